@@ -20,8 +20,7 @@ import sys
 from time import monotonic_ns, sleep, time_ns
 
 from bench.raw_node import node, publisher, subscription, taker
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import JointStateWriter, NANOSECONDS
 from linkage_ros.signals import stop_on_signals
 
 _STAMP = Struct('<iI')

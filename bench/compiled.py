@@ -26,15 +26,11 @@ import time
 
 from bench import ROOT
 from bench.report import in_turn, ratios, say, spread, Table
-from linkage_ros.description.linkage_file import load, read_linkage
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.batch import Array
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.ranges import is_iterated
+from linkage_ros.description import load, parse_yaml, read_linkage
+from linkage_ros.kinematics import Array, Closure, is_iterated
+from linkage_ros.kinematics.compiling import Compiled
 from linkage_ros.processes import MeasurementError
-from linkage_ros.tools.models.source_code.c import C
-from linkage_ros.tools.models.source_code.source import Subject, write_source
+from linkage_ros.tools.models.source_code import C, Subject, write_source
 import numpy as np
 
 RATE, ACCELERATION = 3.0, 0.5

@@ -21,10 +21,10 @@ from math import atan2, cos, isclose, sin, sqrt
 
 from bench import ROOT
 from bench.report import compare, in_turn, Table
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.description import parse_scene
+from linkage_ros.messages import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.processes import MeasurementError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 
 BEGIN = 1_700_000_000_000_000_000
 PERIOD = 10_000

@@ -19,8 +19,8 @@ from contextlib import suppress
 from pathlib import Path
 import sys
 
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.description import load_scene
+from linkage_ros.kinematics import Closure
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node

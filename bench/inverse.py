@@ -14,7 +14,7 @@ from collections.abc import Callable
 import time
 
 from bench.report import in_turn, ratios, spread, Table
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.resources import named_file
 
 INVERTED = (

@@ -24,10 +24,9 @@ from math import atan2, cos, sin, sqrt, tau
 
 from bench import ROOT
 from bench.report import compare, in_turn, say, Table
-from linkage_ros.description.linkage_file import load
-from linkage_ros.kinematics.batch import Batch
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.description import load
+from linkage_ros.kinematics import Batch, Closure
+from linkage_ros.kinematics.compiling import Compiled
 from linkage_ros.processes import MeasurementError
 import numpy as np
 from numpy.typing import ArrayLike

@@ -18,7 +18,7 @@ from pathlib import Path
 from bench.report import ratios, say, spread, Table
 from bench.ticks import write_scene
 from linkage_ros.processes import Graph
-from linkage_ros.tools.study.measuring import percentile
+from linkage_ros.tools.study import percentile
 
 TARGET = 1.25
 

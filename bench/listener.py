@@ -27,7 +27,7 @@ from typing import Any
 
 from bench.raw_node import keep_last, node, subscription, taker
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import NANOSECONDS
 from linkage_ros.signals import stop_on_signals
 
 _POLL = 0.005

@@ -23,8 +23,7 @@ import sys
 from time import monotonic_ns, sleep, time_ns
 
 from bench.raw_node import node, publisher, subscription, taker, waiter
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import JointStateWriter, NANOSECONDS
 from linkage_ros.signals import stop_on_signals
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data

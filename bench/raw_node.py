@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import sys
 from typing import Any
 
-from linkage_ros.node.scene_topics import CRANK_QOS, OUTPUT_QOS
+from linkage_ros.node import CRANK_QOS, OUTPUT_QOS
 import rclpy
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node

@@ -19,8 +19,8 @@ import time
 
 from bench import ROOT
 from linkage_ros.cli import terminal
-from linkage_ros.tools.study.measuring import alternate_order, describe_machine, spread_of
-from linkage_ros.tools.view.pages.markdown import table_lines
+from linkage_ros.tools.study import alternate_order, describe_machine, spread_of
+from linkage_ros.tools.view.pages import table_lines
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ import time
 from bench import ROOT
 from bench.report import ratios, say, spread, Table
 from linkage_ros.processes import Graph, MeasurementError, Process
-from linkage_ros.tools.study.measuring import alternate_order
+from linkage_ros.tools.study import alternate_order
 
 _FOUR_BAR = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
 

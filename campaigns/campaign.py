@@ -20,7 +20,7 @@ import time
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from bench.report import machine_table, say, show, Table, write_page
-from linkage_ros.tools.study.measuring import percentile
+from linkage_ros.tools.study import percentile
 
 Work = TypeVar('Work')
 Result = TypeVar('Result')

@@ -36,11 +36,17 @@ from campaigns.campaign import (
     publish,
     results_of,
 )
-from linkage_ros.bag.mcap_records import Message, RecordSource
-from linkage_ros.bag.reader import BagMessage, read_bag, topic_of
-from linkage_ros.bag.salvage import Salvage
-from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    BagMessage,
+    BagWriter,
+    Message,
+    QosProfile,
+    read_bag,
+    RecordSource,
+    Salvage,
+    Topic,
+    topic_of,
+)
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 from mcap.records import Attachment

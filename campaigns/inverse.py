@@ -26,12 +26,9 @@ from typing import Any
 from bench import ROOT
 from bench.report import Table
 from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.crank_branches import CrankBranch
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.ranges import is_iterated
+from linkage_ros.kinematics import Closure, CrankBranch, Input, is_iterated, Linkage, RevoluteJoint
 from linkage_ros.resources import linkage_names, named_file
 import numpy as np
 

@@ -43,7 +43,8 @@ from campaigns.campaign import (
     tallies_of,
 )
 from flint import arb, ctx
-from linkage_ros.tools.design.pairs.freudenstein import solve_links, three_pairs, TRUSTED
+from linkage_ros.tools.design import solve_links, three_pairs
+from linkage_ros.tools.design.pairs.freudenstein import TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 

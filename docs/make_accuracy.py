@@ -21,27 +21,33 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
+from linkage_ros.description import LINKAGE_FILE, load_scene, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import list_names
 from linkage_ros.resources import shipped_path
-from linkage_ros.stages.effects.stage import NEEDS, PUBLISHED_WITH
-from linkage_ros.tools.study.budget import Budget
-from linkage_ros.tools.study.budget_text import (
+from linkage_ros.stages.effects import NEEDS, PUBLISHED_WITH
+from linkage_ros.tools.study import (
+    Budget,
+    budget_svg,
     closing_lines,
+    compare_hard_cases,
+    compare_runs,
+    describe_machine,
+    DISTANCES,
     error_text,
+    HardCase,
     heads_of,
     lead_lines,
+    leave_out,
+    measure_budget,
+    PARTS,
+    price_scenes,
     price_text,
+    Progress,
     rows_of,
+    tick_price,
+    turn_crank,
 )
-from linkage_ros.tools.study.deliberate import compare_runs, leave_out
-from linkage_ros.tools.study.measure import measure_budget, PARTS
-from linkage_ros.tools.study.measuring import describe_machine, Progress
-from linkage_ros.tools.study.picture import budget_svg
-from linkage_ros.tools.study.prices import price_scenes, tick_price, turn_crank
-from linkage_ros.tools.study.solving import compare_hard_cases, DISTANCES, HardCase
-from linkage_ros.tools.view.pages.markdown import fill_marks, table_lines
+from linkage_ros.tools.view.pages import fill_marks, table_lines
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'

@@ -23,13 +23,12 @@ import re
 import sys
 from typing import NamedTuple
 
-from linkage_ros.cli.scene import parameters_of, REGISTRIES, table_of
-from linkage_ros.description.parameters import first_docstring_line, parameter_rows
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.dynamics.loads import AppliedLoads
+from linkage_ros.cli import parameters_of, REGISTRIES, table_of
+from linkage_ros.description import first_docstring_line, parameter_rows, parse_scene
+from linkage_ros.dynamics import AppliedLoads
 from linkage_ros.errors import FileError
-from linkage_ros.stages.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.stages.effects import EFFECTS, NEEDS, PUBLISHED_WITH
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.view.pages import markdown
 import yaml
 

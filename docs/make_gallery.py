@@ -23,25 +23,32 @@ from pathlib import Path
 import shutil
 import sys
 
-from linkage_ros.cli.arguments import angle_text, fixed_text
-from linkage_ros.cli.check import describe_group
-from linkage_ros.description.linkage_file import load
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import all_places, LinkageView, prepare_view, symbol_size
-from linkage_ros.kinematics.shapes import bounding_corners, draw_shapes, shape_outline
-from linkage_ros.kinematics.sides import sides_at
-from linkage_ros.kinematics.sweep_analysis import (
+from linkage_ros.cli import angle_text, describe_group, fixed_text
+from linkage_ros.description import load
+from linkage_ros.kinematics import (
+    all_places,
+    bounding_corners,
+    Closure,
     conditioning_curves,
+    draw_shapes,
+    Driven,
     InputSweep,
+    LinkageView,
+    links_of,
+    prepare_view,
+    shape_outline,
+    sides_at,
+    symbol_size,
     transmission_angles,
     usual_inputs,
 )
-from linkage_ros.kinematics.topology import Driven, links_of
-from linkage_ros.tools.drawing.animation import animate, range_motion
-from linkage_ros.tools.drawing.figure import paint_background, paint_picture
-from linkage_ros.tools.drawing.painting import (
+from linkage_ros.tools.drawing import (
+    animate,
+    paint_background,
+    paint_picture,
     paint_shapes,
     picture_settings,
+    range_motion,
     save_picture,
     set_plane,
 )

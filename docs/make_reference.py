@@ -25,10 +25,9 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.cli.main import COMMANDS, EXIT_CODES, module_of, parser_of
-from linkage_ros.cli.scene import REGISTRIES, table_of
-from linkage_ros.description.schema import linkage_schema, scene_schema
-from linkage_ros.tools.view.pages.markdown import table_lines
+from linkage_ros.cli import COMMANDS, EXIT_CODES, module_of, parser_of, REGISTRIES, table_of
+from linkage_ros.description import linkage_schema, scene_schema
+from linkage_ros.tools.view.pages import table_lines
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -37,7 +37,7 @@ DECIMALS = range(3, 17)
 
 def main() -> int:
     """Write page and pictures; return 1 if a picture is too large."""
-    from linkage_ros.tools.design.picture import draw_design
+    from linkage_ros.tools.design import draw_design
 
     from .pictures.digits import digits_picture
 

@@ -22,10 +22,7 @@ from threading import Event, Thread
 from typing import Any
 
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view.conversation import Conversation, UserFile
-from linkage_ros.tools.view.model import build_model
-from linkage_ros.tools.view.page import page_html as page_of
-from linkage_ros.tools.view.server import serve
+from linkage_ros.tools.view import build_model, Conversation, page_html as page_of, serve, UserFile
 from PIL import Image
 
 from test.browser import chromium  # noqa: I100 (our own, not that of Python)

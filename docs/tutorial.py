@@ -195,8 +195,7 @@ assert [again.tick(index * 10_000_000).message for index in range(101)] == [
 # checks the design.
 
 # %%
-from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar
-from linkage_ros.tools.design.proof import prove
+from linkage_ros.tools.design import exact_four_bar, prove
 
 angles = np.radians([[25, 30], [35, 40], [50, 60]])
 design, conditioning = exact_four_bar(angles[:, 0], angles[:, 1], ground=1.0)

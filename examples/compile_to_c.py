@@ -13,8 +13,7 @@ from pathlib import Path
 import subprocess
 
 import linkage_ros as lr
-from linkage_ros.tools.models.source_code.c import C
-from linkage_ros.tools.models.source_code.source import Subject, write_source
+from linkage_ros.tools.models.source_code import C, Subject, write_source
 
 closure = lr.load('four_bar')
 subject = Subject(closure, 'four_bar', 'four_bar.yaml', 0, closure.joint_names)

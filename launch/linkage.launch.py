@@ -22,8 +22,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.tools.models.robot_model_command import model_of
-from linkage_ros.tools.models.urdf import urdf_model as write_urdf
+from linkage_ros.tools.models import model_of, urdf_model as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
 

@@ -63,54 +63,8 @@ Design a four-bar whose rocker follows a function of the crank:
 <Closure logarithm: 1 input, 2 joints>
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-import sys
-from typing import Any
+from linkage_ros.faces import lazy_names
 
 __version__ = '0.1.0'
 
-# A name is imported when it is used, so that nothing else is; type checkers read __init__.pyi.
-_HOMES = {
-    'linkage_ros.bag.reader': 'Bag BagMessage read_bag',
-    'linkage_ros.tools.drawing.svg_picture': 'svg',
-    'linkage_ros.errors': 'BagError DefinitionError FileError LinkageError SynthesisError',
-    'linkage_ros.description.linkage_file': 'load',
-    'linkage_ros.kinematics.batch': 'Batch',
-    'linkage_ros.kinematics.closure': 'Closure',
-    'linkage_ros.kinematics.inverse_closure': 'InverseClosure',
-    'linkage_ros.kinematics.linkage': (
-        'Input Limits Linkage Mass Ratio RevoluteJoint SlideJoint Slider'
-    ),
-    'linkage_ros.kinematics.results': 'Acceleration InputRange Position Velocity',
-    'linkage_ros.kinematics.status': 'Status',
-    'linkage_ros.messages.joint_state': 'JointStateReader Rejection',
-    'linkage_ros.tick.pipeline': 'Pipeline Tick',
-    'linkage_ros.replay.replay': 'recorded_scene',
-    'linkage_ros.resources': 'linkage_names scene_names',
-    'linkage_ros.description.scene_file': 'load_scene',
-    'linkage_ros.description.scene': 'Scene',
-    'linkage_ros.tools.design.defects': 'assess Assessment',
-    'linkage_ros.tools.design.design': 'Design',
-    'linkage_ros.tools.design.function.task': 'generate_function',
-    'linkage_ros.tools.design.motion': 'from_fixed_pivots from_moving_pivots Pose',
-    'linkage_ros.tools.design.path.curves': 'PathTask',
-    'linkage_ros.tools.design.path.generate': 'generate_path',
-    'linkage_ros.tools.view.linkage_page': 'LinkagePage',
-}
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
-
-__all__ = [*_HOME_OF]  # noqa: PLE0604 (they are strings)
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        message = f'module {__name__!r} has no attribute {name!r}'
-        raise AttributeError(message, name=name, obj=sys.modules[__name__])
-    value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__, __all__ = lazy_names(__name__)

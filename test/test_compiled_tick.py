@@ -12,14 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 import re
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.linkage import GROUND, Mass
-from linkage_ros.kinematics.topology import assur_groups
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tick.pipeline import LinkageState, Pipeline
+from linkage_ros.description import linkage_text, parse_scene, parse_yaml, read_linkage
+from linkage_ros.kinematics import assur_groups, GROUND, Mass
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tick import LinkageState, Pipeline
 import pytest
 
 from .support.scenes import pipeline_of

@@ -15,24 +15,33 @@ A row is what stands behind the name in a scene file; in a message, … stands f
 from importlib import import_module
 import re
 
-from linkage_ros.description.parameters import declared_fields
-from linkage_ros.dynamics.loads import JointFriction
+from linkage_ros.description import declared_fields
+from linkage_ros.dynamics import JointFriction
 from linkage_ros.errors import FileError
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.backlash import BacklashParameters
-from linkage_ros.stages.effects.bias import BiasParameters
-from linkage_ros.stages.effects.clearance import ClearanceParameters
-from linkage_ros.stages.effects.compliance import ComplianceParameters
-from linkage_ros.stages.effects.delay import DelayParameters, JointDelay
-from linkage_ros.stages.effects.dropout import DropoutParameters, JointDropout
-from linkage_ros.stages.effects.encoder import EncoderParameters, JointEncoder
-from linkage_ros.stages.effects.friction import FrictionParameters
-from linkage_ros.stages.effects.jitter import JitterParameters
-from linkage_ros.stages.effects.measuring_range import JointRange, MeasuringRangeParameters
-from linkage_ros.stages.effects.noise import JointNoise, NoiseParameters
-from linkage_ros.stages.effects.rate_limit import JointRateLimit, RateLimitParameters
-from linkage_ros.stages.effects.stage import EFFECTS, NEEDS
-from linkage_ros.stages.effects.tolerance import ToleranceParameters
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import (
+    BacklashParameters,
+    BiasParameters,
+    ClearanceParameters,
+    ComplianceParameters,
+    DelayParameters,
+    DropoutParameters,
+    EFFECTS,
+    EncoderParameters,
+    FrictionParameters,
+    JitterParameters,
+    JointDelay,
+    JointDropout,
+    JointEncoder,
+    JointNoise,
+    JointRange,
+    JointRateLimit,
+    MeasuringRangeParameters,
+    NEEDS,
+    NoiseParameters,
+    RateLimitParameters,
+    ToleranceParameters,
+)
 from linkage_ros.stages.faults import FAULTS
 import pytest
 

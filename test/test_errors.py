@@ -14,7 +14,7 @@ from pkgutil import walk_packages
 
 import linkage_ros
 from linkage_ros.errors import FileError, LinkageError, list_names
-from linkage_ros.tools.models.part import PartError
+from linkage_ros.tools.models import PartError
 import pytest
 
 from .support.scenes import linkage_of

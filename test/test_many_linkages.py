@@ -8,14 +8,13 @@
 
 """A scene of several linkages: each as it would be alone, and one joint state for all."""
 
-from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description import load_scene, parse_scene
 from linkage_ros.errors import FileError
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JointStateWriter, Rejection
+from linkage_ros.tick import Pipeline
 import pytest
 
-from .support.messages import read_joint_state as read
-from .support.messages import STORE
+from .support.messages import read_joint_state as read, STORE
 from .support.scenes import four_bar_text, pipeline_of
 
 MS = 1_000_000

@@ -18,9 +18,8 @@ from math import isnan
 import struct
 from typing import Any, NamedTuple
 
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
-from linkage_ros.messages.joint_state import (
+from hypothesis import assume, example, given, settings, strategies as st
+from linkage_ros.messages import (
     CrankSample,
     EffortCommand,
     JointEffortReader,

@@ -13,19 +13,24 @@ from importlib import import_module
 from math import cos, sin
 from typing import Any, NamedTuple
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.messages.joint_state import JOINT_STATE as JOINT_STATE_FIELDS
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import (
+from hypothesis import given, strategies as st
+from linkage_ros.messages import (
+    ADD,
+    DELETE,
+    JOINT_STATE as JOINT_STATE_FIELDS,
     JOINT_TRAJECTORY,
+    JointStateWriter,
     JointTrajectoryWriter,
+    MalformedError,
+    Marker,
+    MARKER_ARRAY,
+    MarkerArrayWriter,
     MULTI_DOF_JOINT_STATE,
+    pack_message,
+    parse_message,
     PlanarWrenchWriter,
 )
-from linkage_ros.messages.layout import MalformedError, pack_message, parse_message
-from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MARKER_ARRAY, MarkerArrayWriter
-from linkage_ros.tools.view.report.diagnostics_summary import DIAGNOSTIC_ARRAY
+from linkage_ros.tools.view.report import DIAGNOSTIC_ARRAY
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype

@@ -20,25 +20,22 @@ import sys
 from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.tables import table_file
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.drawing import painting
-from linkage_ros.tools.drawing.animation import animate, range_motion
-from linkage_ros.tools.drawing.dxf import links_dxf
-from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture
-from linkage_ros.tools.drawing.spread import draw_spread, JointSpread
-from linkage_ros.tools.drawing.svg_picture import svg
-from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.source_code.languages import LANGUAGES
-from linkage_ros.tools.models.source_code.source import Subject, write_source
-from linkage_ros.tools.models.urdf import urdf_model
-from linkage_ros.tools.view.linkage_page import LinkagePage
+from linkage_ros.description import linkage_text, parse_yaml, read_closure, table_file
+from linkage_ros.kinematics import Closure, prepare_view, usual_inputs
+from linkage_ros.tools.drawing import (
+    animate,
+    assemblies_picture,
+    draw_spread,
+    JointSpread,
+    links_dxf,
+    paint_picture,
+    painting,
+    range_motion,
+    svg,
+)
+from linkage_ros.tools.models import ModelPart, mujoco_model, urdf_model
+from linkage_ros.tools.models.source_code import LANGUAGES, Subject, write_source
+from linkage_ros.tools.view import LinkagePage
 import numpy as np
 import pytest
 

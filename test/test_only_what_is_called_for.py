@@ -19,9 +19,9 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.solvers import SOLVERS
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
 import pytest
 

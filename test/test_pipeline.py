@@ -16,13 +16,12 @@ import subprocess
 import sys
 
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.tick.pipeline import LinkageState
+from linkage_ros.kinematics import Status
+from linkage_ros.messages import JointStateWriter, Rejection
+from linkage_ros.tick import LinkageState
 import pytest
 
-from .support.messages import read_joint_state as read
-from .support.messages import STORE
+from .support.messages import read_joint_state as read, STORE
 from .support.scenes import FIVE_BAR, pipeline_of
 
 MS = 1_000_000

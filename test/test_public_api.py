@@ -22,7 +22,7 @@ import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
 from linkage_ros.resources import shipped_path
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.solvers import TableClosure
 import pytest
 
 PACKAGE = Path(lr.__file__).parent

@@ -9,7 +9,7 @@
 """Tools are found by name; one that is not installed is told in one line."""
 
 from linkage_ros import workbench
-from linkage_ros.cli.main import COMMANDS
+from linkage_ros.cli import COMMANDS
 from linkage_ros.errors import LinkageError
 from linkage_ros.workbench import find_tool, TOOLS
 import pytest

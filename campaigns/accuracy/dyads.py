@@ -36,7 +36,7 @@ from campaigns.accuracy.motion import (
     times,
 )
 from flint import acb
-from linkage_ros.kinematics.linkage import Side
+from linkage_ros.kinematics import Side
 
 
 class _Dyad:

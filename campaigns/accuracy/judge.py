@@ -35,8 +35,7 @@ from campaigns.accuracy.reference import (
 )
 from flint import arb, ctx
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Status
 import numpy as np
 import numpy.typing as npt
 

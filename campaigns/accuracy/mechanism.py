@@ -21,14 +21,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Any, NamedTuple, Protocol
 
-from linkage_ros.kinematics.linkage import (
-    Input,
-    Linkage,
-    RevoluteJoint,
-    Side,
-    SlideJoint,
-    Slider,
-)
+from linkage_ros.kinematics import Input, Linkage, RevoluteJoint, Side, SlideJoint, Slider
 
 GROUND = 'ground'
 CRANK = 'crank'

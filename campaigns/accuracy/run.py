@@ -33,7 +33,7 @@ from campaigns.accuracy.reference import (
 )
 from campaigns.campaign import Part, parts_of, tallies_of
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 
 _PART = 20
 """Number of linkages in a part: about a tenth of a second's work."""

@@ -27,13 +27,9 @@ from struct import Struct
 from campaigns.campaign import attack_in_parts
 from campaigns.damage import KINDS, make
 from campaigns.in_process import confined, Ended, in_process
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import LINKAGE_FILE, parse_scene, SCENE_FILE
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.bag import BagWriter, METADATA_FILE, RUN_FILE, Storage, Topic
+from linkage_ros.description import LINKAGE_FILE, parse_scene, SCENE_FILE
+from linkage_ros.tick import Pipeline
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 

@@ -29,11 +29,9 @@ import warnings
 
 from campaigns.campaign import attack_in_parts
 from campaigns.in_process import confined, in_process
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.description import parse_yaml, read_linkage
+from linkage_ros.messages import JointStateWriter
 from linkage_ros.resources import shipped_path
 
 _NUMBER = re.compile(rb'(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])')

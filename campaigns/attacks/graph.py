@@ -32,8 +32,8 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from linkage_ros.description.linkage_file import load
-from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
+from linkage_ros.description import load
+from linkage_ros.messages import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 from linkage_ros.resources import shipped_path
 from rcl_interfaces.msg import Parameter, ParameterValue

@@ -36,7 +36,7 @@ from campaigns.disk.judge import (
     Outcome,
     Recorded,
 )
-from linkage_ros.bag.storage import Storage
+from linkage_ros.bag import Storage
 
 _NOBODY = 65534
 

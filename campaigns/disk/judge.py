@@ -19,12 +19,20 @@ from time import monotonic_ns, sleep
 from typing import Any
 
 from campaigns.kills.plan import ATTACHMENTS, expected, message, TOPICS
-from linkage_ros.bag.metadata import BagSummary, FAILURE, METADATA_FILE, ROOT_KEY, UNFINISHED
-from linkage_ros.bag.reader import Bag, BagMessage, read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recover import recover_bag
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    Bag,
+    BagMessage,
+    BagSummary,
+    BagWriter,
+    FAILURE,
+    METADATA_FILE,
+    read_bag,
+    Recorder,
+    recover_bag,
+    ROOT_KEY,
+    Storage,
+    UNFINISHED,
+)
 from linkage_ros.errors import BagError, RecordingError
 from rosbags.highlevel import AnyReader
 import yaml

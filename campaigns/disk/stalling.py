@@ -25,8 +25,7 @@ from typing import NamedTuple
 
 from campaigns.disk.filling import Disk, mounted
 from campaigns.endurance.memory import Counts, counts_of
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import METADATA_FILE, read_bag
 from linkage_ros.errors import BagError
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 

@@ -29,16 +29,10 @@ from typing import Any, NamedTuple
 from bench.report import say
 from campaigns.campaign import progress_lines
 from campaigns.endurance.memory import shortcomings, Usage, usage
-from linkage_ros.bag.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.bag import BagWriter, Recorder, RecordingSummary, Storage, Topic
+from linkage_ros.description import load_scene, Scene
+from linkage_ros.messages import JointStateWriter, NANOSECONDS
+from linkage_ros.tick import Pipeline, TickLoop
 from rosbags.typesys import get_typestore, Stores
 
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'

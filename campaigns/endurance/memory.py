@@ -19,8 +19,7 @@ import re
 from statistics import median
 from typing import NamedTuple
 
-from linkage_ros.bag.metadata import STATS_RECORD
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import read_bag, STATS_RECORD
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 

@@ -22,7 +22,7 @@ from typing import Any
 from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
 from campaigns.endurance.memory import Counts, counts_of, shortcomings, Usage, usage
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import read_bag
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 from rosbags.typesys import get_typestore, Stores
 

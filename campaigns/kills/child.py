@@ -19,10 +19,7 @@ import sys
 from time import monotonic_ns, sleep
 
 from campaigns.kills.plan import ATTACHMENTS, Marks, message, PERIOD_NS, Phase, TOPICS
-from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagSummary, BagWriter, Recorder, Storage
 
 _SWITCH_INTERVAL = 1e-4  # as the node has it [s]
 

@@ -25,10 +25,8 @@ from random import Random
 from time import monotonic_ns
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import BagMessage
-from linkage_ros.bag.storage import COMPRESSIONS, Storage
-from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.bag import BagMessage, COMPRESSIONS, QosProfile, Storage, Topic
+from linkage_ros.messages import JointStateWriter
 
 PERIOD_NS = 1_000_000
 """Period of the ticks: 1 kHz."""

@@ -26,9 +26,15 @@ from typing import Any
 
 from campaigns.campaign import results_of
 from campaigns.kills.plan import expected, Marks, PERIOD_NS, Phase, Plan, TOPICS
-from linkage_ros.bag.metadata import DISCARDED, METADATA_FILE, ROOT_KEY, UNFINISHED
-from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.recover import recover_bag
+from linkage_ros.bag import (
+    BagMessage,
+    DISCARDED,
+    METADATA_FILE,
+    read_bag,
+    recover_bag,
+    ROOT_KEY,
+    UNFINISHED,
+)
 from linkage_ros.errors import BagError
 from rosbags.highlevel import AnyReader
 import yaml

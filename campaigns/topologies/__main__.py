@@ -47,7 +47,7 @@ from campaigns.topologies.run import (
     Tally,
     TESTS,
 )
-from linkage_ros.description.linkage_writer import linkage_text
+from linkage_ros.description import linkage_text
 import numpy as np
 
 INTRO = """

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint
 import numpy as np
 import numpy.typing as npt
 

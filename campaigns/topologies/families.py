@@ -30,15 +30,7 @@ from campaigns.accuracy.random_families import DYADS
 from campaigns.topologies.constraints import Real
 from campaigns.topologies.geometry import DrivenLink, Geometry, Group, Passing
 from campaigns.topologies.topology import Topology, TopologyBuilder
-from linkage_ros.kinematics.linkage import (
-    GROUND,
-    Input,
-    Linkage,
-    RevoluteJoint,
-    Side,
-    SlideJoint,
-    Slider,
-)
+from linkage_ros.kinematics import GROUND, Input, Linkage, RevoluteJoint, Side, SlideJoint, Slider
 import numpy as np
 
 Links = dict[str, dict[str, tuple[float, float]]]

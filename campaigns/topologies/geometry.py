@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Spot
 from campaigns.topologies.constraints import Array, Real, TURN
-from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics import GROUND, Linkage
 import numpy as np
 
 Complex = np.clongdouble

@@ -28,9 +28,7 @@ from campaigns.topologies.constraints import (
 from campaigns.topologies.geometry import Geometry, Places
 from campaigns.topologies.topology import follow, Topology, Walks
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, GROUND, Status
 import numpy as np
 
 QUANTITIES = ('position', 'velocity', 'acceleration')
@@ -204,7 +202,7 @@ def _compare_arrays(
     findings: Findings,
 ) -> None:
     """Compare the solution of arrays with that of single states."""
-    from linkage_ros.kinematics.batch import CODES  # local import: with numpy only
+    from linkage_ros.kinematics import CODES  # local import: with numpy only
 
     motion = {'rates': rates.astype(float), 'accelerations': accelerations.astype(float)}
     try:

@@ -18,10 +18,7 @@ from campaigns.topologies.constraints import Array, Real
 from campaigns.topologies.geometry import Geometry, Margin, Passing
 from campaigns.topologies.judge import Findings
 from campaigns.topologies.topology import Topology, Walks
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.results import SingularInput
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, GROUND, SingularInput, Status
 import numpy as np
 
 SAMPLES = 2400

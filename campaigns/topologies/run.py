@@ -33,8 +33,8 @@ from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges
 from campaigns.topologies.topology import both_ways, Topology
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.description import linkage_text
+from linkage_ros.kinematics import Linkage
 
 FILES = ('draw', 'urdf', 'mjcf')
 """Commands that write a file; `check` and `accuracy` are tried separately."""

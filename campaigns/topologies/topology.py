@@ -32,7 +32,7 @@ from campaigns.accuracy.mechanism import Dyad, polar, Spot, Turn
 from campaigns.accuracy.random_families import add_random, Builder
 from campaigns.topologies.constraints import Array, Equations, Real
 from campaigns.topologies.geometry import DrivenLink, DrivenRRR, Group, Passing
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
     GROUND,
     Input,

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from math import isnan, nan
 from pathlib import Path
 
-from linkage_ros.kinematics.shapes import COLOURS, INK
-from linkage_ros.tools.drawing.painting import picture_settings, save_picture
+from linkage_ros.kinematics import COLOURS, INK
+from linkage_ros.tools.drawing import picture_settings, save_picture
 
 _LINKS = ('crank', 'coupler', 'rocker')
 

@@ -13,8 +13,7 @@ from __future__ import annotations
 from math import cos, sin, tau
 from typing import Any
 
-from linkage_ros.messages.joint_state import JointStateReader
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages import JOINT_STATE_TYPE, JointStateReader
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -142,7 +141,7 @@ def play(scene: Scene) -> Figure:
     seconds = 1.0
     moving = run(scene, seconds)
     read = JointStateReader([f'{CRANK}_motor']).read
-    read_motor = [read(data) for data in extra_messages(scene, JOINT_STATE, seconds)]
+    read_motor = [read(data) for data in extra_messages(scene, JOINT_STATE_TYPE, seconds)]
     angles = np.array([sample.angles[0] for sample in read_motor])
     crank, _, _ = moving.crank()
     upper.plot(moving.times, angles, color=VERMILLION, linestyle='--', label='motor')

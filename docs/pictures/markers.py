@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.stages.effects.markers import MESSAGE
+from linkage_ros.stages.effects import MESSAGE
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch

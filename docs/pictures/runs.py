@@ -18,12 +18,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.effects.stage import SensorReading
-from linkage_ros.tick.pipeline import LinkageState, Pipeline
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.description import load_scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.effects import SensorReading
+from linkage_ros.tick import LinkageState, Pipeline
 import numpy as np
 from numpy.typing import NDArray
 

@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
-from linkage_ros.tools.design.pairs.freudenstein import three_pairs
+from linkage_ros.tools.design import three_pairs
 from mpmath import mp, mpf
 import numpy as np
 from numpy.typing import NDArray

@@ -17,8 +17,7 @@ from pathlib import Path
 from shlex import split
 from typing import NamedTuple
 
-from linkage_ros.tools.design.synthesis_tasks import DesignAnswer
-from linkage_ros.tools.design.synthesize_command import add_arguments, find_solutions
+from linkage_ros.tools.design import add_arguments, DesignAnswer, find_solutions
 
 from .markdown import prose
 
@@ -89,7 +88,7 @@ def answer_to(kind: Kind) -> DesignAnswer:
 
 def chapter(folder: Path) -> Iterator[str]:
     """Draw every kind of task, and yield the lines on them."""
-    from linkage_ros.tools.design.picture import draw_design
+    from linkage_ros.tools.design import draw_design
 
     yield from prose("""
         ## Four-bars by kind of task

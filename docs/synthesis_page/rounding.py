@@ -16,9 +16,7 @@ from itertools import pairwise
 from math import ceil, log10, radians
 from typing import NamedTuple
 
-from linkage_ros.tools.design.defects import assess
-from linkage_ros.tools.design.design import Design
-from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar, three_pairs, ThreePairs
+from linkage_ros.tools.design import assess, Design, exact_four_bar, three_pairs, ThreePairs
 from mpmath import mp, mpf
 import numpy as np
 

@@ -26,8 +26,7 @@ import re
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-from matplotlib import pyplot as plt
-from matplotlib import rc_context
+from matplotlib import pyplot as plt, rc_context
 from myst_parser.parsers.sphinx_ import MystParser
 
 _CELL = re.compile(r'^# %%(.*)$', re.MULTILINE)

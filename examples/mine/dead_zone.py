@@ -10,7 +10,7 @@
 
 from dataclasses import dataclass
 
-from linkage_ros.description.parameters import number
+from linkage_ros.description import number
 
 AFTER = 'noise'
 

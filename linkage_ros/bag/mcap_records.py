@@ -21,8 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from importlib import import_module
 from io import BytesIO, SEEK_END
-from struct import error as StructError
-from struct import Struct
+from struct import error as StructError, Struct
 from typing import Any, BinaryIO, NamedTuple
 from zlib import crc32
 

@@ -41,9 +41,7 @@ from linkage_ros.bag.other_formats import (
     unpacked_file,
 )
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
-from linkage_ros.description.file_access import read_regular
-from linkage_ros.description.file_kinds import BINARY, kind_of_bytes
-from linkage_ros.description.yaml_file import bounded_yaml
+from linkage_ros.description import BINARY, bounded_yaml, kind_of_bytes, read_regular
 from linkage_ros.errors import BagError, quote
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC

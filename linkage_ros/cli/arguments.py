@@ -17,9 +17,9 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description.file_access import check_new, check_output_name
+from linkage_ros.description import check_new, check_output_name
 from linkage_ros.errors import decimal_comma, LinkageError, list_names
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Suffixes of the pictures that matplotlib writes."""

@@ -20,30 +20,33 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.contents import Contents, Layout, layout_of, REPORT_EVERY
-from linkage_ros.bag.metadata import counts_in, FAILURE
-from linkage_ros.bag.reader import (
+from linkage_ros.bag import (
     Bag,
     BagMessage,
+    Contents,
+    counts_in,
+    expected_counts,
+    FAILURE,
     information_of,
-    MOST_ATTACHED,
-    read_bag,
-    serialized_metadata,
-)
-from linkage_ros.bag.recover import expected_counts, NOTHING_LOST, RECOVERED
-from linkage_ros.bag.run_events import (
+    Layout,
+    layout_of,
     missing_start_reason,
+    MOST_ATTACHED,
+    NOTHING_LOST,
+    read_bag,
     read_raw_metadata,
     read_run_metadata,
+    RECOVERED,
+    REPORT_EVERY,
     RunMetadata,
+    serialized_metadata,
 )
 from linkage_ros.cli.arguments import finite_or_none
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, escape_unprintable, list_names
-from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.verify import ExaminedRun, WorstResiduals
+from linkage_ros.kinematics import four_bars
+from linkage_ros.replay import ExaminedRun, recorded_scene, WorstResiduals
 from linkage_ros.signals import heed_signals, StoppedError
 
 _MIB = 2**20
@@ -95,7 +98,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
     scene = recorded_scene(bag, settings=settings)
     if not trust_effects or not scene.not_imported:
         return scene
-    from linkage_ros.stages.effects.user_effects import found_in
+    from linkage_ros.stages.effects import found_in
 
     for name in scene.not_imported:
         where = found_in(name)

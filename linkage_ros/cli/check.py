@@ -21,24 +21,29 @@ from typing import Any
 
 from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite_or_none
 from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
-from linkage_ros.description.linkage_file import linkage_content, read_closure
-from linkage_ros.description.notes import linkage_notes
+from linkage_ros.description import linkage_content, linkage_notes, read_closure
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.kinematics.ranges import is_iterated
-from linkage_ros.kinematics.sides import closes_in_two_ways, closing_name, sides_at
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import (
+from linkage_ros.kinematics import (
+    closes_in_two_ways,
+    closing_name,
+    Closure,
     conditioning_curves,
+    Driven,
+    Dyad,
     Extreme,
+    four_bars,
+    Group,
     InputSweep,
+    is_iterated,
+    Iterated,
+    links_of,
+    sides_at,
+    Status,
     SweptCurve,
     transmission_angles,
     usual_inputs,
     worst_residual,
 )
-from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated, links_of
 from linkage_ros.resources import named_file
 
 _SINGULAR = {
@@ -252,7 +257,7 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
         if not isinstance(group, Iterated) or pose is None:
             continue
         # local import: it loads numpy
-        from linkage_ros.kinematics.assembly_modes import other_assemblies, STARTS
+        from linkage_ros.kinematics import other_assemblies, STARTS
 
         groups.append(
             {

@@ -26,9 +26,9 @@ from typing import Any
 
 from linkage_ros.cli.arguments import bounded_number
 from linkage_ros.errors import did_you_mean, escape_unprintable, LinkageError, list_names, shorten
-from linkage_ros.messages.joint_values import EFFORT, JOINT_STATE, POSITION, RATE, UNITS
-from linkage_ros.node.player import player_node
-from linkage_ros.replay.topic_description import message_type
+from linkage_ros.messages import EFFORT, JOINT_STATE_TYPE, POSITION, RATE, UNITS
+from linkage_ros.node import player_node
+from linkage_ros.replay import message_type
 from linkage_ros.signals import heed_signals
 import rclpy
 from rclpy.node import Node
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     timeout = arguments.timeout or (_TIMEOUT if isfinite(arguments.count) else inf)
     seen = 0
     with heed_signals(), player_node([], 'linkage_echo') as node:
-        silence = _Silence(node, topic, timeout)
+        silence = _SilenceTimer(node, topic, timeout)
         kind = _await_type(node, topic, silence, end, stop)
         if kind is not None:
             seen = _receive_messages(node, topic, kind, arguments, silence, end, stop)
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return int(missing and not stop.is_set())
 
 
-class _Silence:
+class _SilenceTimer:
     """
     The time without a message: reported once, and too long after a timeout.
 
@@ -150,7 +150,9 @@ class _Silence:
         return f'({topics.get(self._topic, 0)} publishers); {remedy}'
 
 
-def _await_type(node: Node, topic: str, silence: _Silence, end: float, stop: Event) -> str | None:
+def _await_type(
+    node: Node, topic: str, silence: _SilenceTimer, end: float, stop: Event
+) -> str | None:
     """Return the type of a topic when it exists; None if the wait ended before."""
     while not stop.is_set() and monotonic() < end and not silence.too_long():
         types = dict(node.get_topic_names_and_types()).get(topic, [])
@@ -169,7 +171,7 @@ def _receive_messages(
     topic: str,
     kind: str,
     arguments: argparse.Namespace,
-    silence: _Silence,
+    silence: _SilenceTimer,
     end: float,
     stop: Event,
 ) -> int:
@@ -250,7 +252,7 @@ def as_yaml(message: Any, kind: str) -> str:
         allow_unicode=True,
         width=inf,
     )
-    if kind != JOINT_STATE:
+    if kind != JOINT_STATE_TYPE:
         return text
     lines = []
     for line in text.splitlines():

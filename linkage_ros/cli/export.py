@@ -26,17 +26,15 @@ import sys
 from threading import Event
 from typing import NamedTuple
 
-from linkage_ros.bag.contents import layout_of, REPORT_EVERY
-from linkage_ros.bag.reader import Bag
+from linkage_ros.bag import Bag, layout_of, REPORT_EVERY
 from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.tables import block_rows, check_kind, table_file, TABLE_KINDS
+from linkage_ros.description import block_rows, check_kind, Scene, table_file, TABLE_KINDS
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
-from linkage_ros.messages.joint_values import (
+from linkage_ros.messages import (
     FORCE_X,
-    JOINT_STATE,
+    JOINT_STATE_TYPE,
     Key,
     MessageContent,
     MessageValues,
@@ -45,8 +43,7 @@ from linkage_ros.messages.joint_values import (
     TYPES,
     UNITS,
 )
-from linkage_ros.replay.replay import own_joint_states, recorded_scene
-from linkage_ros.replay.verify import turning_joints
+from linkage_ros.replay import own_joint_states, recorded_scene, turning_joints
 from linkage_ros.signals import StoppedError
 
 # Each tick, or each message of one topic, becomes a row.
@@ -339,7 +336,7 @@ def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSo
     joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)
-        return ExportSource(bag, {joint_states: JOINT_STATE}, (), {})
+        return ExportSource(bag, {joint_states: JOINT_STATE_TYPE}, (), {})
     written = [joint_states, *(name for name in run.extras if name in readable)]
     wanted = {}
     if scene is not None and run.crank_topic == joint_states:
@@ -353,7 +350,7 @@ def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSo
 
 
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
-    topics = [name for name, kind in readable.items() if kind == JOINT_STATE]
+    topics = [name for name, kind in readable.items() if kind == JOINT_STATE_TYPE]
     if len(topics) == 1:
         return topics[0]
     if topics:
@@ -362,7 +359,7 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
         )
     raise BagError(
         bag.path,
-        f'holds no topic of {JOINT_STATE}',
+        f'holds no topic of {JOINT_STATE_TYPE}',
         f'name {list_names(readable, " or ")} with --topic' if readable else 'name another bag',
     )
 

@@ -22,7 +22,7 @@ from threading import Event
 
 from linkage_ros.cli.arguments import add_output, LINKAGES
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description import atomic_write
 from linkage_ros.errors import FileError
 from linkage_ros.resources import linkage_names, named_file, scene_names, shipped_path
 

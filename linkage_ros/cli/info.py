@@ -23,8 +23,7 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.contents import contents_of, layout_of
-from linkage_ros.bag.reader import Bag
+from linkage_ros.bag import Bag, contents_of, layout_of
 from linkage_ros.cli.arguments import add_bag, add_radians, AngleUnit, wrap_angle
 from linkage_ros.cli.bag_reading import (
     add_trust,
@@ -37,7 +36,7 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
 from linkage_ros.errors import escape_unprintable, LinkageError
-from linkage_ros.replay.verify import examine_states
+from linkage_ros.replay import examine_states
 from linkage_ros.signals import heed_signals
 
 _MIB = 2**20

@@ -16,27 +16,33 @@ import os
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, RUN_FILE
-from linkage_ros.bag.run_events import (
+from linkage_ros.bag import (
+    Bag,
+    BagWriter,
     BEGUN,
     FaultEvent,
+    QosProfile,
     read_raw_metadata,
     ResetEvent,
+    RUN_FILE,
     RunMetadata,
     SampleEvent,
     SEED,
+    Topic,
     USER_EFFECTS,
     WITH_THE_RUN,
 )
-from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene import Scene
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.messages.single_values import time_message
-from linkage_ros.replay.counterfactual import Counterfactual, ReplayEvent
-from linkage_ros.replay.replay import user_effects_here, versions_here
-from linkage_ros.replay.topic_description import describe_topic, message_type
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import Scene
+from linkage_ros.messages import JOINT_STATE_TYPE, time_message
+from linkage_ros.replay import (
+    Counterfactual,
+    describe_topic,
+    message_type,
+    ReplayEvent,
+    user_effects_here,
+    versions_here,
+)
+from linkage_ros.tick import Pipeline
 
 _FLUSHED_EVERY = 50_000
 _TIME = 'builtin_interfaces/msg/Time'
@@ -125,8 +131,8 @@ class ReplayBag:
         bag = source.bag
         own = {topic.name: topic for topic in bag.topics}
         topics = [
-            ('joint_states_topic', names.joint_states, JOINT_STATE, QosProfile()),
-            ('crank_topic', source.crank_topic, JOINT_STATE, own[source.crank_topic].qos),
+            ('joint_states_topic', names.joint_states, JOINT_STATE_TYPE, QosProfile()),
+            ('crank_topic', source.crank_topic, JOINT_STATE_TYPE, own[source.crank_topic].qos),
         ]
         if source.run.resets_topic:
             topics.append(('resets_topic', names.resets, _TIME, QosProfile()))

@@ -22,17 +22,22 @@ from math import inf
 import sys
 from threading import Event
 
-from linkage_ros.bag.order import LogTimeOrder
-from linkage_ros.bag.reader import Bag, is_in_use
-from linkage_ros.bag.topic import Topic
+from linkage_ros.bag import Bag, is_in_use, LogTimeOrder, Topic
 from linkage_ros.cli.arguments import add_bag, add_ros_arguments, bounded_number
 from linkage_ros.cli.bag_reading import open_bag
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.bag_topics import create_publishers
-from linkage_ros.node.playback import LATE, Playback, PlaybackPart
-from linkage_ros.node.player import CLOCK, play, PlaybackOptions, player_node
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.node import (
+    CLOCK,
+    create_publishers,
+    LATE,
+    play,
+    Playback,
+    PlaybackOptions,
+    PlaybackPart,
+    player_node,
+)
 from linkage_ros.signals import heed_signals
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``

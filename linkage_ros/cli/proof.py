@@ -14,14 +14,20 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from time import monotonic
 
-from linkage_ros.bag.reader import BagMessage, read_bag
+from linkage_ros.bag import BagMessage, read_bag
 from linkage_ros.cli.bag_reading import describe_gaps
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import LinkageError
-from linkage_ros.replay.replay import recorded_scene, ReplayedTick
-from linkage_ros.replay.verify import beginning_text, DIFFERENT, UNDECIDED, verify_replay
+from linkage_ros.replay import (
+    beginning_text,
+    DIFFERENT,
+    recorded_scene,
+    ReplayedTick,
+    UNDECIDED,
+    verify_replay,
+)
 from linkage_ros.signals import raise_on_signals, StoppedError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 
 LONGEST_PROOF = 2.0
 """Time that the replay of the bag takes at the end of a run, in [s]."""

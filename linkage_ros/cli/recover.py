@@ -15,10 +15,10 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.recover import recover_bag, recovered_name, Recovery
+from linkage_ros.bag import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
 from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
-from linkage_ros.description.file_access import remove_bag
+from linkage_ros.description import remove_bag
 from linkage_ros.errors import escape_unprintable
 from linkage_ros.signals import heed_signals
 

@@ -31,8 +31,7 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import Bag, RUN_FILE
-from linkage_ros.bag.run_events import read_run_metadata, recorded_events, RunMetadata
+from linkage_ros.bag import Bag, read_run_metadata, recorded_events, RUN_FILE, RunMetadata
 from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite_or_none, SCENE_HELP
 from linkage_ros.cli.bag_reading import (
     add_trust,
@@ -44,39 +43,31 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.description.file_access import remove_bag
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene, remove_bag, Scene
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
-from linkage_ros.messages.joint_values import JOINT_STATE, Key, UNITS
-from linkage_ros.replay.compare import (
-    Comparison,
-    Deviation,
-    FirstDifference,
-    TickPlace,
-    TopicComparison,
-    ulp_distance,
-)
-from linkage_ros.replay.counterfactual import (
+from linkage_ros.messages import JOINT_STATE_TYPE, Key, UNITS
+from linkage_ros.replay import (
+    beginning_text,
     check_drives,
+    Comparison,
     Counterfactual,
     CounterfactualTick,
+    Deviation,
+    DIFFERENT,
     find_crank_topic,
-)
-from linkage_ros.replay.replay import (
+    FirstDifference,
+    IDENTICAL,
     own_joint_states,
     recorded_scene,
     ReplayedTick,
-    user_effects_here,
-    versions_here,
-)
-from linkage_ros.replay.verify import (
-    beginning_text,
-    DIFFERENT,
-    IDENTICAL,
     ReplayVerification,
+    TickPlace,
+    TopicComparison,
     turning_joints,
+    ulp_distance,
+    user_effects_here,
     verify_replay,
+    versions_here,
 )
 from linkage_ros.signals import heed_signals
 
@@ -330,7 +321,7 @@ def _replayed_with(
     counterfactual = Counterfactual(scene, recorded)
     names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
-    kinds = {run.joint_states_topic: JOINT_STATE}
+    kinds = {run.joint_states_topic: JOINT_STATE_TYPE}
     kinds |= dict(
         zip(names.extras, (extra.message for extra in counterfactual.extras), strict=True)
     )

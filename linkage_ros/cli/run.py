@@ -31,12 +31,11 @@ from linkage_ros.cli.arguments import (
 from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.kinematics.status import Status
-from linkage_ros.node.node import LinkageNode
-from linkage_ros.node.run import run_linkage_node
-from linkage_ros.replay.verify import turning_joints
+from linkage_ros.kinematics import Status
+from linkage_ros.node import LinkageNode, run_linkage_node
+from linkage_ros.replay import turning_joints
 from linkage_ros.signals import heed_signals
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.tick import TickLoop
 
 _RICH = find_spec('rich') is not None
 if _RICH:

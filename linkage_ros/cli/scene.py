@@ -28,28 +28,30 @@ from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
 from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.description.notes import scene_notes
-from linkage_ros.description.parameters import (
+from linkage_ros.description import (
+    as_text,
     declared_fields,
     default_of,
     first_docstring_line,
     is_required,
+    kind_of,
+    linkage_schema,
+    load_scene,
     parameter_rows,
+    read_yaml,
+    Scene,
+    scene_notes,
+    scene_schema,
+    Section,
 )
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import kind_of, load_scene
-from linkage_ros.description.schema import as_text, linkage_schema, scene_schema
-from linkage_ros.description.section import Section
-from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
-from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.dispatch import effects_requiring, module_of
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.solvers import SOLVERS
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS, effects_requiring, module_of
 from linkage_ros.stages.faults import FAULTS
-from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.tick import LinkagePipeline, Pipeline
 
 _WHERE = {
     'alter': 'in the place of the linkage that is drawn',
@@ -173,10 +175,10 @@ def _fault_rows(scene: Scene) -> Iterator[tuple[str, ...]]:
 
 def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
     if pipeline.topic:
-        yield 'listens to', pipeline.topic, JOINT_STATE, ''
+        yield 'listens to', pipeline.topic, JOINT_STATE_TYPE, ''
     for wrench in pipeline.wrenches:
         yield 'listens to', wrench.topic, 'geometry_msgs/msg/WrenchStamped', wrench.key
-    yield 'publishes', 'joint_states', JOINT_STATE, f'{len(scene.joint_names)} joints'
+    yield 'publishes', 'joint_states', JOINT_STATE_TYPE, f'{len(scene.joint_names)} joints'
     for extra in pipeline.extras:
         yield 'publishes', extra.topic, extra.message, ''
     if scene.faults:
@@ -385,7 +387,7 @@ def _find_violations(file: Path) -> list[FileError]:
     """Return all violations of the schemas in a scene and the linkages that it names."""
     if find_spec('jsonschema') is None:
         return []
-    from linkage_ros.description.violations import find_violations
+    from linkage_ros.description import find_violations
 
     content, _ = read_yaml(file)
     if kind_of(content) == 'linkage':

@@ -29,22 +29,28 @@ from threading import Event
 from linkage_ros.cli.arguments import add_force, add_set, bounded_number, PICTURES, SCENE_HELP
 from linkage_ros.cli.export import export_bag
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description.file_access import check_output_name, remove_bag
-from linkage_ros.description.notes import scene_notes
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.description.tables import check_kind, table_file, TABLE_KINDS
+from linkage_ros.description import (
+    check_kind,
+    check_output_name,
+    load_scene,
+    remove_bag,
+    Scene,
+    scene_notes,
+    table_file,
+    TABLE_KINDS,
+)
 from linkage_ros.errors import escape_unprintable, LinkageError
-from linkage_ros.messages.joint_values import EFFORT, POSITION, RATE, UNITS
-from linkage_ros.replay.finished_runs import FinishedRuns
-from linkage_ros.replay.simulate import check_simulated, simulate_run
-from linkage_ros.replay.study import (
+from linkage_ros.messages import EFFORT, POSITION, RATE, UNITS
+from linkage_ros.replay import (
+    check_simulated,
+    FinishedRuns,
     instants_of,
     Outcome,
     ParameterSweep,
     run_outcomes,
     runs_of,
     Settings,
+    simulate_run,
     Statistics,
     Study,
     sweep_of,

@@ -38,13 +38,9 @@ from linkage_ros.cli.arguments import (
     wrap_angle,
 )
 from linkage_ros.cli.terminal import print_tables, show_progress, table_text, TerminalTable
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import atomic_write, load
 from linkage_ros.errors import LinkageError, list_names
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import traced_carriers
-from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.kinematics.topology import assur_groups, Iterated
+from linkage_ros.kinematics import assur_groups, Closure, InputSweep, Iterated, traced_carriers
 from linkage_ros.names import csv_text
 
 _STEPS = 36

@@ -22,9 +22,14 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES, LENGTHS, Units
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import DefinitionError, FileError, list_names, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
+    assembly_sides,
     AssemblyPose,
+    assur_groups,
+    check_closes,
+    check_limits,
+    check_turns,
+    Closure,
     GROUND,
     Input,
     Limits,
@@ -34,10 +39,8 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
     SlideJoint,
     Slider,
+    without_drawn_pose,
 )
-from linkage_ros.kinematics.sides import assembly_sides, without_drawn_pose
-from linkage_ros.kinematics.sweep_analysis import check_closes, check_limits, check_turns
-from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.resources import linkage_names, named_file
 
 _KEYS = (

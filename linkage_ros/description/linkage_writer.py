@@ -32,20 +32,22 @@ from linkage_ros.description.linkage_file import read_linkage
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    Closure,
+    describe_ranges,
     Input,
+    InputRange,
+    InputSweep,
     Limits,
     Linkage,
     Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
+    starts_at_pose,
+    usual_inputs,
 )
-from linkage_ros.kinematics.ranges import describe_ranges
-from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, starts_at_pose, usual_inputs
 
 _WIDTH = 99
 _WHOLE = 1e15

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.linkage import Linkage, links_by_point, RevoluteJoint
+from linkage_ros.kinematics import Linkage, links_by_point, RevoluteJoint
 
 if TYPE_CHECKING:
     from linkage_ros.description.scene import Scene, SceneLinkage

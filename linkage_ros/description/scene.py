@@ -14,12 +14,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag.storage import COMPRESSIONS, Storage
+from linkage_ros.bag import COMPRESSIONS, Storage
 from linkage_ros.description.parameters import choice, number, Parts, whole_number
 from linkage_ros.description.section import Section
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Linkage, SlideJoint
+from linkage_ros.dynamics import Loads
+from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Fault

@@ -35,15 +35,13 @@ from linkage_ros.description.scene import (
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES, LENGTHS, Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
-from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
+from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
-from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.dispatch import in_order, module_of
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.solvers import SOLVERS
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS, in_order, module_of
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Fault

@@ -44,10 +44,10 @@ from linkage_ros.description.scene_file import (
     PUBLISHED_ANGLES,
 )
 from linkage_ros.description.units import ANGLES, LENGTHS
-from linkage_ros.dynamics.loads import AppliedLoads, GREATEST_LOAD, STIFFEST
-from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, STIFFEST
+from linkage_ros.solvers import SOLVERS
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
 
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'

@@ -27,10 +27,16 @@ from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
-from linkage_ros.kinematics.arithmetic import call, remainder, unit_vector
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
-from linkage_ros.kinematics.results import Position, Velocity
+from linkage_ros.kinematics import (
+    call,
+    Closure,
+    GROUND,
+    Position,
+    remainder,
+    RevoluteJoint,
+    unit_vector,
+    Velocity,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.wrenches import Component, HeldWrench

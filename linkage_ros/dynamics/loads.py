@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from linkage_ros.description.parameters import choice, each_part, number, number_rows, point, text
+from linkage_ros.description import choice, each_part, number, number_rows, point, text
 from linkage_ros.errors import DefinitionError, list_names, quote
-from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics import GROUND, Linkage
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,11 +44,17 @@ from linkage_ros.dynamics.loads import (
 )
 from linkage_ros.dynamics.longest_step import check_step, EXACT
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import all_finite, call, copysign, where
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
+from linkage_ros.kinematics import (
+    Acceleration,
+    all_finite,
+    call,
+    Closure,
+    copysign,
+    Position,
+    Velocity,
+    where,
+)
+from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledMotion
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import AppliedForces

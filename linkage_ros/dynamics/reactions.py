@@ -42,14 +42,21 @@ from linkage_ros.dynamics.mechanics import (
     spring_length,
 )
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.arithmetic import call, has_result, make_vector, unit_vector
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
-from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.topology import Joint
+from linkage_ros.kinematics import (
+    Acceleration,
+    call,
+    Closure,
+    GROUND,
+    has_result,
+    Joint,
+    make_vector,
+    Position,
+    RevoluteJoint,
+    Status,
+    unit_vector,
+    Velocity,
+)
+from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledMotion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -441,11 +448,11 @@ class Reactions:
 
     @cached_property
     def _compiled_motion(self) -> Compiled:
-        def wanted(motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        def list_outputs(motion: CompiledMotion) -> Sequence[Sequence[float]]:
             assert motion.velocity is not None
             return self._force_coefficients(motion.position, motion.velocity)
 
-        return Compiled(self._mechanics.closure, 1, wanted, within_limits=False)
+        return Compiled(self._mechanics.closure, 1, list_outputs, within_limits=False)
 
     def _force_coefficients(
         self, position: Position, velocity: Velocity

@@ -19,8 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.messages.wrench import PlanarWrench
+from linkage_ros.messages import NANOSECONDS, PlanarWrench
 
 NEVER = 1 << 63
 """A time after all others, in [ns]."""

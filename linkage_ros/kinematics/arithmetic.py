@@ -19,8 +19,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Sequence
 import math
-from math import fsum, pi
-from math import remainder as math_remainder
+from math import fsum, pi, remainder as math_remainder
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.status import Status

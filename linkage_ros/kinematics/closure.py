@@ -46,9 +46,7 @@ from linkage_ros.kinematics.topology import assur_groups, Structure
 if TYPE_CHECKING:
     from linkage_ros import InverseClosure, LinkagePage
     from linkage_ros.kinematics.batch import Batch
-    from linkage_ros.kinematics.compiling.linkage import Compiled
-    from linkage_ros.kinematics.compiling.solve import SolverOutline
-    from linkage_ros.kinematics.compiling.trace import OutputSelection
+    from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
     from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
@@ -392,9 +390,7 @@ class Closure:
 
     @BuiltProperty
     def _solver(self) -> SolverOutline:
-        from linkage_ros.kinematics.compiling.solve import (
-            SolverOutline,  # local import: needs numpy
-        )
+        from linkage_ros.kinematics.compiling import SolverOutline  # local import: numpy
 
         return SolverOutline(self, len(self.linkage.joints))
 

@@ -30,8 +30,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.trace import OutputSelection, TracedMotion
+from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import golden_section, last_inside
 from linkage_ros.kinematics.results import InputRange, LoopClosure

@@ -25,7 +25,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.trace import TracedMotion
+from linkage_ros.kinematics.compiling import TracedMotion
 from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse, Output
 from linkage_ros.kinematics.doubles import to_doubles
 from linkage_ros.kinematics.limits import Bounds

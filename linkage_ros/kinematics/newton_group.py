@@ -34,7 +34,7 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.arithmetic import call, has_result, UNIT_ROUNDOFF
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling.python import compile_function
+from linkage_ros.kinematics.compiling import compile_function
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,

@@ -38,7 +38,7 @@ from linkage_ros.messages.layout import (
     Pattern,
 )
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINT_STATE_TYPE = 'sensor_msgs/msg/JointState'
 TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 WRENCHES = 'sensor_msgs/msg/MultiDOFJointState'
 
@@ -96,7 +96,7 @@ class MessageValues:
 
     def __init__(self, message_type: str, dependent: Collection[str] = ()) -> None:
         self._parse = _PARSERS.get(message_type, _parse_other)
-        if message_type == JOINT_STATE:
+        if message_type == JOINT_STATE_TYPE:
             self._parse = partial(_parse_joint_state, dependent=dependent)
         self._known: tuple[Pattern, tuple[Key, ...], tuple[str, ...]] | None = None
 
@@ -180,7 +180,7 @@ def _parse_other(_: bytes) -> str:
 
 
 _PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {
-    JOINT_STATE: _parse_joint_state,
+    JOINT_STATE_TYPE: _parse_joint_state,
     TRAJECTORY: _parse_trajectory,
     WRENCHES: _parse_wrenches,
 }

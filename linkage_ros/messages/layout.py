@@ -24,8 +24,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import combinations, zip_longest
 from operator import itemgetter
-from struct import calcsize, pack, Struct, unpack
-from struct import error as StructError
+from struct import calcsize, error as StructError, pack, Struct, unpack
 from typing import Any, NamedTuple
 
 from linkage_ros.generated_code import define_function, Lines

@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Any
 
-from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
+from linkage_ros.bag import INFINITE, QosProfile, Topic
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.replay.topic_description import describe_topic, message_type
+from linkage_ros.replay import describe_topic, message_type
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy

@@ -31,8 +31,7 @@ from threading import Event
 from time import monotonic, monotonic_ns, sleep, time_ns
 from typing import Any, ClassVar, TypeVar
 
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import JointStateWriter, NANOSECONDS
 from linkage_ros.node.pacing import ClockGuard
 from linkage_ros.node.parameters import declare_parameters, NodeParameter, show_help
 from linkage_ros.node.real_time import leave_out_shared_memory

@@ -24,16 +24,11 @@ from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from linkage_ros.errors import list_names
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import describe_ranges
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import head_of, Rejection
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.kinematics import Closure, describe_ranges, Position, Status
+from linkage_ros.messages import head_of, NANOSECONDS, Rejection
 from linkage_ros.node.run_recording import RunSnapshots
-from linkage_ros.stages.drives.drive import describe_chatter
-from linkage_ros.tick.pipeline import LinkagePipeline, LinkageState
-from linkage_ros.tick.tick_loop import Counts, TickLoop, WrenchCounts
+from linkage_ros.stages.drives import describe_chatter
+from linkage_ros.tick import Counts, LinkagePipeline, LinkageState, TickLoop, WrenchCounts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 if TYPE_CHECKING:

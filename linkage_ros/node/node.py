@@ -24,13 +24,11 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.bag.topic import Topic
-from linkage_ros.description.notes import scene_notes
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.bag import Topic
+from linkage_ros.description import load_scene, Scene, scene_notes
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import (
@@ -47,9 +45,8 @@ from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearne
 from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
-from linkage_ros.replay.replay import own_joint_states
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import Pace, TickLoop
+from linkage_ros.replay import own_joint_states
+from linkage_ros.tick import Pace, Pipeline, TickLoop
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.clock import Clock, ClockType

@@ -15,8 +15,8 @@ from threading import Event
 from time import monotonic_ns, sleep, time_ns
 from typing import TYPE_CHECKING
 
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.tick.tick_loop import Stall, TickLoop
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.tick import Stall, TickLoop
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.subscription import Subscription
@@ -24,7 +24,7 @@ from rclpy.time_source import TimeSource
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 if TYPE_CHECKING:
-    from linkage_ros.tick.tick_loop import Pace
+    from linkage_ros.tick import Pace
 
 CATCH_UP = 20_000_000
 """Lag up to which late ticks still run, in [ns]; beyond it they are lost."""

@@ -23,7 +23,7 @@ from threading import Event, Thread
 from time import monotonic_ns, sleep
 from typing import NamedTuple, Protocol
 
-from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.bag import LogTimeOrder
 from linkage_ros.errors import LinkageError
 
 _BATCH = 256

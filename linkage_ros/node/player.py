@@ -17,10 +17,9 @@ import sys
 from threading import Event
 from time import monotonic
 
-from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.bag import LogTimeOrder
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.messages.single_values import TIME_END, time_message
+from linkage_ros.messages import NANOSECONDS, TIME_END, time_message
 from linkage_ros.node.playback import (
     ClockTicks,
     Playback,

@@ -35,7 +35,7 @@ from linkage_ros.resources import shipped_path
 from rclpy.utilities import get_rmw_implementation_identifier
 
 if TYPE_CHECKING:
-    from linkage_ros.tick.tick_loop import Pace, TickLoop
+    from linkage_ros.tick import Pace, TickLoop
 
 _CURRENT, _FUTURE = 1, 2
 """MCL_CURRENT and MCL_FUTURE of mlockall(2)."""

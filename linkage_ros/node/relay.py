@@ -29,14 +29,12 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene, Scene
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.inverse_closure import InverseClosure
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import InverseClosure, Status
 from linkage_ros.node.demo_nodes import run_demo_node
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE
-from linkage_ros.stages.drives.dependent_samples import sampled_inverse
+from linkage_ros.stages.drives import sampled_inverse
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter

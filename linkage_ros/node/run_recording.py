@@ -18,18 +18,25 @@ from os.path import lexists
 from pathlib import Path
 from typing import Any, cast
 
-from linkage_ros.bag.bag_file import compression_type
-from linkage_ros.bag.recorder import Recorder, RecordingSummary, TopicCounts
-from linkage_ros.bag.run_events import MID_RUN, WITH_THE_RUN, WRENCH_TOPICS
-from linkage_ros.bag.snapshot import KeptCounts, SnapshotMemory, SnapshotWriting
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene import RecordParameters, Scene
+from linkage_ros.bag import (
+    BagWriter,
+    compression_type,
+    KeptCounts,
+    MID_RUN,
+    Recorder,
+    RecordingSummary,
+    SnapshotMemory,
+    SnapshotWriting,
+    Storage,
+    Topic,
+    TopicCounts,
+    WITH_THE_RUN,
+    WRENCH_TOPICS,
+)
+from linkage_ros.description import RecordParameters, Scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
-from linkage_ros.tick.pipeline import LinkagePipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.replay import EXTRA, scene_files, to_attachments
+from linkage_ros.tick import LinkagePipeline, TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)

@@ -14,18 +14,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag.run_events import WRENCH_TOPICS
-from linkage_ros.bag.topic import Topic
-from linkage_ros.description.scene import Scene
+from linkage_ros.bag import Topic, WRENCH_TOPICS
+from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.single_values import text_message
+from linkage_ros.messages import text_message
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.run_recording import DESCRIPTION
-from linkage_ros.replay.replay import announced_text, change_text
-from linkage_ros.replay.run_files import EXTRA, scene_files
-from linkage_ros.replay.topic_description import message_type
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import RecordedTopics, TakeMessage
+from linkage_ros.replay import announced_text, change_text, EXTRA, message_type, scene_files
+from linkage_ros.tick import Pipeline, RecordedTopics, TakeMessage
 from linkage_ros.workbench import find_tool
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node

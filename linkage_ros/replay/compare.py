@@ -20,7 +20,7 @@ from math import copysign, isfinite, isnan, sqrt, tau, ulp
 from struct import Struct
 from typing import NamedTuple
 
-from linkage_ros.messages.joint_values import Key, MessageContent, MessageValues, POSITION
+from linkage_ros.messages import Key, MessageContent, MessageValues, POSITION
 
 _DOUBLE, _BITS = Struct('<d'), Struct('<q')
 

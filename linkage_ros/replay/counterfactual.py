@@ -23,10 +23,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple, TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING, TypeAlias
 
-from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import (
+from linkage_ros.bag import (
+    Bag,
+    BagMessage,
     Event,
     FaultEvent,
     ResetEvent,
@@ -35,18 +36,19 @@ from linkage_ros.bag.run_events import (
     TickEvent,
     WrenchEvent,
 )
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, list_names
-from linkage_ros.messages.joint_state import (
+from linkage_ros.messages import (
     head_of,
+    JOINT_STATE_TYPE,
     JointEffortReader,
     JointStateReader,
     Rejection,
+    text_message,
+    TIME_END,
 )
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.messages.single_values import text_message, TIME_END
 from linkage_ros.replay.replay import change_text, read_change
-from linkage_ros.tick.pipeline import Pipeline, Tick
+from linkage_ros.tick import Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Injection
@@ -72,8 +74,8 @@ class CounterfactualTick(NamedTuple):
     tick: Tick | None  # Result of the scene; None if it does not tick then
 
 
-HeardEvent = SampleEvent | FaultEvent | ResetEvent | TickEvent
-ReplayEvent = SampleEvent | FaultEvent | ResetEvent | CounterfactualTick
+HeardEvent: TypeAlias = SampleEvent | FaultEvent | ResetEvent | TickEvent
+ReplayEvent: TypeAlias = SampleEvent | FaultEvent | ResetEvent | CounterfactualTick
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -411,12 +413,12 @@ def _sample_reader(
 def _candidate_topics(
     bag: Bag, drive: str, run: RunMetadata, recorded: Scene | None, typed: str | None
 ) -> Sequence[str]:
-    held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
+    held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE]
     if typed is not None:
         if typed not in held:
             raise BagError(
                 bag.path,
-                f'holds no topic {typed} of {JOINT_STATE}',
+                f'holds no topic {typed} of {JOINT_STATE_TYPE}',
                 did_you_mean(typed, held, f'it holds {list_names(held) or "none"}'),
             )
         return [typed]
@@ -437,7 +439,7 @@ def _no_samples_error(
 ) -> BagError:
     """Return an error message with the missing joints and the existing topics."""
     missing = [name for name in inputs if name not in names] or inputs
-    where = f' on {list_names(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
+    where = f' on {list_names(topics)}' if topics else f'; it has no topic of {JOINT_STATE_TYPE}'
     there = f', which has {list_names(names)}' if names else ''
     return BagError(
         bag.path,

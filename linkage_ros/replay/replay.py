@@ -25,23 +25,23 @@ import platform
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
-from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.run_events import (
+from linkage_ros.bag import (
+    Bag,
+    BagMessage,
     read_run_metadata,
     recorded_events,
     ResetEvent,
+    RUN_FILE,
     RunFiles,
     SampleEvent,
     TickEvent,
     VERSIONS,
     WrenchEvent,
 )
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import LINKAGE_FILE, parse_scene, SCENE_FILE
+from linkage_ros.description import LINKAGE_FILE, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import BagError, list_names
-from linkage_ros.messages.joint_state import OwnJointStates
-from linkage_ros.messages.single_values import text_of, TIME_END
-from linkage_ros.tick.pipeline import Pipeline, Tick
+from linkage_ros.messages import OwnJointStates, text_of, TIME_END
+from linkage_ros.tick import Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultChange, Injection
@@ -266,8 +266,6 @@ def user_effects_here(scene: Scene) -> dict[str, str]:
     }
     if not names:
         return {}
-    from linkage_ros.stages.effects.user_effects import (
-        effect_version,  # local import: only where a scene names one
-    )
+    from linkage_ros.stages.effects import effect_version  # local import: few scenes name one
 
     return {name: effect_version(name) for name in sorted(names)}

@@ -18,11 +18,10 @@ import platform
 from typing import Any
 
 from linkage_ros import __version__
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.run_events import BEGUN, CHOSEN, SEED, USER_EFFECTS
-from linkage_ros.description.scene import Scene
+from linkage_ros.bag import BEGUN, CHOSEN, RUN_FILE, SEED, USER_EFFECTS
+from linkage_ros.description import Scene
 from linkage_ros.replay.replay import user_effects_here
-from linkage_ros.tick.pipeline import LinkagePipeline
+from linkage_ros.tick import LinkagePipeline
 
 EXTRA = 'extra'
 """Key of the auxiliary topics, of which there may be several."""

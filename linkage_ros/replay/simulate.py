@@ -22,21 +22,16 @@ from math import floor
 from pathlib import Path
 from typing import Any, cast, TYPE_CHECKING
 
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.run_events import WITH_THE_RUN
-from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene import Scene
+from linkage_ros.bag import BagWriter, QosProfile, Recorder, Topic, WITH_THE_RUN
+from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.messages.single_values import text_message
+from linkage_ros.messages import JOINT_STATE_TYPE, text_message
 from linkage_ros.replay.replay import change_text
 from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
 from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.signals import heed_signals
-from linkage_ros.stages.drives.drive import describe_chatter
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.stages.drives import describe_chatter
+from linkage_ros.tick import Pipeline, TickLoop
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultChange
@@ -197,7 +192,12 @@ def _bag_topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
     """Return the topics of the bag, in the order of their handles, each with its key."""
     handles = loop.topics
     found = {
-        handles.joint_states: ('joint_states_topic', '/joint_states', JOINT_STATE, QosProfile()),
+        handles.joint_states: (
+            'joint_states_topic',
+            '/joint_states',
+            JOINT_STATE_TYPE,
+            QosProfile(),
+        ),
         handles.diagnostics: (
             'diagnostics_topic',
             '/diagnostics',
@@ -207,7 +207,7 @@ def _bag_topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
         handles.resets: ('resets_topic', f'{_NODE}/resets', _TIME, QosProfile()),
     }
     if handles.crank is not None:
-        found[handles.crank] = 'crank_topic', f'/{pipeline.topic}', JOINT_STATE, QosProfile()
+        found[handles.crank] = 'crank_topic', f'/{pipeline.topic}', JOINT_STATE_TYPE, QosProfile()
     if handles.faults is not None:
         found[handles.faults] = 'faults_topic', f'{_NODE}/faults', 'std_msgs/msg/String', _LATCHED
     if handles.suppressed is not None:

@@ -30,12 +30,11 @@ import signal
 from threading import Thread
 from typing import NamedTuple
 
-from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description import parse_scene
 from linkage_ros.errors import escape_unprintable, LinkageError, quote
 from linkage_ros.replay.simulate import check_simulated, tick_times
-from linkage_ros.stages.effects.stage import SensorReading
-from linkage_ros.tick.compiled_tick import CompiledState, StateTuple
-from linkage_ros.tick.pipeline import LinkageState, Pipeline
+from linkage_ros.stages.effects import SensorReading
+from linkage_ros.tick import CompiledState, LinkageState, Pipeline, StateTuple
 import numpy as np
 from numpy.typing import NDArray
 

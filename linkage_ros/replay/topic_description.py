@@ -16,7 +16,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag import QosProfile, Topic
 from linkage_ros.errors import LinkageError, quote, RecordingError
 from linkage_ros.resources import share_folders
 

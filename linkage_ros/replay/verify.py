@@ -21,18 +21,14 @@ from collections.abc import Callable, Iterable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import missing_start_reason, read_run_metadata
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.bag import Bag, BagMessage, missing_start_reason, read_run_metadata
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.kinematics.results import Position, SingularityMargin
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.kinematics import Closure, Position, RevoluteJoint, SingularityMargin, Status
+from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.replay.compare import Comparison, FirstDifference, TickPlace
 from linkage_ros.replay.replay import replay_all, replay_ticks, ReplayedTick
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 
 IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
 
@@ -94,8 +90,8 @@ def verify_replay(
     """
     run = read_run_metadata(bag)
     types = [extra.message for extra in Pipeline(scene).extras]
-    types += [JOINT_STATE] * len(run.extras)  # for topics that the scene does not know
-    topics = [(run.joint_states_topic, JOINT_STATE), *zip(run.extras, types, strict=False)]
+    types += [JOINT_STATE_TYPE] * len(run.extras)  # for topics that the scene does not know
+    topics = [(run.joint_states_topic, JOINT_STATE_TYPE), *zip(run.extras, types, strict=False)]
     silent = (b'',) * len(topics)
     beginning = missing_start_reason(bag, run)
     turning = turning_joints(scene) if beginning and not scene.wrapped else {}

@@ -30,10 +30,7 @@ from time import perf_counter
 from typing import Any
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.kinematics.topology import Dyad, Iterated
+from linkage_ros.kinematics import Closure, Dyad, InputSweep, Iterated, Linkage, usual_inputs
 from linkage_ros.solvers.newton import LEAST_SINE, NewtonClosure
 from linkage_ros.solvers.solver import Solver, SolverChoice
 from linkage_ros.solvers.table import TableClosure

@@ -22,9 +22,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.linkage import GROUND, Linkage
-from linkage_ros.kinematics.solved_links import Angle, SolvedLinks
-from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Joint, Structure
+from linkage_ros.kinematics import (
+    Angle,
+    Driven,
+    Dyad,
+    GROUND,
+    Iterated,
+    Joint,
+    Linkage,
+    SolvedLinks,
+    Structure,
+)
 
 Turns = tuple[tuple[int, float], ...]
 """Coordinates and their signs, whose sum is an angle."""

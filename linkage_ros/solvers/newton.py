@@ -37,25 +37,29 @@ from dataclasses import dataclass, replace
 from math import copysign, inf, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.description.parameters import number
-from linkage_ros.kinematics.arithmetic import cross_product, UNIT_ROUNDOFF
-from linkage_ros.kinematics.built_once import BUILD_LOCK
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.doubles import HUGE
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import (
+from linkage_ros.description import number
+from linkage_ros.kinematics import (
+    Acceleration,
+    BUILD_LOCK,
+    Closure,
+    cross_product,
+    Dyad,
     FixedPoint,
+    HUGE,
+    Iterated,
+    Linkage,
     LinkState,
     PLACED,
     PointOnLink,
     PointOnRail,
+    Position,
     RelativeAngle,
+    Status,
     Step,
+    UNIT_ROUNDOFF,
+    usual_inputs,
+    Velocity,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
 from linkage_ros.solvers.solver import refuse_ratios, Solver
 

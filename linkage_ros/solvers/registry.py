@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Closure, Linkage
 
 SOLVERS = {
     'closed_form': 'linkage_ros.solvers.registry',

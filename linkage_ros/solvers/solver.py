@@ -19,23 +19,22 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.doubles import to_doubles
-from linkage_ros.kinematics.results import (
+from linkage_ros.kinematics import (
     Acceleration,
+    BuiltProperty,
+    Closure,
     InputRange,
     PointMotion,
     Position,
     SingularInput,
     SingularityMargin,
+    Status,
+    to_doubles,
     Velocity,
 )
-from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Batch
-    from linkage_ros.kinematics.linkage import Linkage
+    from linkage_ros.kinematics import Batch, Linkage
     from numpy.typing import ArrayLike
 
 
@@ -83,7 +82,7 @@ class Solver(Closure):
         )
         if self.by_steps:
             return batch
-        from linkage_ros.kinematics.batch import CODES  # local import: it loads numpy
+        from linkage_ros.kinematics import CODES  # local import: it loads numpy
         import numpy as np  # local import: the batch alone needs it
 
         count, driven = len(batch.status), len(inputs)

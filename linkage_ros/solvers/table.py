@@ -33,16 +33,20 @@ from struct import Struct
 from time import perf_counter
 from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.description.parameters import number, point
+from linkage_ros.description import number, point
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.doubles import to_double
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.ranges import link_lengths
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import (
+    Acceleration,
+    Closure,
+    InputSweep,
+    link_lengths,
+    Linkage,
+    LinkState,
+    Position,
+    Status,
+    to_double,
+    Velocity,
+)
 from linkage_ros.solvers.solver import refuse_ratios, Solver
 import numpy as np
 

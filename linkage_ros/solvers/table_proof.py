@@ -26,10 +26,8 @@ from math import degrees, pi, remainder, sqrt, tau
 from typing import Any, NamedTuple, NoReturn
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.solve import SolverOutline
-from linkage_ros.kinematics.compiling.trace import TracedMotion
-from linkage_ros.kinematics.singularity_margin import signed_distance
+from linkage_ros.kinematics import Closure, signed_distance
+from linkage_ros.kinematics.compiling import SolverOutline, TracedMotion
 from linkage_ros.solvers.loops import Loops, Turns
 from linkage_ros.solvers.validated_enclosure import (
     Array,

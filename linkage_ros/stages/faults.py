@@ -32,13 +32,11 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Any, NamedTuple
 
-from linkage_ros.description.parameters import number, part_name
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import with_every_number
-from linkage_ros.messages.single_values import TIME_END
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
+from linkage_ros.description import number, part_name
+from linkage_ros.kinematics import Position, Status
+from linkage_ros.messages import TIME_END, with_every_number
+from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects import restamp, Sensor, SensorReading
 
 
 @dataclass(frozen=True, slots=True)

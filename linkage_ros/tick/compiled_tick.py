@@ -26,15 +26,14 @@ from math import pi
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.generated_code import define_function, Lines
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.effects.stage import SensorReading
+from linkage_ros.stages.drives import CrankState
+from linkage_ros.stages.effects import SensorReading
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.compiling.linkage import Compiled
-    from linkage_ros.messages.joint_state import JointStateWriter
-    from linkage_ros.stages.drives.drive import Drive
-    from linkage_ros.stages.effects.angle_unwrap import Continuous
-    from linkage_ros.stages.effects.stage import DriveStage, WriterStage
+    from linkage_ros.kinematics.compiling import Compiled
+    from linkage_ros.messages import JointStateWriter
+    from linkage_ros.stages.drives import Drive
+    from linkage_ros.stages.effects import Continuous, DriveStage, WriterStage
 
 _CRANK_FIELDS = ', '.join(CrankState._fields)
 

@@ -22,21 +22,20 @@ from itertools import chain
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics.arithmetic import all_finite
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.stages.drives.drive import Context, CrankState, Drive, DRIVES
-from linkage_ros.stages.effects.angle_unwrap import Continuous, first_values, wrap_all
-from linkage_ros.stages.effects.stage import (
+from linkage_ros.kinematics import all_finite, Closure, Position, Status
+from linkage_ros.messages import JointStateWriter, Rejection
+from linkage_ros.solvers import SOLVERS
+from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
+from linkage_ros.stages.effects import (
+    Continuous,
+    first_values,
     FORCE_EFFECTS,
     MechanismState,
     SensorReading,
     SensorStage,
+    wrap_all,
     WriterStage,
 )
 from linkage_ros.tick.compiled_tick import (
@@ -52,9 +51,9 @@ from linkage_ros.tick.sample_router import SampleRouter
 from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics.wrenches import HeldWrench
-    from linkage_ros.kinematics.compiling.trace import TracedMotion as CompiledMotion
-    from linkage_ros.solvers.solver import SolverChoice
+    from linkage_ros.dynamics import HeldWrench
+    from linkage_ros.kinematics.compiling import TracedMotion as CompiledMotion
+    from linkage_ros.solvers import SolverChoice
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
 

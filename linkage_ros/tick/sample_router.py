@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 
-from linkage_ros.messages.joint_state import head_of
-from linkage_ros.messages.layout import STAMP_END
+from linkage_ros.messages import head_of, STAMP_END
 
 _MOST = 1000
 """Most kinds of messages in the cache; a limit against ever new names."""

@@ -23,12 +23,10 @@ from threading import Event, Thread
 from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag import Recorder
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.single_values import time_message
+from linkage_ros.kinematics import Position, Status
+from linkage_ros.messages import Rejection, time_message
 from linkage_ros.tick.pipeline import LinkageState, Pipeline, Tick
 
 if TYPE_CHECKING:

@@ -14,17 +14,18 @@ from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from linkage_ros.description.scene import SceneLinkage
+from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.effects.dispatch import (
+from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects import (
     Effect,
     effect_of,
+    FORCE_EFFECTS,
     in_order,
     module_of,
     needed_effects,
+    PUBLISHED_WITH,
 )
-from linkage_ros.stages.effects.stage import FORCE_EFFECTS, PUBLISHED_WITH
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,7 @@ def _rate_free_effects(
 
 def _refuse_not_imported(scene_linkage: SceneLinkage) -> None:
     if scene_linkage.not_imported:
-        from linkage_ros.stages.effects.user_effects import (
-            found_in,  # local import: only where a scene has one
-        )
+        from linkage_ros.stages.effects import found_in
 
         name = scene_linkage.not_imported[0]
         raise DefinitionError(

@@ -15,14 +15,13 @@ from math import isfinite
 from re import fullmatch
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.dynamics.loads import GREATEST_LOAD
+from linkage_ros.dynamics import GREATEST_LOAD
 from linkage_ros.errors import FileError, quote
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.wrench import read_wrench
+from linkage_ros.messages import read_wrench, Rejection
 
 if TYPE_CHECKING:
-    from linkage_ros.description.scene import SceneLinkage
-    from linkage_ros.dynamics.wrenches import HeldWrench
+    from linkage_ros.description import SceneLinkage
+    from linkage_ros.dynamics import HeldWrench
 
 MOST_WRENCHES = 32
 """Most wrenches of a scene: each tick asks for the messages of each."""

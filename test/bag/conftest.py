@@ -14,7 +14,7 @@ from pathlib import Path
 import subprocess
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag import QosProfile, Topic
 from mcap.reader import make_reader
 import numpy as np
 import pytest

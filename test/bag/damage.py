@@ -11,8 +11,7 @@
 from io import BytesIO
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, read_bag
 from mcap.reader import make_reader
 
 ATTACHMENTS = {

@@ -13,9 +13,14 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.contents import contents_of, layout_of
-from linkage_ros.bag.reader import is_in_use, read_bag, serialized_metadata
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    BagWriter,
+    contents_of,
+    is_in_use,
+    layout_of,
+    read_bag,
+    serialized_metadata,
+)
 from linkage_ros.errors import BagError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader

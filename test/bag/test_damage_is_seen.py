@@ -13,11 +13,15 @@ import os
 from pathlib import Path
 import shutil
 
-from linkage_ros.bag.metadata import BagSummary, RecordingStats
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.recover import recover_bag
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    Bag,
+    BagSummary,
+    BagWriter,
+    read_bag,
+    RecordingStats,
+    recover_bag,
+    Storage,
+)
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
 import pytest

@@ -16,11 +16,7 @@ import errno
 import os
 from pathlib import Path
 
-from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, METADATA_FILE, read_bag, Recorder, ROOT_KEY, Storage
 from linkage_ros.errors import RecordingError
 import pytest
 import yaml

@@ -24,12 +24,7 @@ import subprocess
 import sys
 import time
 
-from linkage_ros.bag.disk import Reserve
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recover import recover_bag
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, read_bag, Recorder, recover_bag, Reserve, Storage
 from linkage_ros.errors import BagError, RecordingError
 import pytest
 import yaml

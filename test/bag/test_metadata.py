@@ -11,15 +11,15 @@
 from dataclasses import replace
 from pathlib import Path
 
-from linkage_ros.bag.metadata import (
+from linkage_ros.bag import (
     BagSummary,
     merge_summaries,
     metadata_text,
     NO_START,
     qos_text,
+    QosProfile,
     write_metadata,
 )
-from linkage_ros.bag.topic import QosProfile
 import pytest
 import yaml
 

@@ -11,10 +11,7 @@
 from pathlib import Path
 import sqlite3
 
-from linkage_ros.bag.other_formats import MOST_UNPACKED
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, MOST_UNPACKED, read_bag, Topic
 from linkage_ros.errors import BagError
 import pytest
 import yaml

@@ -8,12 +8,8 @@
 
 """`read_bag` reads our bags and those of others, refuses what is none, and sorts by time."""
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.bag.order import LogTimeOrder, WINDOW
-from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.topic import QosProfile
-from linkage_ros.bag.writer import BagWriter
+from hypothesis import given, settings, strategies as st
+from linkage_ros.bag import BagMessage, BagWriter, LogTimeOrder, QosProfile, read_bag, WINDOW
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, MCAP0_MAGIC, Writer
 import pytest
@@ -25,8 +21,12 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    StoragePlugin,
+    Writer as RosbagsWriter,
+)
 
 
 @pytest.fixture

@@ -16,11 +16,7 @@ import threading
 import time
 from types import SimpleNamespace
 
-from linkage_ros.bag.metadata import UNFINISHED
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import PLACE, Recorder
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, PLACE, read_bag, Recorder, Topic, UNFINISHED
 import pytest
 import yaml
 

@@ -15,16 +15,19 @@ the damaged bag stays as it was.
 
 from io import BytesIO
 
-from hypothesis import given, HealthCheck, settings
-from hypothesis import strategies as st
-from linkage_ros.bag.mcap_records import Message, RecordSource
-from linkage_ros.bag.metadata import UNFINISHED, UNFINISHED_DATA
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recover import recover_bag
-from linkage_ros.bag.salvage import Salvage
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from hypothesis import given, HealthCheck, settings, strategies as st
+from linkage_ros.bag import (
+    BagWriter,
+    Message,
+    read_bag,
+    RecordSource,
+    recover_bag,
+    Salvage,
+    Storage,
+    Topic,
+    UNFINISHED,
+    UNFINISHED_DATA,
+)
 from linkage_ros.errors import BagError, RecordingError
 from mcap.reader import make_reader
 import pytest

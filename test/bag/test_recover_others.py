@@ -13,9 +13,7 @@ import struct
 import sys
 import tracemalloc
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recover import MOST_CHANNELS, recover_bag
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, MOST_CHANNELS, read_bag, recover_bag
 from linkage_ros.cli.main import main
 from linkage_ros.errors import BagError
 from mcap.data_stream import RecordBuilder

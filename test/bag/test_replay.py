@@ -14,15 +14,11 @@ import math
 from math import sin, tau
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag, RUN_FILE
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, read_bag, Recorder, RUN_FILE, Storage, Topic
 from linkage_ros.errors import BagError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.replay import recorded_scene, replay_ticks
+from linkage_ros.tick import Pipeline
 import numpy as np
 import pytest
 

@@ -11,8 +11,7 @@
 import io
 from zlib import crc32
 
-from linkage_ros.bag.mcap_records import RecordSource
-from linkage_ros.bag.salvage import find_next_whole
+from linkage_ros.bag import find_next_whole, RecordSource
 from mcap.data_stream import RecordBuilder
 from mcap.records import Attachment, Chunk, Message
 import pytest

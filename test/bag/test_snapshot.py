@@ -19,11 +19,15 @@ import json
 import threading
 
 from hypothesis import given, strategies
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import PLACE
-from linkage_ros.bag.snapshot import LastSeconds, SnapshotMemory, SnapshotWriting
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    BagWriter,
+    LastSeconds,
+    PLACE,
+    read_bag,
+    SnapshotMemory,
+    SnapshotWriting,
+    Storage,
+)
 from linkage_ros.errors import RecordingError
 import pytest
 import yaml

@@ -15,12 +15,15 @@ import pickle
 import subprocess
 import sys
 
-from linkage_ros.bag import bag_file
-from linkage_ros.bag.metadata import STATS_RECORD, UNFINISHED
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    bag_file,
+    BagWriter,
+    read_bag,
+    Recorder,
+    STATS_RECORD,
+    Storage,
+    UNFINISHED,
+)
 from linkage_ros.errors import RecordingError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.reader import make_reader

@@ -16,12 +16,15 @@ import subprocess
 import threading
 
 from linkage_ros import __version__
-from linkage_ros.bag.metadata import qos_text
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.snapshot import SnapshotMemory, SnapshotWriting
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import (
+    BagWriter,
+    qos_text,
+    read_bag,
+    Recorder,
+    SnapshotMemory,
+    SnapshotWriting,
+    Storage,
+)
 from linkage_ros.errors import RecordingError
 from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Schema

@@ -17,8 +17,8 @@ import sys
 
 from bench.kinematics_speed import AVAILABLE
 from bench.report import ratios, spread, Table
-from linkage_ros.cli.terminal import table_text
-from linkage_ros.tools.study.measuring import percentile
+from linkage_ros.cli import table_text
+from linkage_ros.tools.study import percentile
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]

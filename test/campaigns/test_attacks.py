@@ -15,11 +15,10 @@ import random
 from random import Random
 
 from campaigns.attacks import files, signals
-from campaigns.attacks.bags import attack, change_bag, fault_of
-from campaigns.attacks.bags import COMMANDS as BAG_COMMANDS
+from campaigns.attacks.bags import attack, change_bag, COMMANDS as BAG_COMMANDS, fault_of
 from campaigns.attacks.files import mutated
 from campaigns.in_process import Ended
-from linkage_ros.cli.main import COMMANDS
+from linkage_ros.cli import COMMANDS
 import pytest
 
 # A sample of the attacks: no traceback, no hang, no long output; and the judge detects them.

@@ -27,7 +27,7 @@ from campaigns.damage import (
     run,
     Tally,
 )
-from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag import Bag, BagMessage
 import pytest
 
 SEED = 20261121

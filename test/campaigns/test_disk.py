@@ -30,7 +30,7 @@ from campaigns.disk.judge import (
     REFUSED,
     SETTINGS,
 )
-from linkage_ros.bag.metadata import METADATA_FILE
+from linkage_ros.bag import METADATA_FILE
 import pytest
 
 EVERY = 29

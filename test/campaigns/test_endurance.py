@@ -19,9 +19,7 @@ import sys
 from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
 from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
-from linkage_ros.bag.metadata import RecordingStats
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, RecordingStats, Topic
 import pytest
 
 MINUTES = 15.0 / 60.0  # h

@@ -17,10 +17,7 @@ import shutil
 from campaigns.kills import run as judge_module
 from campaigns.kills.plan import Marks, message, PERIOD_NS, Phase, Plan, plans, TOPICS
 from campaigns.kills.run import FAULT, judge, NO_FILE, NO_FOLDER, Outcome, run
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import Bag, BagMessage, BagWriter, METADATA_FILE, Storage
 import pytest
 
 SEED = 20261121

@@ -30,9 +30,7 @@ from campaigns.topologies.run import (
     Tally,
 )
 from campaigns.topologies.topology import start_of, Topology
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import InputRange, SingularInput
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, InputRange, SingularInput, Status
 import numpy as np
 import pytest
 

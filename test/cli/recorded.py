@@ -18,13 +18,10 @@ from threading import Event
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.single_values import time_message
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.bag import BagWriter, QosProfile, RUN_FILE, Topic
+from linkage_ros.description import load_scene
+from linkage_ros.messages import JointStateWriter, time_message
+from linkage_ros.tick import Pipeline
 from rosbags.highlevel import AnyReader
 
 from ..support.messages import joint_state, STORE

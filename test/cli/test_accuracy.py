@@ -19,11 +19,9 @@ from subprocess import CompletedProcess
 from threading import Event
 from typing import Any
 
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.tools.study import accuracy_command as command
-from linkage_ros.tools.study.budget import Budget
-from linkage_ros.tools.study.measure import PARTS
+from linkage_ros.tools.study import accuracy_command as command, Budget, PARTS
 import pytest
 
 from .recorded import Recorded, scene_file

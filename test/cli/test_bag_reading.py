@@ -13,8 +13,8 @@ from __future__ import annotations
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.bag_reading import open_bag, path_beside
+from linkage_ros.bag import BagWriter
+from linkage_ros.cli import open_bag, path_beside
 import pytest
 
 

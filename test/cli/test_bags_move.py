@@ -11,7 +11,7 @@
 from pathlib import Path
 import shutil
 
-from linkage_ros.bag.reader import read_bag, RUN_FILE
+from linkage_ros.bag import read_bag, RUN_FILE
 import pytest
 
 from ..support.commands import linkage

@@ -24,9 +24,8 @@ import sys
 from typing import Any
 from zlib import crc32
 
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.description.yaml_file import bounded_yaml, DEEPEST, MOST_VALUES
+from linkage_ros.bag import METADATA_FILE, read_bag
+from linkage_ros.description import bounded_yaml, DEEPEST, MOST_VALUES
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType, Writer
 import pytest

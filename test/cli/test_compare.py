@@ -11,8 +11,7 @@
 import json
 from math import pi, sin
 
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, Topic
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.view import compare_command as compare
 import pytest

@@ -19,11 +19,11 @@ from typing import Any
 
 from linkage_ros import FileError, load
 from linkage_ros.cli import replay
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import load_scene
+from linkage_ros.messages import Rejection
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.models.fmu.stepped_scene import _Sender
-from linkage_ros.tools.study.prices import turn_crank
+from linkage_ros.tools.study import turn_crank
 from linkage_ros.tools.view import report_command as report
 import pytest
 

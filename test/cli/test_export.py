@@ -23,16 +23,14 @@ import sys
 from threading import Event
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.writer import BagWriter
+from hypothesis import given, strategies as st
+from linkage_ros.bag import BagWriter, RUN_FILE
 from linkage_ros.cli import export
 from linkage_ros.description import tables
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import (
-    JOINT_STATE,
+from linkage_ros.messages import (
+    JOINT_STATE_TYPE,
+    JointStateWriter,
     JointTrajectoryWriter,
     MessageValues,
     TRAJECTORY,
@@ -283,7 +281,11 @@ def test_ticks_of_one_time_are_told_apart_by_what_lies_between(
     run = {
         'scene': 's', 'crank_topic': '/c', 'joint_states_topic': '/js', 'extra_topics': ['/m']
     }  # fmt: skip
-    topics = [topic('/c', JOINT_STATE), topic('/js', JOINT_STATE), topic('/m', TRAJECTORY)]
+    topics = [
+        topic('/c', JOINT_STATE_TYPE),
+        topic('/js', JOINT_STATE_TYPE),
+        topic('/m', TRAJECTORY),
+    ]
     writer = BagWriter(tmp_path / 'bag', topics, {RUN_FILE: ('', json.dumps(run).encode())})
     state, motion = JointStateWriter(['j']).write, JointTrajectoryWriter(['j']).write
     crank, states, motions = range(3)
@@ -313,19 +315,19 @@ def joint_state(
 ) -> bytes:
     """Return a JointState as rosbags writes it."""
     types = STORE.types
-    message = types[JOINT_STATE](
+    message = types[JOINT_STATE_TYPE](
         types['std_msgs/msg/Header'](
             types['builtin_interfaces/msg/Time'](*divmod(stamp, SECOND)), 'some frame'
         ),
         list(names),
         *(np.array(values, dtype=np.float64) for values in (position, velocity, effort)),
     )
-    return bytes(STORE.serialize_cdr(message, JOINT_STATE, little_endian=little))
+    return bytes(STORE.serialize_cdr(message, JOINT_STATE_TYPE, little_endian=little))
 
 
 def foreign(folder: Path, *messages: bytes, topics: Sequence[str] = ('/js',)) -> Path:
     """Write a bag without a scene, its messages on the first topic."""
-    writer = BagWriter(folder, [topic(name, JOINT_STATE) for name in topics])
+    writer = BagWriter(folder, [topic(name, JOINT_STATE_TYPE) for name in topics])
     for index, message in enumerate(messages):
         writer.write(0, BEGIN + index, BEGIN + index, message)
     writer.close()
@@ -375,7 +377,7 @@ def test_a_command_has_a_row_though_the_joints_that_follow_have_no_effort(
     run = {'scene': 's', 'joint_states_topic': '/js', 'crank_topic': '/crank_commands'}
     writer = BagWriter(
         tmp_path / 'bag',
-        [topic('/js', JOINT_STATE), topic('/crank_commands', JOINT_STATE)],
+        [topic('/js', JOINT_STATE_TYPE), topic('/crank_commands', JOINT_STATE_TYPE)],
         {
             RUN_FILE: ('', json.dumps(run).encode()),
             'scene.yaml': ('', scene.read_bytes()),
@@ -425,7 +427,7 @@ numbers = st.floats(width=64)
 
 
 @given(data=st.data(), stamp=st.integers(-(2**31) * SECOND, 2**31 * SECOND - 1))
-@pytest.mark.parametrize('kind', [JOINT_STATE, TRAJECTORY, WRENCHES])
+@pytest.mark.parametrize('kind', [JOINT_STATE_TYPE, TRAJECTORY, WRENCHES])
 def test_messages_tell_what_rosbags_has_written(data: Any, stamp: int, kind: str) -> None:
     types, reader = STORE.types, MessageValues(kind)
     joints = data.draw(names)
@@ -440,7 +442,7 @@ def test_messages_tell_what_rosbags_has_written(data: Any, stamp: int, kind: str
         types['builtin_interfaces/msg/Time'](seconds, rest), data.draw(st.text(max_size=5))
     )
     expected: list[tuple[tuple[str, str], float]] = []
-    if kind == JOINT_STATE:
+    if kind == JOINT_STATE_TYPE:
         told_of = {'position': draw(), 'rate': draw(), 'effort': draw()}
         message = types[kind](header, joints, *told_of.values())
     elif kind == TRAJECTORY:

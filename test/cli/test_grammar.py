@@ -21,9 +21,8 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.cli.completion import SHELLS
-from linkage_ros.cli.main import COMMANDS, EXIT_CODES, module_of, Parser, parser_of
-from linkage_ros.description.scene_file import load_scene, SCENE_FILE
+from linkage_ros.cli import COMMANDS, EXIT_CODES, module_of, Parser, parser_of, SHELLS
+from linkage_ros.description import load_scene, SCENE_FILE
 from linkage_ros.errors import LinkageError
 from linkage_ros.resources import linkage_names, named_file, scene_names
 import pytest

@@ -19,19 +19,21 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import export, info, replay
-from linkage_ros.cli.main import COMMANDS as ALL_COMMANDS
-from linkage_ros.cli.main import module_of, parser_of
-from linkage_ros.cli.terminal import PrintableStream
-from linkage_ros.description.scene_file import SCENE_FILE
+from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Topic
+from linkage_ros.cli import (
+    COMMANDS as ALL_COMMANDS,
+    export,
+    info,
+    module_of,
+    parser_of,
+    PrintableStream,
+    replay,
+)
+from linkage_ros.description import SCENE_FILE
 from linkage_ros.errors import BagError, escape_unprintable, FileError, LinkageError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.single_values import text_message
-from linkage_ros.replay.replay import read_change, recorded_scene
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JointStateWriter, text_message
+from linkage_ros.replay import read_change, recorded_scene
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.drawing import plot_command as plot
 from linkage_ros.tools.view import report_command as report
 import pytest

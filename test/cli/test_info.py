@@ -19,18 +19,20 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reader import read_bag, RUN_FILE
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, METADATA_FILE, read_bag, RUN_FILE
 from linkage_ros.cli import info
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 import pytest
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as RosbagsWriter
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    StoragePlugin,
+    Writer as RosbagsWriter,
+)
 
 from .conftest import json_keys, Run
 from .recorded import (

@@ -13,7 +13,7 @@ from pathlib import Path
 import stat
 from subprocess import CompletedProcess
 
-from linkage_ros.cli.main import COMMANDS, module_of, parser_of
+from linkage_ros.cli import COMMANDS, module_of, parser_of
 import pytest
 
 from .recorded import Recorded, scene_file

@@ -11,13 +11,15 @@
 from math import remainder, tau
 from pathlib import Path
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.drawing import plot_command as command
-from linkage_ros.tools.drawing.plot_command import crank_curves, curves_over_time, is_after_gap
+from linkage_ros.tools.drawing import (
+    crank_curves,
+    curves_over_time,
+    is_after_gap,
+    plot_command as command,
+)
 import numpy as np
 import pytest
 

@@ -12,8 +12,8 @@ from math import inf
 import re
 import time
 
-from linkage_ros.bag.reader import BagMessage
-from linkage_ros.cli.proof import Beginning, proof_of
+from linkage_ros.bag import BagMessage
+from linkage_ros.cli import Beginning, proof_of
 import pytest
 
 from .recorded import FOUR_BAR, Recorded, scene_file

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
+from linkage_ros.bag import read_bag
+from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 

@@ -21,19 +21,21 @@ from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
-from hypothesis import assume, example, given
-from hypothesis import strategies as st
-from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from hypothesis import assume, example, given, strategies as st
+from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Storage
 from linkage_ros.cli import replay
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.run_recording import RunRecording
-from linkage_ros.replay.compare import Comparison, TickPlace, ulp_distance
-from linkage_ros.replay.replay import recorded_scene, versions_here
-from linkage_ros.replay.replay import replay_ticks as replayed
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.node import RunRecording
+from linkage_ros.replay import (
+    Comparison,
+    recorded_scene,
+    replay_ticks as replayed,
+    TickPlace,
+    ulp_distance,
+    versions_here,
+)
 from linkage_ros.resources import shipped_path
 import pytest
 

@@ -14,9 +14,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.recover import recover_bag
-from linkage_ros.bag.storage import Storage
+from linkage_ros.bag import BagMessage, read_bag, recover_bag, Storage
 from linkage_ros.cli import info, replay
 import pytest
 

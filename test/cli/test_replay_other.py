@@ -17,14 +17,13 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE
 from linkage_ros.cli import replay
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages import JointStateWriter
 from linkage_ros.signals import StoppedError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import pytest
 from rosbags.highlevel import AnyReader
 
@@ -39,10 +38,8 @@ from .recorded import (
     Recorded,
     scene_file,
     SECOND,
-    topic,
-)
-from .recorded import (
     told as messages_of,
+    topic,
 )
 
 TICKS = 300

@@ -18,8 +18,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, read_bag
 from linkage_ros.errors import LinkageError
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.view import report_command as command

@@ -15,10 +15,8 @@ import re
 import subprocess
 import sys
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.replay.replay import recorded_scene
+from linkage_ros.bag import BagWriter, read_bag, Topic
+from linkage_ros.replay import recorded_scene
 import pytest
 
 from .conftest import Run

@@ -19,12 +19,10 @@ from math import inf
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli import scene as command
-from linkage_ros.cli.scene import REGISTRIES, table_of
-from linkage_ros.cli.terminal import table_text
-from linkage_ros.description.schema import as_text
+from linkage_ros.cli import REGISTRIES, scene as command, table_of, table_text
+from linkage_ros.description import as_text
 from linkage_ros.errors import FileError, LinkageError
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages import JOINT_STATE_TYPE
 import pytest
 
 from .conftest import json_keys, Run
@@ -91,7 +89,9 @@ def test_json_of_every_shipped_scene_has_the_documented_keys(path, capsys):
     assert run(str(path), '--json') == 0
     account = json.loads(capsys.readouterr().out)
     assert set(account) == json_keys('scene')
-    assert {'name': 'joint_states', 'type': JOINT_STATE, 'what': 'publishes'} in account['topics']
+    assert {'name': 'joint_states', 'type': JOINT_STATE_TYPE, 'what': 'publishes'} in account[
+        'topics'
+    ]
 
 
 def test_json_of_a_scene_holds_each_stage_with_its_parameters(tmp_path, capsys):

@@ -15,14 +15,13 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import read_bag
 from linkage_ros.cli.main import main
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.messages.joint_state import JointStateReader
-from linkage_ros.replay import simulate as simulated_run
-from linkage_ros.replay.simulate import BEGIN, simulate_run
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JointStateReader
+from linkage_ros.replay import BEGIN, simulate as simulated_run, simulate_run
+from linkage_ros.tick import Pipeline
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

@@ -13,13 +13,13 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from linkage_ros.cli import terminal
-from linkage_ros.cli.terminal import (
+from linkage_ros.cli import (
     FIRST_LINE,
     fold_table,
     print_tables,
     show_progress,
     table_text,
+    terminal,
     TerminalTable,
 )
 import pytest

@@ -15,7 +15,7 @@ from pathlib import Path
 import shutil
 from threading import Event
 
-from linkage_ros.cli.main import module_of, parser_of
+from linkage_ros.cli import module_of, parser_of
 from linkage_ros.errors import LinkageError
 import pytest
 

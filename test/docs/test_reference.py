@@ -13,9 +13,8 @@ from __future__ import annotations
 import re
 
 from docs.make_reference import MADE, made_pages
-from linkage_ros.cli.main import COMMANDS
-from linkage_ros.cli.scene import REGISTRIES
-from linkage_ros.description.schema import linkage_schema, scene_schema
+from linkage_ros.cli import COMMANDS, REGISTRIES
+from linkage_ros.description import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT

@@ -17,9 +17,8 @@ import sys
 from urllib.parse import unquote, urlsplit
 
 import linkage_ros as lr
-from linkage_ros.cli.main import COMMANDS
-from linkage_ros.cli.scene import REGISTRIES
-from linkage_ros.description.schema import linkage_schema, scene_schema
+from linkage_ros.cli import COMMANDS, REGISTRIES
+from linkage_ros.description import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT

@@ -15,14 +15,11 @@ import re
 from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import frames_of_links
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.drawing.animation import animate, check_kind, range_motion, RATE
-from linkage_ros.tools.view.report.run import Window
-from linkage_ros.tools.view.report.run_motion import find_run_motion
+from linkage_ros.kinematics import frames_of_links, prepare_view, usual_inputs
+from linkage_ros.tools.drawing import animate, check_kind, range_motion, RATE
+from linkage_ros.tools.view.report import find_run_motion, Window
 import numpy as np
 import pytest
 

@@ -16,11 +16,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.shapes import INK
-from linkage_ros.tools.design import picture as drawing
-from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
-from linkage_ros.tools.design.picture import draw_design
-from linkage_ros.tools.drawing.painting import OTHER, WANTED
+from linkage_ros.kinematics import INK
+from linkage_ros.tools.design import (
+    Design,
+    DesignRequest,
+    draw_design,
+    FourBar,
+    picture as drawing,
+)
+from linkage_ros.tools.drawing import OTHER, WANTED
 import numpy as np
 import pytest
 

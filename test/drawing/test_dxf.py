@@ -15,10 +15,10 @@ from pathlib import Path
 import subprocess
 from typing import Any
 
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.resources import linkage_names, shipped_path
-from linkage_ros.tools.drawing.dxf import links_dxf
+from linkage_ros.tools.drawing import links_dxf
 import pytest
 import yaml
 

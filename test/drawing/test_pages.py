@@ -15,12 +15,11 @@ from pathlib import Path
 import re
 import sys
 
-from linkage_ros.description.linkage_file import load
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.description import load, parse_scene
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import pytest
 
 # The gallery shows every shipped linkage, as its file is now.

@@ -15,14 +15,11 @@ import re
 from typing import Any
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.linkage_file import find_assemblies, load
+from linkage_ros.description import find_assemblies, load
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.resources import linkage_names, named_file
-from linkage_ros.tools.drawing import figure as drawing
-from linkage_ros.tools.drawing.figure import paint_picture
-from linkage_ros.tools.drawing.painting import degree_step
+from linkage_ros.tools.drawing import degree_step, figure as drawing, paint_picture
 import pytest
 
 pytest.importorskip('matplotlib')

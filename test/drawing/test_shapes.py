@@ -13,24 +13,25 @@ from math import cos, pi, remainder, sin, tau
 from pathlib import Path
 import random
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import parse_yaml, read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import drawn_once, sweep_range, unwrap_angles
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import (
+from hypothesis import given, strategies as st
+from linkage_ros.description import parse_yaml, read_linkage, read_yaml
+from linkage_ros.kinematics import (
     Circle,
+    Closure,
     convex_hull,
     draw_shapes,
     draw_skeleton,
+    drawn_once,
+    GROUND,
+    InputSweep,
     Polygon,
     round_corners,
     Segment,
+    sweep_range,
+    unwrap_angles,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.tools.drawing.painting import Label, place_labels
+from linkage_ros.tools.drawing import Label, place_labels
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

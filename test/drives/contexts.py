@@ -8,8 +8,8 @@
 
 """Contexts for drives in tests: linkages of one input and of two, and a scene."""
 
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.stages.drives import Context
+from linkage_ros.tick import Pipeline
 
 from ..support.scenes import closure_of, FIVE_BAR, FOUR_BAR, pipeline_of
 

@@ -12,17 +12,14 @@ import json
 from math import inf, nan
 from random import Random
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
+from hypothesis import given, strategies as st
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.description import load_scene
 from linkage_ros.errors import BagError, DefinitionError
-from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
-from linkage_ros.stages.drives.bag import BagParameters, build
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import CrankSample, JointStateWriter, Rejection
+from linkage_ros.stages.drives import BagParameters, CrankState, TopicDrive, TopicParameters
+from linkage_ros.stages.drives.bag import build
+from linkage_ros.tick import Pipeline
 from mcap.writer import IndexType, Writer
 import pytest
 

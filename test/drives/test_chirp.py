@@ -15,8 +15,8 @@ The integral is mpmath's, by quadrature; so are the derivatives of the position.
 from dataclasses import replace
 from math import hypot, log2, tau
 
-from linkage_ros.stages.drives.chirp import build, Chirp, ChirpParameters, motion_curve
-from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.drives import Chirp, ChirpParameters, CrankState
+from linkage_ros.stages.drives.chirp import build, motion_curve
 from mpmath import mp
 import pytest
 

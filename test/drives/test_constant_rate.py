@@ -10,16 +10,10 @@
 
 from math import ulp
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.constant_rate import (
-    build,
-    ConstantRate,
-    ConstantRateParameters,
-    motion_curve,
-)
-from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.stages.drives import ConstantRate, ConstantRateParameters, CrankState
+from linkage_ros.stages.drives.constant_rate import build, motion_curve
 from mpmath import mp
 import pytest
 

@@ -10,15 +10,13 @@
 
 from math import cos, exp, pi, sin
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.errors import FileError
-from linkage_ros.messages.joint_state import CrankSample, Rejection
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.messages import CrankSample, Rejection
+from linkage_ros.stages.drives import TopicDrive, TopicParameters
 import pytest
 
-from ..support.messages import joint_state as serialized
-from ..support.messages import read_joint_state
+from ..support.messages import joint_state as serialized, read_joint_state
 from ..support.scenes import PENDULUM, pipeline_of
 
 MS = 1_000_000

@@ -8,12 +8,12 @@
 
 """Drives and the limits of joints: what would leave them is refused, and a torque is stopped."""
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.stages.drives.profile import motion_curve, ProfileParameters, value_range
+from linkage_ros.kinematics import Status
+from linkage_ros.messages import EffortCommand
+from linkage_ros.stages.drives import ProfileParameters, value_range
+from linkage_ros.stages.drives.profile import motion_curve
 import pytest
 
 from ..support.scenes import four_bar_text, pipeline_of, symmetric_five_bar

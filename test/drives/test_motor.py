@@ -16,15 +16,13 @@ The motor has k·N = 1, so a current of 1 A gives 1 N·m at the input without lo
 from dataclasses import replace
 from math import copysign, exp, log
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, Loads
-from linkage_ros.dynamics.motor import Motor
+from hypothesis import given, settings, strategies as st
+from linkage_ros.dynamics import AppliedLoads, JointLoad, Loads, Motor
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.drives.torque import build, MotorParameters, TorqueParameters
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import EffortCommand
+from linkage_ros.stages.drives import Context, MotorParameters, TorqueParameters
+from linkage_ros.stages.drives.torque import build
 import pytest
 from scipy.integrate import solve_ivp
 

@@ -10,11 +10,10 @@
 
 from math import sqrt, tau
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.drives.profile import build, motion_curve, Profile, ProfileParameters
+from linkage_ros.stages.drives import CrankState, Profile, ProfileParameters
+from linkage_ros.stages.drives.profile import build, motion_curve
 from mpmath import mp
 import numpy as np
 import pytest

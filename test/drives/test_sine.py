@@ -10,10 +10,9 @@
 
 from math import pi
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.drives.sine import build, motion_curve, Sine, SineParameters
+from hypothesis import given, strategies as st
+from linkage_ros.stages.drives import CrankState, Sine, SineParameters
+from linkage_ros.stages.drives.sine import build, motion_curve
 from mpmath import mp
 import pytest
 

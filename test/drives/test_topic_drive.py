@@ -13,18 +13,15 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.kinematics.linkage import Input
-from linkage_ros.messages.joint_state import CrankSample, Rejection
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.tick.pipeline import Pipeline
+from hypothesis import given, strategies as st
+from linkage_ros.description import parse_scene
+from linkage_ros.kinematics import Input
+from linkage_ros.messages import CrankSample, Rejection
+from linkage_ros.stages.drives import CrankState, TopicDrive, TopicParameters
+from linkage_ros.tick import Pipeline
 import pytest
 
-from ..support.messages import joint_state as serialized
-from ..support.messages import read_joint_state
+from ..support.messages import joint_state as serialized, read_joint_state
 from ..support.scenes import FOUR_BAR, pipeline_of
 
 # The crank from a topic, as timelines.

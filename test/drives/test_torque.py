@@ -17,16 +17,13 @@ from dataclasses import replace
 from math import inf, isfinite, nan, pi
 import random
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
+from hypothesis import given, settings, strategies as st
+from linkage_ros.dynamics import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Mass
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import EffortCommand, Rejection
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.drives.torque import build, reader, TOPIC, TorqueParameters
+from linkage_ros.kinematics import Closure, Mass, Status
+from linkage_ros.messages import EffortCommand, Rejection
+from linkage_ros.stages.drives import Context, reader, TOPIC, TorqueParameters
+from linkage_ros.stages.drives.torque import build
 import pytest
 
 from .contexts import two_inputs

@@ -10,9 +10,9 @@
 
 from math import exp, log
 
-from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.torque import PlayParameters
+from linkage_ros.stages.drives import PlayParameters
 import numpy as np
 import pytest
 from scipy.linalg import expm

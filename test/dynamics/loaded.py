@@ -13,27 +13,11 @@ from itertools import pairwise
 from pathlib import Path
 import random
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import parse_yaml, read_yaml
-from linkage_ros.dynamics.loads import (
-    AppliedLoads,
-    JointLoad,
-    JointSpring,
-    Loads,
-    PointLoad,
-    Spring,
-)
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
-    GROUND,
-    Input,
-    Linkage,
-    Mass,
-    SlideJoint,
-    Slider,
-)
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.drives.torque import build, TorqueParameters
+from linkage_ros.description import parse_yaml, read_linkage, read_yaml
+from linkage_ros.dynamics import AppliedLoads, JointLoad, JointSpring, Loads, PointLoad, Spring
+from linkage_ros.kinematics import Closure, GROUND, Input, Linkage, Mass, SlideJoint, Slider
+from linkage_ros.stages.drives import Context, TorqueParameters
+from linkage_ros.stages.drives.torque import build
 
 from ..support.scenes import closure_of, PENDULUM
 

@@ -17,8 +17,7 @@ starts from a pose close by.
 from cmath import rect
 from math import hypot, tau
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
+from linkage_ros.kinematics import Closure, GROUND, RevoluteJoint
 import numpy as np
 
 

@@ -20,10 +20,8 @@ a linear system for τ and λ. Without λ, τ = Kᵀ·Q with the ratios K = dq/d
 (virtual work). With τ and λ known, MuJoCo also gives the forces in the pins of the tree.
 """
 
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.dynamics import Loads, Mechanics, Reactions
+from linkage_ros.kinematics import Closure
 import numpy as np
 import pytest
 

@@ -17,16 +17,16 @@ from itertools import pairwise
 from math import cos, exp, remainder, sin, sqrt, tau
 from pathlib import Path
 
-from linkage_ros.dynamics.loads import (
+from linkage_ros.dynamics import (
     Friction,
     JointFriction,
     JointLoad,
     JointSpring,
     Loads,
+    Mechanics,
     PointLoad,
     SoftStop,
 )
-from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import DefinitionError, FileError
 import pytest
 from scipy.integrate import solve_ivp

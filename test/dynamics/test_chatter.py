@@ -15,14 +15,10 @@ What is counted is work, not time: how often the equation of motion is asked for
 from dataclasses import replace
 from itertools import pairwise
 
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import SingleDofMechanism
-from linkage_ros.dynamics.two_masses import TwoMasses
+from linkage_ros.dynamics import Loads, Mechanics, METHODS, SingleDofMechanism, Terms, TwoMasses
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import EffortCommand
 import pytest
 
 from .loaded import BEGIN, FOLDER, shipped

@@ -12,29 +12,25 @@ from cmath import rect
 from dataclasses import replace
 from math import copysign, cos, hypot, pi, sin, sqrt
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import (
+from hypothesis import given, strategies as st
+from linkage_ros.dynamics import (
     AppliedLoads,
     Friction,
     JointFriction,
     JointLoad,
     Loads,
+    Mechanics,
+    METHODS,
     PointLoad,
+    Reactions,
+    SingleDofMechanism,
     WrenchLoad,
 )
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.motion import SingleDofMechanism
-from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.arithmetic import cross_product
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Mass
-from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.messages.wrench import PlanarWrench
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.drives.torque import build, TorqueParameters
+from linkage_ros.kinematics import Closure, cross_product, GROUND, Mass
+from linkage_ros.messages import EffortCommand, PlanarWrench
+from linkage_ros.stages.drives import Context, TorqueParameters
+from linkage_ros.stages.drives.torque import build
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq

@@ -14,10 +14,8 @@ On a crank alone, whose inertia about its pivot is 0.23 kg·m².
 
 from math import cos, exp
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.dynamics.loads import Friction, JointFriction, JointLoad, Loads
-from linkage_ros.dynamics.mechanics import Mechanics
+from hypothesis import given, strategies as st
+from linkage_ros.dynamics import Friction, JointFriction, JointLoad, Loads, Mechanics
 from linkage_ros.errors import DefinitionError
 import pytest
 from scipy.integrate import solve_ivp

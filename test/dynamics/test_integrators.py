@@ -11,18 +11,19 @@
 from itertools import pairwise
 from math import cos, exp, log2, pi, sin, sqrt
 
-from linkage_ros.dynamics.integrators import (
+from linkage_ros.dynamics import (
     gauss_legendre,
     GAUSS_MATRIX,
     GAUSS_NODES,
     GAUSS_WEIGHTS,
+    last_before,
+    Loads,
+    Mechanics,
     METHODS,
     rk4,
+    SingleDofMechanism,
 )
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.motion import last_before, SingleDofMechanism
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 import mpmath
 import numpy as np
 import pytest

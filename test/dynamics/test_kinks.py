@@ -21,11 +21,16 @@ from cmath import phase, rect
 from itertools import pairwise
 from math import acos, log2, pi, sin, sqrt
 
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
-from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import SingleDofMechanism
-from linkage_ros.kinematics.linkage import Mass
+from linkage_ros.dynamics import (
+    Friction,
+    JointFriction,
+    Loads,
+    Mechanics,
+    METHODS,
+    SingleDofMechanism,
+    Terms,
+)
+from linkage_ros.kinematics import Mass
 import numpy as np
 import pytest
 

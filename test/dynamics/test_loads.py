@@ -10,17 +10,17 @@
 
 from dataclasses import replace
 
-from linkage_ros.dynamics.loads import (
+from linkage_ros.dynamics import (
     check_loads,
     check_masses,
     Friction,
     JointFriction,
     Loads,
+    Mechanics,
     Spring,
 )
-from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 import pytest
 
 from .loaded import shipped

@@ -15,15 +15,19 @@ The reference is scipy's DOP853 at 1e-12, cut at its events: contacts, and rates
 from math import exp, inf, sin, sqrt, tau
 import random
 
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.laws import Contact, LawTerm
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.longest_step import EXACT
-from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import SingleDofMechanism
+from linkage_ros.dynamics import (
+    Contact,
+    EXACT,
+    LawTerm,
+    Loads,
+    Mechanics,
+    METHODS,
+    SingleDofMechanism,
+    Terms,
+)
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import EffortCommand
 import pytest
 from scipy.integrate import solve_ivp
 

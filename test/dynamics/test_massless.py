@@ -13,7 +13,7 @@ from math import hypot
 
 from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import numpy as np
 import pytest
 

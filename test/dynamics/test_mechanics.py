@@ -16,13 +16,9 @@ energy itself against closed forms here and against another engine in `test_agai
 from dataclasses import replace
 from math import cos, hypot, sin
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.dynamics.loads import Friction, JointFriction, Loads, Spring
-from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, Mass, RevoluteJoint
-from linkage_ros.kinematics.status import Status
+from hypothesis import given, strategies as st
+from linkage_ros.dynamics import Friction, JointFriction, Loads, Mechanics, Spring, Terms
+from linkage_ros.kinematics import Closure, Input, Linkage, Mass, RevoluteJoint, Status
 import numpy as np
 import pytest
 

@@ -14,12 +14,8 @@ The mechanisms are made by hand: a mass of 1 on a line, under a constant force o
 
 from math import cos, exp, inf, isfinite, pi, sin, sqrt
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.laws import LawTerm, TorqueTable
-from linkage_ros.dynamics.mechanics import Terms
-from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
+from hypothesis import given, strategies as st
+from linkage_ros.dynamics import LARGEST, LawTerm, METHODS, SingleDofMechanism, Terms, TorqueTable
 import pytest
 
 STEP = {name: method.step for name, method in METHODS.items()}

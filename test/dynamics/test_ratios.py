@@ -11,14 +11,19 @@
 from dataclasses import replace
 from math import cos
 
-from linkage_ros.dynamics.loads import AppliedLoads, Friction, JointFriction, JointLoad, Loads
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
+from linkage_ros.dynamics import (
+    AppliedLoads,
+    Friction,
+    JointFriction,
+    JointLoad,
+    Loads,
+    Mechanics,
+    Reactions,
+)
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, Mass, Ratio, RevoluteJoint
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.drives.torque import build, TorqueParameters
+from linkage_ros.kinematics import Closure, Input, Linkage, Mass, Ratio, RevoluteJoint
+from linkage_ros.stages.drives import Context, TorqueParameters
+from linkage_ros.stages.drives.torque import build
 import pytest
 from scipy.integrate import solve_ivp
 

@@ -16,12 +16,17 @@ from cmath import rect
 from dataclasses import replace
 from math import asin, cos, hypot, sin, tan
 
-from linkage_ros.dynamics.loads import Friction, JointFriction, Loads, Spring
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Mass, RevoluteJoint, Slider
-from linkage_ros.kinematics.status import Status
+from linkage_ros.dynamics import Friction, JointFriction, Loads, Mechanics, Reactions, Spring
+from linkage_ros.kinematics import (
+    Closure,
+    GROUND,
+    Input,
+    Linkage,
+    Mass,
+    RevoluteJoint,
+    Slider,
+    Status,
+)
 import numpy as np
 import pytest
 

@@ -18,9 +18,8 @@ from dataclasses import replace
 from itertools import pairwise
 import random
 
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.dynamics import Mechanics, Reactions
+from linkage_ros.kinematics import Closure
 import numpy as np
 import pytest
 

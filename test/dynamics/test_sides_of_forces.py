@@ -19,11 +19,8 @@ from cmath import rect
 from dataclasses import replace
 from math import copysign, hypot
 
-from linkage_ros.dynamics.loads import Friction, JointFriction, Loads, Spring
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.dynamics import Friction, JointFriction, Loads, Mechanics, Reactions, Spring
+from linkage_ros.kinematics import Closure, GROUND
 import pytest
 
 from .loaded import slope, STATES, weighed

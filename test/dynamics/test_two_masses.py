@@ -15,14 +15,10 @@ Without other forces the momentum J·φ̇ + I·q̇ is the impulse of the drive, 
 from dataclasses import replace
 from math import exp, sqrt, tau
 
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.mechanics import Mechanics, Terms
-from linkage_ros.dynamics.motion import SingleDofMechanism
-from linkage_ros.dynamics.two_masses import TwoMasses
+from linkage_ros.dynamics import Loads, Mechanics, METHODS, SingleDofMechanism, Terms, TwoMasses
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import EffortCommand
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import EffortCommand
 import pytest
 from scipy.integrate import solve_ivp
 

@@ -17,15 +17,12 @@ drive is the work of force and torque over the ways of point and link.
 from cmath import exp, phase
 from math import acos, inf, nan
 
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.dynamics.loads import AppliedLoads, Loads, WrenchLoad
-from linkage_ros.dynamics.mechanics import Mechanics
-from linkage_ros.dynamics.reactions import Reactions
+from linkage_ros.description import load_scene
+from linkage_ros.dynamics import AppliedLoads, Loads, Mechanics, Reactions, WrenchLoad
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.wrench import PlanarWrench, read_wrench
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.kinematics import GROUND
+from linkage_ros.messages import PlanarWrench, read_wrench, Rejection
+from linkage_ros.tick import Pipeline
 import pytest
 from scipy.integrate import solve_ivp
 

@@ -10,11 +10,10 @@
 
 from importlib import import_module
 
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.stages.drives.drive import Context, CrankState
-from linkage_ros.stages.effects import velocity
-from linkage_ros.stages.effects.stage import EFFECTS, MechanismState
+from linkage_ros.dynamics import Loads
+from linkage_ros.kinematics import Closure
+from linkage_ros.stages.drives import Context, CrankState
+from linkage_ros.stages.effects import EFFECTS, MechanismState, velocity
 
 from ..support.scenes import four_bar_text
 

@@ -8,9 +8,9 @@
 
 """Set-up of the tests of sensors: two linkages, readings by hand, scenes, and statistics."""
 
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.drives.drive import Context
-from linkage_ros.stages.effects.stage import SensorReading
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects import SensorReading
 from mpmath import gammainc
 
 from ..support.scenes import closure_of, FOUR_BAR, pipeline_of, SLIDER_CRANK

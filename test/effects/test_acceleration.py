@@ -11,12 +11,10 @@
 from dataclasses import replace
 from math import inf, isfinite, nan
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.kinematics.status import Status
-from linkage_ros.stages.drives.drive import Context, CrankState
-from linkage_ros.stages.effects import acceleration, velocity
-from linkage_ros.stages.effects.stage import MechanismState, SensorReading
+from hypothesis import given, strategies as st
+from linkage_ros.kinematics import Status
+from linkage_ros.stages.drives import Context, CrankState
+from linkage_ros.stages.effects import acceleration, MechanismState, SensorReading, velocity
 import pytest
 
 from .sensors import ANGLES, SLIDE

@@ -10,12 +10,10 @@
 
 from math import pi, remainder, sin, tau
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.stages.drives.drive import Context, CrankState
-from linkage_ros.stages.effects import backlash
-from linkage_ros.stages.effects.backlash import BacklashParameters
+from hypothesis import given, strategies as st
+from linkage_ros.kinematics import Closure
+from linkage_ros.stages.drives import Context, CrankState
+from linkage_ros.stages.effects import backlash, BacklashParameters
 import pytest
 
 from ..support.messages import read_joint_state

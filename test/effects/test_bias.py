@@ -8,11 +8,9 @@
 
 """Bias: what is read of a joint is off by a constant, and nothing else is."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import bias
-from linkage_ros.stages.effects.bias import BiasParameters, EccentricDisc
+from linkage_ros.stages.effects import bias, BiasParameters, EccentricDisc
 from mpmath import mp
 import pytest
 

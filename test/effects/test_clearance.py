@@ -12,8 +12,7 @@ from cmath import rect
 from math import hypot, sqrt
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import clearance
-from linkage_ros.stages.effects.clearance import ClearanceParameters
+from linkage_ros.stages.effects import clearance, ClearanceParameters
 import pytest
 
 from .four_bar_by_hand import FourBar

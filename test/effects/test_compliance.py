@@ -11,9 +11,8 @@
 from dataclasses import replace
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.stages.effects import compliance
-from linkage_ros.stages.effects.compliance import ComplianceParameters
+from linkage_ros.kinematics import Closure
+from linkage_ros.stages.effects import compliance, ComplianceParameters
 import pytest
 
 from .four_bar_by_hand import FourBar, mp, turn

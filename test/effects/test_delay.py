@@ -13,12 +13,9 @@ from functools import partial
 from math import cos, sin
 from random import Random
 
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import delay
-from linkage_ros.stages.effects.delay import DelayParameters
-from linkage_ros.stages.effects.history import History
+from linkage_ros.stages.effects import delay, DelayParameters, History
 import pytest
 from scipy.stats import expon, kstest, uniform
 

@@ -12,8 +12,7 @@ from itertools import groupby, pairwise
 from math import ceil, inf, log
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import dropout
-from linkage_ros.stages.effects.dropout import DropoutParameters
+from linkage_ros.stages.effects import dropout, DropoutParameters
 import pytest
 
 from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY

@@ -10,21 +10,18 @@
 
 from math import cos, sin
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.dynamics.loads import Friction, JointFriction
+from hypothesis import given, strategies as st
+from linkage_ros.dynamics import Friction, JointFriction
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.status import Status
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.stages.effects import effort
-from linkage_ros.stages.effects.stage import MechanismState
+from linkage_ros.kinematics import Status
+from linkage_ros.stages.drives import CrankState
+from linkage_ros.stages.effects import effort, MechanismState
 import numpy as np
 import pytest
 
 from .four_bar_by_hand import FourBar, mp
 from .loaded import context, GRAVITY, moved, SINGULAR
-from ..support.messages import joint_state as serialized
-from ..support.messages import read_joint_state, STORE
+from ..support.messages import joint_state as serialized, read_joint_state, STORE
 from ..support.scenes import linkage_of, LINKAGES, PENDULUM, pipeline_of, shipped
 
 # Effort that the drive must exert, against closed forms and energy balances by hand.

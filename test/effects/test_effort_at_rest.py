@@ -19,8 +19,7 @@ from math import cos, inf, pi
 
 import pytest
 
-from ..support.messages import joint_state as serialized
-from ..support.messages import read_joint_state
+from ..support.messages import joint_state as serialized, read_joint_state
 from ..support.scenes import LINKAGES, PENDULUM, pipeline_of
 
 MS = 1_000_000

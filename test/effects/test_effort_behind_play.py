@@ -16,7 +16,7 @@ J. Craig, Introduction to Robotics, 3rd ed., 2005, 6.7).
 
 from math import cos, sin, tau
 
-from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description import parse_scene
 from linkage_ros.errors import FileError
 import pytest
 

@@ -12,11 +12,9 @@ from fractions import Fraction
 from itertools import pairwise
 from math import exp, floor, isclose, pi, tau, ulp
 
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import encoder
-from linkage_ros.stages.effects.encoder import EncoderParameters, JointEncoder
+from linkage_ros.stages.effects import encoder, EncoderParameters, JointEncoder
 import pytest
 
 from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE

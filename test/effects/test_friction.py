@@ -8,10 +8,9 @@
 
 """Friction: parameters that everything with forces takes into account, and no stage of its own."""
 
-from linkage_ros.dynamics.loads import Friction, JointFriction
+from linkage_ros.dynamics import Friction, JointFriction
 from linkage_ros.errors import FileError
-from linkage_ros.stages.effects import friction
-from linkage_ros.stages.effects.friction import FrictionParameters
+from linkage_ros.stages.effects import friction, FrictionParameters
 import pytest
 
 from .loaded import context, moved

@@ -16,8 +16,8 @@ stamp, the published joints have to close it.
 from cmath import rect
 from math import pi, sin
 
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.effects.delay import Delay, DelayParameters
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.effects import Delay, DelayParameters
 import pytest
 
 from .sensors import BEGIN, MS, reading

@@ -11,8 +11,7 @@
 from itertools import pairwise
 from math import erf, sqrt
 
-from linkage_ros.stages.effects import jitter
-from linkage_ros.stages.effects.jitter import JitterParameters
+from linkage_ros.stages.effects import jitter, JitterParameters
 import pytest
 
 from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKELY

@@ -13,14 +13,18 @@ from fractions import Fraction
 from itertools import pairwise
 from math import acos, cos, hypot, log, pi, radians, remainder, tau
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import carried_shapes, Polygon, shape_outline
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tick.pipeline import Pipeline
+from hypothesis import given, settings, strategies as st
+from linkage_ros.description import parse_scene
+from linkage_ros.kinematics import (
+    carried_shapes,
+    GROUND,
+    InputSweep,
+    Polygon,
+    shape_outline,
+    usual_inputs,
+)
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tick import Pipeline
 import pytest
 
 from ..support.messages import read_joint_state, STORE

@@ -8,11 +8,9 @@
 
 """Measuring range: readings end at its limits, and nothing else changes."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import measuring_range
-from linkage_ros.stages.effects.measuring_range import JointRange, MeasuringRangeParameters
+from linkage_ros.stages.effects import JointRange, measuring_range, MeasuringRangeParameters
 import pytest
 
 from .sensors import BEGIN, context, published, reading

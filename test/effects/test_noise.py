@@ -12,8 +12,7 @@ from itertools import accumulate, cycle, islice, pairwise
 from math import exp, sqrt
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import noise
-from linkage_ros.stages.effects.noise import JointNoise, NoiseParameters
+from linkage_ros.stages.effects import JointNoise, noise, NoiseParameters
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE

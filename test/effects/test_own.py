@@ -15,20 +15,13 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.description.schema import scene_schema
-from linkage_ros.description.violations import find_violations
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.bag import BagWriter, RUN_FILE, Topic
+from linkage_ros.description import find_violations, load_scene, read_yaml, scene_schema
 from linkage_ros.errors import FileError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.single_values import time_message
-from linkage_ros.replay.replay import user_effects_here
-from linkage_ros.stages.effects.stage import EFFECTS
-from linkage_ros.stages.effects.user_effects import FUNCTIONS
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JointStateWriter, time_message
+from linkage_ros.replay import user_effects_here
+from linkage_ros.stages.effects import EFFECTS, FUNCTIONS
+from linkage_ros.tick import Pipeline
 import pytest
 
 from ..support.commands import linkage

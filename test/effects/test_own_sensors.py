@@ -11,12 +11,18 @@
 from fractions import Fraction
 from math import floor, tau
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.stages.effects import delay, dropout, rate_limit
-from linkage_ros.stages.effects.delay import DelayParameters, JointDelay
-from linkage_ros.stages.effects.dropout import DropoutParameters, JointDropout
-from linkage_ros.stages.effects.rate_limit import JointRateLimit, RateLimitParameters
+from hypothesis import given, strategies as st
+from linkage_ros.stages.effects import (
+    delay,
+    DelayParameters,
+    dropout,
+    DropoutParameters,
+    JointDelay,
+    JointDropout,
+    JointRateLimit,
+    rate_limit,
+    RateLimitParameters,
+)
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading

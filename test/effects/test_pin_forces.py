@@ -10,13 +10,11 @@
 
 from cmath import rect
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.kinematics.status import Status
-from linkage_ros.stages.effects import pin_forces
-from linkage_ros.stages.effects.stage import MechanismState, SensorReading
-from linkage_ros.tick.pipeline import Pipeline
+from hypothesis import given, strategies as st
+from linkage_ros.description import parse_scene
+from linkage_ros.kinematics import Status
+from linkage_ros.stages.effects import MechanismState, pin_forces, SensorReading
+from linkage_ros.tick import Pipeline
 import pytest
 
 from .four_bar_by_hand import FourBar

@@ -11,10 +11,8 @@
 from fractions import Fraction
 from math import floor
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.stages.effects import rate_limit
-from linkage_ros.stages.effects.rate_limit import RateLimitParameters
+from hypothesis import given, strategies as st
+from linkage_ros.stages.effects import rate_limit, RateLimitParameters
 import pytest
 
 from .sensors import BEGIN, context, MS, published, reading

@@ -15,9 +15,8 @@ from pathlib import Path
 from random import Random
 
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.stages.effects import tolerance
-from linkage_ros.stages.effects.tolerance import alter, ToleranceParameters
+from linkage_ros.kinematics import Closure
+from linkage_ros.stages.effects import alter, tolerance, ToleranceParameters
 import mpmath
 import pytest
 

@@ -11,10 +11,8 @@
 from fractions import Fraction
 from math import nextafter, pi, tau
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.stages.effects.angle_unwrap import Continuous, wrap_all, wrap_angle
-from linkage_ros.stages.effects.stage import SensorReading
+from hypothesis import given, strategies as st
+from linkage_ros.stages.effects import Continuous, SensorReading, wrap_all, wrap_angle
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')

@@ -10,12 +10,10 @@
 
 from math import isfinite, remainder, tau
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.kinematics.status import Status
-from linkage_ros.stages.drives.drive import Context, CrankState
-from linkage_ros.stages.effects import velocity
-from linkage_ros.stages.effects.stage import MechanismState
+from hypothesis import given, strategies as st
+from linkage_ros.kinematics import Status
+from linkage_ros.stages.drives import Context, CrankState
+from linkage_ros.stages.effects import MechanismState, velocity
 import pytest
 
 from .sensors import ANGLES, SLIDE

@@ -10,11 +10,10 @@
 
 from math import isnan
 
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.kinematics import Status
+from linkage_ros.messages import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.stages.faults import Fault, FaultChange, Freeze, Injection
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
 from ..support.scenes import scene_of

@@ -16,10 +16,9 @@ import sys
 from typing import Any
 
 from fmpy import extract, read_model_description
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.tools.models.fmu.build import scene_fmu
+from hypothesis import given, settings, strategies as st
+from linkage_ros.description import load_scene
+from linkage_ros.tools.models.fmu import scene_fmu
 import pytest
 
 Call = Callable[[list[str]], list[tuple[int, list[Any]]]]

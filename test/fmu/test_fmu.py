@@ -25,14 +25,11 @@ from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from linkage_ros import __version__
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene, Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tools.models.fmu import stepped_scene
-from linkage_ros.tools.models.fmu.build import scene_fmu
-from linkage_ros.tools.models.fmu.stepped_scene import LinkageOutputs
+from linkage_ros.stages.drives import CrankState
+from linkage_ros.tick import Pipeline
+from linkage_ros.tools.models.fmu import LinkageOutputs, scene_fmu, stepped_scene
 from mpmath import mp, mpf
 import pytest
 

@@ -19,15 +19,7 @@ from math import pi
 import random
 from typing import NamedTuple
 
-from linkage_ros.kinematics.linkage import (
-    Input,
-    Linkage,
-    Point,
-    RevoluteJoint,
-    Side,
-    SlideJoint,
-    Slider,
-)
+from linkage_ros.kinematics import Input, Linkage, Point, RevoluteJoint, Side, SlideJoint, Slider
 
 Points = dict[tuple[str, str], complex]
 Sided = Callable[[Points], float]

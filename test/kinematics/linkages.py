@@ -11,19 +11,23 @@
 from math import cos, sin
 from typing import Any
 
-from linkage_ros.kinematics.dyads.rpr import RPRDyad, RPRPose, swivel_diagonal
-from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad, RRRPose
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    crank_diagonal,
     Input,
     Linkage,
+    LinkState,
     Point,
     RevoluteJoint,
+    RPRDyad,
+    RPRPose,
+    RRRDyad,
+    RRRPose,
     Side,
     SlideJoint,
     Slider,
+    swivel_diagonal,
 )
-from linkage_ros.kinematics.step import LinkState
 
 # Linkage objects for the tests: textbook shapes, in plain or arbitrary frames.
 

@@ -27,14 +27,7 @@ from math import tau
 import random
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.linkage import (
-    AssemblyPose,
-    Input,
-    Linkage,
-    Point,
-    RevoluteJoint,
-    Slider,
-)
+from linkage_ros.kinematics import AssemblyPose, Input, Linkage, Point, RevoluteJoint, Slider
 import numpy as np
 from numpy.typing import NDArray
 

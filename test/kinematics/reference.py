@@ -21,7 +21,7 @@ the crank's direction within (-π, π]: what rounding inputs and result once may
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Status
 from mpmath import mp, mpc, mpf
 
 # The reference of the kinematics tests, with any number of digits.

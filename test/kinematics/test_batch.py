@@ -18,13 +18,9 @@ from math import inf, nan, pi, remainder
 from typing import Any
 import warnings
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.closure import Closure
+from hypothesis import given, settings, strategies as st
+from linkage_ros.kinematics import AssemblyPose, Closure, CODES, RevoluteJoint, Status
 from linkage_ros.kinematics.compiling import numpy_blocks
-from linkage_ros.kinematics.linkage import AssemblyPose, RevoluteJoint
-from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpc, mpf
 import numpy as np
 from numpy.typing import NDArray

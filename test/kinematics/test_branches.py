@@ -14,12 +14,16 @@ from functools import cache
 from math import pi, remainder, tau
 import random
 
-from linkage_ros.kinematics.assembly_modes import other_assemblies
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import AssemblyPose, Input, Linkage
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.kinematics import (
+    AssemblyPose,
+    Closure,
+    Input,
+    InputSweep,
+    Linkage,
+    other_assemblies,
+    Status,
+)
+from linkage_ros.solvers import TableClosure
 from mpmath import mp
 import numpy as np
 import pytest

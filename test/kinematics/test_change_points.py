@@ -12,8 +12,7 @@ from itertools import pairwise
 from math import copysign, cos, nextafter, pi, remainder, sin, tau
 import random
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Status
 from mpmath import mp, mpf
 import pytest
 

@@ -12,14 +12,17 @@ from cmath import rect
 from math import cos, pi, remainder, sin
 import random
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import (
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.kinematics import (
+    Closure,
+    Input,
     InputSweep,
+    Linkage,
     pose_alone,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+    Status,
     transmission_angles,
     usual_inputs,
 )

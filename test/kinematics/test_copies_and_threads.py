@@ -19,13 +19,9 @@ import sys
 from threading import Barrier, Thread
 
 import linkage_ros as lr
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.solvers.newton import NewtonClosure
-from linkage_ros.solvers.solver import Solver
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.description import parse_yaml, read_closure
+from linkage_ros.kinematics import Status, usual_inputs
+from linkage_ros.solvers import NewtonClosure, Solver, TableClosure
 import numpy as np
 import pytest
 

@@ -13,9 +13,7 @@ from __future__ import annotations
 from math import asin, sqrt
 from random import Random
 
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.kinematics.dyads.rrr import crank_diagonal
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics import crank_diagonal, LinkState, UNIT_ROUNDOFF
 from mpmath import mp, mpf
 import pytest
 

@@ -21,20 +21,20 @@ from math import cos, pi, radians, remainder, sin, sqrt, tau
 import random
 from typing import NamedTuple
 
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.drawn_pose import read_drawn_pose
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    Closure,
     Input,
     Linkage,
     Point,
+    read_drawn_pose,
     RevoluteJoint,
+    sides_at,
     Slider,
 )
-from linkage_ros.kinematics.sides import sides_at
-from linkage_ros.stages.effects.tolerance import alter, ToleranceParameters
+from linkage_ros.stages.effects import alter, ToleranceParameters
 import pytest
 
 from .linkages import four_bar_linkage

@@ -11,15 +11,10 @@
 import math
 from math import cos, hypot, ldexp, pi, remainder, sin, tau
 
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import scene_text_for
-from linkage_ros.description.yaml_file import parse_yaml
+from hypothesis import assume, given, settings, strategies as st
+from linkage_ros.description import parse_yaml, read_linkage, scene_text_for
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import Closure, InputSweep, Status
 import pytest
 
 from .linkages import four_bar_linkage, FourBar, inverted_slider_crank_linkage, InvertedSliderCrank

@@ -18,11 +18,8 @@ import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.topology import Dyad, Iterated
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.kinematics import Closure, Dyad, Iterated, Status
 import pytest
 
 from ..support.scenes import size_of

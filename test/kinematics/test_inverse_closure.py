@@ -21,11 +21,9 @@ import sys
 from campaigns.inverse import errors_of, passes_of, random_four_bars
 from flint import arb
 from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
-from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.crank_branches import _monotonic_pieces, CrankBranch
-from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.status import Status
-from linkage_ros.tools.study.enclosure import prove, SingularError
+from linkage_ros.kinematics import CODES, CrankBranch, InputRange, Status
+from linkage_ros.kinematics.crank_branches import _monotonic_pieces
+from linkage_ros.tools.study import prove, SingularError
 import numpy as np
 import pytest
 

@@ -16,15 +16,24 @@ from pathlib import Path
 import random
 from typing import Any
 
-from linkage_ros.kinematics import closure as closure_module
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import AssemblyPose, GROUND, Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.sides import sides_at
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.kinematics.topology import assur_groups, Driven, Iterated, Structure
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.kinematics import (
+    AssemblyPose,
+    assur_groups,
+    Closure,
+    closure as closure_module,
+    Driven,
+    GROUND,
+    Input,
+    InputSweep,
+    Iterated,
+    Linkage,
+    Position,
+    RevoluteJoint,
+    sides_at,
+    Status,
+    Structure,
+)
+from linkage_ros.solvers import TableClosure
 import numpy as np
 import pytest
 

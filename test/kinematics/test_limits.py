@@ -12,16 +12,10 @@ from dataclasses import replace
 from math import inf, nextafter, pi, remainder, tau
 import random
 
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.solvers.newton import NewtonClosure
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.kinematics import Closure, CODES, InputSweep, Limits, Status
+from linkage_ros.solvers import NewtonClosure, TableClosure
 import numpy as np
 import pytest
 

@@ -21,12 +21,9 @@ from math import copysign, inf, isfinite, nan
 import warnings
 
 import linkage_ros as lr
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.status import Status
-from linkage_ros.solvers.newton import NewtonClosure
-from linkage_ros.solvers.table import TableClosure
+from linkage_ros.description import parse_yaml, read_closure
+from linkage_ros.kinematics import CODES, Status
+from linkage_ros.solvers import NewtonClosure, TableClosure
 from mpmath import mp, mpf
 import numpy as np
 import pytest

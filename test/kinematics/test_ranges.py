@@ -14,19 +14,23 @@ from math import acos, cos, degrees, hypot, inf, pi, radians, remainder, sin, sq
 from pathlib import Path
 import random
 
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.grashof import four_bar_type, four_bars
-from linkage_ros.kinematics.linkage import AssemblyPose, Input, Limits, Linkage, RevoluteJoint
-from linkage_ros.kinematics.ranges import describe_ranges
-from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import (
+from hypothesis import assume, given, strategies as st
+from linkage_ros.kinematics import (
+    AssemblyPose,
+    Closure,
+    describe_ranges,
     find_extremes,
+    four_bar_type,
+    four_bars,
     grid_positions,
+    Input,
+    InputRange,
     InputSweep,
+    Limits,
+    Linkage,
+    RevoluteJoint,
     sample_inputs,
+    Status,
     transmission_angles,
     usual_inputs,
     worst_residual,

@@ -19,9 +19,11 @@ from typing import Any
 
 from linkage_ros import Closure, load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    check_turns,
     Input,
+    InputSweep,
     Limits,
     Linkage,
     Ratio,
@@ -29,7 +31,6 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.sweep_analysis import check_turns, InputSweep
 from mpmath import mp, mpf
 import numpy as np
 import pytest

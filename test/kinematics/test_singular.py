@@ -11,9 +11,7 @@
 from math import cos, inf, pi, remainder, tau
 import random
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Input, Linkage, RevoluteJoint, Status
 import numpy as np
 import pytest
 

@@ -20,17 +20,26 @@ from typing import Any
 import warnings
 
 from campaigns.topologies.families import FAMILIES
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import diagonals, dyads, newton_group, rail, step
-from linkage_ros.kinematics.batch import Batch, CODES
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled, CompiledAnswer
-from linkage_ros.kinematics.compiling.solve import BLOCK
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import (
+    Batch,
+    Closure,
+    CODES,
+    diagonals,
+    dyads,
+    Input,
+    Linkage,
+    newton_group,
+    Position,
+    rail,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+    Status,
+    step,
+)
+from linkage_ros.kinematics.compiling import BLOCK, Compiled, CompiledAnswer
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -14,9 +14,15 @@ Numbers in full are the exact results of the texts' own problems, to twenty digi
 
 from math import acos, atan2, cos, degrees, nextafter, pi, radians, sin
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import (
+    Closure,
+    Input,
+    Linkage,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+    Status,
+)
 from mpmath import mp, mpf
 import pytest
 

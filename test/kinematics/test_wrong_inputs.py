@@ -15,16 +15,16 @@ import re
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    Closure,
     Input,
     Linkage,
     RevoluteJoint,
     SlideJoint,
     Slider,
+    Status,
 )
-from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 

@@ -27,13 +27,12 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.description import load_scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.replay import recorded_scene, replay_ticks
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
 import pytest
 

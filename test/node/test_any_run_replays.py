@@ -20,12 +20,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import recorded_scene, replay_all
+from hypothesis import given, settings, strategies as st
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.replay import recorded_scene, replay_all
 import pytest
 
 from .conftest import LINKAGES

@@ -9,8 +9,8 @@
 """Floods of messages and storms of calls, from `campaigns.attacks.graph`, bounded in time."""
 
 from campaigns.attacks.graph import attack
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tick.sample_router import SampleRouter
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tick import SampleRouter
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import JointState

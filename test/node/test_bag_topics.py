@@ -10,8 +10,8 @@
 
 import re
 
-from linkage_ros.bag.topic import INFINITE
-from linkage_ros.node.bag_topics import bag_topic
+from linkage_ros.bag import INFINITE
+from linkage_ros.node import bag_topic
 from rclpy.duration import Duration
 from rclpy.qos import (
     LivelinessPolicy,

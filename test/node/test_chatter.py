@@ -8,14 +8,9 @@
 
 """Motor and crank behind play that meet too often: the node keeps ticking, and says so."""
 
-from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.node.diagnostics import (
-    chatter_count,
-    CountsSnapshot,
-    DiagnosticsSummary,
-    Warnings,
-)
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.messages import EffortCommand
+from linkage_ros.node import chatter_count, CountsSnapshot, DiagnosticsSummary, Warnings
+from linkage_ros.tick import TickLoop
 from sensor_msgs.msg import JointState
 
 from .graph import NS, stamp_of, wait_for

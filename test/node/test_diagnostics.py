@@ -8,11 +8,10 @@
 
 """What diagnostics say of a run, by a clock that a test sets, and without a graph."""
 
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.description import parse_scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.node import CountsSnapshot, DiagnosticsSummary
+from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
 from ..support.scenes import FOUR_BAR

@@ -14,8 +14,8 @@ import signal
 import subprocess
 import sys
 
-from linkage_ros.cli.echo import as_yaml, rate_text
-from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.cli import as_yaml, rate_text
+from linkage_ros.messages import JOINT_STATE_TYPE
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -170,7 +170,7 @@ def test_a_long_field_is_cut():
     shown = yaml.safe_load(as_yaml(String(data='x' * 5000), TEXT))
     assert len(shown['data']) <= 1000
     long = JointState(position=array('d', range(1000)))
-    shown = yaml.safe_load(as_yaml(long, JOINT_STATE))
+    shown = yaml.safe_load(as_yaml(long, JOINT_STATE_TYPE))
     assert shown['position'] == [*range(128), '… and 872 more']
 
 

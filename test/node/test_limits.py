@@ -11,12 +11,11 @@
 from collections import Counter
 from math import pi, tau
 
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary, Warnings
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.description import parse_scene
+from linkage_ros.kinematics import Status
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.node import CountsSnapshot, DiagnosticsSummary, Warnings
+from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 from rosbags.typesys import get_typestore, Stores
 

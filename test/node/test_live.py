@@ -25,11 +25,10 @@ from urllib.error import URLError
 from urllib.request import urlopen
 
 from linkage_ros import load
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import read_bag
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.shapes import frames_of_links
-from linkage_ros.tools.view.live import add_live, live_page
-from linkage_ros.tools.view.live_bridge import LiveBridge
+from linkage_ros.kinematics import frames_of_links
+from linkage_ros.tools.view import add_live, live_page, LiveBridge
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState

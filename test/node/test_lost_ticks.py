@@ -11,10 +11,9 @@
 from threading import Event
 from types import SimpleNamespace
 
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node import diagnostics, pacing
-from linkage_ros.node.diagnostics import Warnings
-from linkage_ros.tick.tick_loop import Counts, Stall
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.node import diagnostics, pacing, Warnings
+from linkage_ros.tick import Counts, Stall
 import pytest
 
 MS = 10**6

@@ -13,8 +13,8 @@ from math import cos, sin
 from pathlib import Path
 import re
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
+from linkage_ros.bag import read_bag
+from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState

@@ -15,12 +15,10 @@ import re
 import subprocess
 import sys
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 import linkage_ros
 from linkage_ros.errors import LinkageError
-from linkage_ros.replay import topic_description
-from linkage_ros.replay.topic_description import message_type
+from linkage_ros.replay import message_type, topic_description
 import pytest
 from sensor_msgs.msg import JointState
 

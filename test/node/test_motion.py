@@ -18,8 +18,8 @@ import time
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
+from linkage_ros.bag import read_bag
+from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState

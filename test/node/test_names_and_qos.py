@@ -11,7 +11,7 @@
 from cmath import rect
 import json
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag import read_bag
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger

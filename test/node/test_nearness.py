@@ -10,9 +10,9 @@
 
 from types import SimpleNamespace
 
-from linkage_ros.kinematics.linkage import Input
-from linkage_ros.node.diagnostics import CountsSnapshot, DiagnosticsSummary
-from linkage_ros.tick.tick_loop import Counts
+from linkage_ros.kinematics import Input
+from linkage_ros.node import CountsSnapshot, DiagnosticsSummary
+from linkage_ros.tick import Counts
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters

@@ -18,10 +18,8 @@ import subprocess
 import sys
 import time
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.topic import QosProfile
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.node.bag_topics import bag_topic, offered_qos
+from linkage_ros.bag import BagWriter, QosProfile, read_bag
+from linkage_ros.node import bag_topic, offered_qos
 from mcap.writer import Writer
 import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy

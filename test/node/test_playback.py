@@ -10,10 +10,9 @@
 
 from threading import Event
 
-from linkage_ros.bag.order import LogTimeOrder
-from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag import BagMessage, LogTimeOrder
 from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.node.playback import (
+from linkage_ros.node import (
     ClockTicks,
     LATE,
     Playback,

@@ -19,7 +19,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
-from linkage_ros.node.node import LinkageNode
+from linkage_ros.node import LinkageNode
 from linkage_ros.processes import held_domain
 import pytest
 import rclpy

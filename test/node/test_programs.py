@@ -12,10 +12,9 @@ import re
 import subprocess
 import sys
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.description.scene_file import SCENE_FILE
-from linkage_ros.node.demo_nodes import CrankSource, PDController
-from linkage_ros.node.parameters import LINKAGE_NODE
+from linkage_ros.bag import read_bag
+from linkage_ros.description import SCENE_FILE
+from linkage_ros.node import CrankSource, LINKAGE_NODE, PDController
 import pytest
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python

@@ -11,8 +11,8 @@
 from math import nan
 
 from linkage_ros import DefinitionError, load
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.node.relay import CommandRelay, PARAMETERS, RefusedError
+from linkage_ros.description import load_scene
+from linkage_ros.node import CommandRelay, PARAMETERS, RefusedError
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint

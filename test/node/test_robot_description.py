@@ -14,9 +14,8 @@ What robot_state_publisher does with both is done by yourdfpy here.
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.verify import IDENTICAL, verify_replay
+from linkage_ros.bag import read_bag
+from linkage_ros.replay import IDENTICAL, recorded_scene, verify_replay
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader

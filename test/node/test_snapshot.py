@@ -20,10 +20,9 @@ from types import SimpleNamespace
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.node.bag_topics import bag_topic
-from linkage_ros.node.run_recording import RunRecording
+from linkage_ros.bag import BagWriter
+from linkage_ros.description import load_scene
+from linkage_ros.node import bag_topic, RunRecording
 import pytest
 from rclpy.qos import QoSProfile
 from rosbags.highlevel import AnyReader

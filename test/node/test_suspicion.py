@@ -8,10 +8,10 @@
 
 """A crank that jumps by more than a turn is suspected to be in degrees, once."""
 
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import CrankSample
-from linkage_ros.node.diagnostics import Warnings
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import load_scene
+from linkage_ros.messages import CrankSample
+from linkage_ros.node import Warnings
+from linkage_ros.tick import Pipeline
 import pytest
 
 SECOND = 10**9

@@ -16,12 +16,10 @@ from functools import partial
 from itertools import count
 from time import time_ns
 
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.replay.replay import own_joint_states
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.description import parse_scene
+from linkage_ros.messages import JointStateWriter, NANOSECONDS, Rejection
+from linkage_ros.replay import own_joint_states
+from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
 MS = 1_000_000

@@ -23,8 +23,8 @@ import sys
 import time
 
 from builtin_interfaces.msg import Time
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay.replay import recorded_scene, replay_ticks
+from linkage_ros.bag import read_bag
+from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState

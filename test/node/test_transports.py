@@ -20,7 +20,7 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.node.real_time import leave_out_shared_memory, stay_on_this_machine
+from linkage_ros.node import leave_out_shared_memory, stay_on_this_machine
 from linkage_ros.resources import shipped_path
 import pytest
 from sensor_msgs.msg import JointState

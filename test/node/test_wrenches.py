@@ -16,9 +16,9 @@ from dataclasses import replace
 from math import nan
 
 from geometry_msgs.msg import WrenchStamped
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.replay.replay import recorded_scene, replay_all, replay_ticks
+from linkage_ros.bag import read_bag
+from linkage_ros.messages import JointStateWriter, Rejection
+from linkage_ros.replay import recorded_scene, replay_all, replay_ticks
 import pytest
 from sensor_msgs.msg import JointState
 

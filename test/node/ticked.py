@@ -14,15 +14,11 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.single_values import text_message
-from linkage_ros.replay.replay import change_text
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
+from linkage_ros.bag import Bag, BagWriter, read_bag, Recorder, Topic
+from linkage_ros.description import load_scene
+from linkage_ros.messages import text_message
+from linkage_ros.replay import change_text
+from linkage_ros.tick import Pipeline, TickLoop
 
 
 class Moment(NamedTuple):

@@ -11,9 +11,11 @@
 import ast
 from collections import defaultdict
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 import sys
 
 from linkage_ros import workbench
+from linkage_ros.faces import home_modules
 import pytest
 
 PACKAGE = 'linkage_ros'
@@ -23,6 +25,7 @@ PACKAGE = 'linkage_ros'
 HEIGHTS = (
     (
         'errors',
+        'faces',
         'names',
         'signals',
         'generated_code',
@@ -87,6 +90,24 @@ NAMING_TOOLS = ('linkage_ros.workbench', 'linkage_ros.__init__')
 LOCAL_IMPORTS = ('tick', 'cli')
 MARK = '# local import: '
 
+# Faces: what each folder shows to the others, by the stub beside its __init__.py.
+ROOT = Path(__file__).parents[2]
+FACES = {
+    '.'.join(stub.parent.relative_to(ROOT).parts): home_modules(stub.read_text('utf-8'))
+    for stub in (ROOT / PACKAGE).rglob('__init__.pyi')
+}
+
+# Files that others import by their path: the entry point, and plug-ins, which are alike.
+BY_PATH = ('linkage_ros.cli.main', 'linkage_ros.stages.drives.')
+# Tests of what lies within, by their file.
+WITHIN = {
+    'linkage_ros.kinematics.crank_branches',
+    'linkage_ros.tools.design.motion',
+    'linkage_ros.tools.design.pairs.freudenstein',
+    'linkage_ros.tools.models.fmu.stepped_scene',
+    'linkage_ros.tools.view.report.diagnostics_summary',
+}
+
 
 def _imported(module, node):
     """Yield the dotted names that an import statement of a module names, made absolute."""
@@ -97,8 +118,13 @@ def _imported(module, node):
     if node.level:
         parents = module.split('.')[: -node.level]
         base = '.'.join([*parents, base] if base else parents)
-    # `from linkage_ros import errors` imports the module errors, not the package.
-    yield from (f'{base}.{alias.name}' if base == PACKAGE else base for alias in node.names)
+    # `from linkage_ros import errors` imports the module errors, not the package; the face of a
+    # folder imports the module of each name.
+    for alias in node.names:
+        if base == PACKAGE:
+            yield f'{base}.{alias.name}'
+        else:
+            yield FACES.get(base, {}).get(alias.name, base)
 
 
 def _imports(root):
@@ -158,7 +184,8 @@ def imports(root):
 
 @pytest.fixture(scope='module')
 def our_imports(imports):
-    return [found for found in imports if found[1].split('.')[0] == PACKAGE]
+    faces = f'{PACKAGE}.faces'  # what every folder starts with
+    return [found for found in imports if found[1].split('.')[0] == PACKAGE and found[1] != faces]
 
 
 def test_every_package_has_its_height(root):
@@ -177,6 +204,46 @@ def test_imports_point_down(our_imports):
         if HEIGHT.get(_package(name), -1) > HEIGHT.get(_package(module), -1)
     ]
     assert not up
+
+
+def _face_beyond(module, importer):
+    """Return the face that a module lies behind, for an importer outside of its folder."""
+    if module in FACES:
+        return ''
+    parts = module.split('.')
+    for end in range(len(parts) - 1, 1, -1):
+        face = '.'.join(parts[:end])
+        if face in FACES and not f'{importer}.'.startswith(f'{face}.'):
+            return face
+    return ''
+
+
+def test_other_folders_and_tests_import_from_faces():
+    beyond = defaultdict(list)
+    for folder in (PACKAGE, 'test'):
+        for path in sorted((ROOT / folder).rglob('*.py')):
+            file = path.relative_to(ROOT)
+            importer = '.'.join(file.with_suffix('').parts)
+            for node in ast.walk(ast.parse(path.read_text('utf-8'))):
+                if not isinstance(node, ast.ImportFrom) or node.level:
+                    continue
+                face = _face_beyond(node.module, importer)
+                if face and not node.module.startswith(BY_PATH):
+                    beyond[node.module].append(str(file))
+    assert {module: files for module, files in beyond.items() if module not in WITHIN} == {}
+    assert all(len(beyond[module]) == 1 for module in WITHIN)
+
+
+def test_a_face_lists_what_others_import(root):
+    """No name stands in a face for nobody."""
+    used = defaultdict(set)
+    for folder in (PACKAGE, 'test', 'campaigns', 'bench', 'docs', 'examples'):
+        for path in (root / folder).rglob('*.py'):
+            for node in ast.walk(ast.parse(path.read_text('utf-8'))):
+                if isinstance(node, ast.ImportFrom) and node.module in FACES:
+                    used[node.module] |= {alias.name for alias in node.names}
+    public = {face: {*names} for face, names in FACES.items() if face != PACKAGE}
+    assert {face: names - used[face] for face, names in public.items() if names - used[face]} == {}
 
 
 def test_no_imports_run_in_a_circle(our_imports):

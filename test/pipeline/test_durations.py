@@ -8,9 +8,8 @@
 
 """The histogram of how late ticks were: its percentiles against those of the durations."""
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.tick.tick_loop import DurationHistogram
+from hypothesis import given, strategies as st
+from linkage_ros.tick import DurationHistogram
 import numpy as np
 import pytest
 

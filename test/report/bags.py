@@ -15,11 +15,9 @@ from math import acos, cos, nan, pi, sin
 from pathlib import Path
 from struct import unpack_from
 
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.single_values import time_message
+from linkage_ros.bag import BagWriter, RUN_FILE
+from linkage_ros.description import load_scene
+from linkage_ros.messages import JointStateWriter, time_message
 from linkage_ros.resources import shipped_path
 from mcap.reader import make_reader
 import numpy as np

@@ -12,13 +12,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, BagMessage, read_bag
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tools.view.report.blocks import Progress
-from linkage_ros.tools.view.report.data import event_tracks
-from linkage_ros.tools.view.report.reading import read_run
-from linkage_ros.tools.view.report.run import ReportedRun, Window
+from linkage_ros.bag import Bag, BagMessage, BagWriter, read_bag
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tools.view.report import event_tracks, Progress, read_run, ReportedRun, Window
 import numpy as np
 
 from ..node.ticked import Moment, run

@@ -12,19 +12,20 @@ from fractions import Fraction
 from itertools import pairwise
 import json
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.tools.view.report.blocks import RunClock, times_of
-from linkage_ros.tools.view.report.curves import Lateness
-from linkage_ros.tools.view.report.decimation import (
+from hypothesis import given, strategies as st
+from linkage_ros.tools.view.report import (
     DecimatedCurves,
     Decimation,
+    EventTrack,
     Histogram,
     interval_capacity,
+    Lateness,
     most_columns,
+    RunClock,
+    Silences,
+    size_in_json,
+    times_of,
 )
-from linkage_ros.tools.view.report.labels import size_in_json
-from linkage_ros.tools.view.report.run import EventTrack, Silences
 import numpy as np
 import pytest
 

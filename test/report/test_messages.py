@@ -12,15 +12,16 @@ from itertools import groupby, pairwise
 from operator import itemgetter
 from types import SimpleNamespace
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.bag.contents import contents_of
-from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.topic import Topic
-from linkage_ros.tools.view.report import blocks as blocks_module
-from linkage_ros.tools.view.report.blocks import Blocks, Progress
-from linkage_ros.tools.view.report.diagnostics_summary import read_statuses
-from linkage_ros.tools.view.report.joint_states import JointStates, MOST_JOINTS
+from hypothesis import given, strategies as st
+from linkage_ros.bag import BagMessage, contents_of, read_bag, Topic
+from linkage_ros.tools.view.report import (
+    Blocks,
+    blocks as blocks_module,
+    JointStates,
+    MOST_JOINTS,
+    Progress,
+    read_statuses,
+)
 import numpy as np
 import pytest
 

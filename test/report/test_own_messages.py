@@ -12,10 +12,9 @@ import json
 from math import inf, nan
 from pathlib import Path
 
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tools.view.report.data import page_data
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tools.view.report import page_data, ReportHeader, run_html
 from linkage_ros.tools.view.report.diagnostics_summary import _COUNTED
-from linkage_ros.tools.view.report.html import ReportHeader, run_html
 import numpy as np
 import pytest
 

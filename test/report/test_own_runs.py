@@ -10,14 +10,9 @@
 
 from math import acos, cos, sqrt
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tools.view.report.blocks import Progress
-from linkage_ros.tools.view.report.html import ReportHeader, run_html
-from linkage_ros.tools.view.report.reading import read_run
-from linkage_ros.tools.view.report.run import Window
+from linkage_ros.bag import BagWriter, read_bag, Topic
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tools.view.report import Progress, read_run, ReportHeader, run_html, Window
 import numpy as np
 import pytest
 

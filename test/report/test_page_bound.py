@@ -13,52 +13,48 @@ import json
 from pathlib import Path
 from threading import Event
 
-from hypothesis import given
-from hypothesis import strategies as st
-from linkage_ros.bag.contents import Contents
-from linkage_ros.bag.reader import BagMessage, read_bag
-from linkage_ros.bag.run_events import read_run_metadata
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
+from hypothesis import given, strategies as st
+from linkage_ros.bag import BagMessage, BagWriter, Contents, read_bag, read_run_metadata, Topic
+from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import recorded_scene
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.replay import recorded_scene
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view.pages.document import plotting_library
-from linkage_ros.tools.view.report.blocks import Blocks, Progress
-from linkage_ros.tools.view.report.curves import BoundedCurves, MOST_LINKAGES
-from linkage_ros.tools.view.report.data import page_data
-from linkage_ros.tools.view.report.decimation import (  # fmt: skip
+from linkage_ros.tools.view import bag_page
+from linkage_ros.tools.view.pages import plotting_library
+from linkage_ros.tools.view.report import (
+    Blocks,
+    BoundedCurves,
+    CurveColumn,
     DURATION_BYTES,
+    EVENT_TRACKS,
+    EventTrack,
     FORCE_BYTES,
     FRAME_BYTES,
+    Frames,
     Histogram,
+    JointStates,
+    LinkageRun,
     MOST_FRAMES,
+    MOST_LINKAGES,
+    MOST_SPANS,
+    MOST_TEXT,
     PAGE_BYTES,
+    page_data,
+    Progress,
+    read_statuses,
+    ReportedRun,
+    ReportHeader,
+    run_html,
     SAMPLE_BYTES,
+    SceneRun,
     SHAPE_BYTES,
     STATE_BYTES,
     TABLE_BYTES,
-)
-from linkage_ros.tools.view.report.diagnostics_summary import read_statuses
-from linkage_ros.tools.view.report.html import ReportHeader, run_html, TableOf
-from linkage_ros.tools.view.report.joint_states import JointStates
-from linkage_ros.tools.view.report.labels import EVENT_TRACKS
-from linkage_ros.tools.view.report.reading import SceneRun
-from linkage_ros.tools.view.report.run import (
-    CurveColumn,
-    EventTrack,
-    Frames,
-    LinkageRun,
-    MOST_SPANS,
-    MOST_TEXT,
-    ReportedRun,
+    TableOf,
     Window,
 )
-from linkage_ros.tools.view.report_command import bag_page
 import numpy as np
 import pytest
 

@@ -14,8 +14,8 @@ import random
 import re
 from threading import Event
 
-from linkage_ros.tools.view.report.run import Window
-from linkage_ros.tools.view.report_command import bag_page
+from linkage_ros.tools.view import bag_page
+from linkage_ros.tools.view.report import Window
 import numpy as np
 import pytest
 

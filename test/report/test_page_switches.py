@@ -11,7 +11,7 @@
 from itertools import combinations, pairwise
 from math import pi
 
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages import JointStateWriter
 import numpy as np
 import pytest
 

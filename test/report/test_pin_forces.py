@@ -8,13 +8,18 @@
 
 """Forces in pins that were recorded are plotted, and what is zero throughout is not."""
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.messages.joint_values import MessageValues, PlanarWrenchWriter, WRENCHES
+from linkage_ros.bag import read_bag
+from linkage_ros.messages import MessageValues, PlanarWrenchWriter, WRENCHES
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view.report.curves import LATER_PINS, PinForces
-from linkage_ros.tools.view.report.data import time_plots, zero_plots
-from linkage_ros.tools.view.report.html import ReportHeader, run_html
-from linkage_ros.tools.view.report.run import Window
+from linkage_ros.tools.view.report import (
+    LATER_PINS,
+    PinForces,
+    ReportHeader,
+    run_html,
+    time_plots,
+    Window,
+    zero_plots,
+)
 import numpy as np
 import pytest
 

@@ -13,19 +13,24 @@ from cmath import exp, rect
 from dataclasses import replace
 import json
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import carried_shapes, Circle, draw_shapes, frames_of_links
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.bag import read_bag
+from linkage_ros.description import load_scene, read_linkage, read_yaml
+from linkage_ros.kinematics import (
+    carried_shapes,
+    Circle,
+    Closure,
+    draw_shapes,
+    frames_of_links,
+    InputSweep,
+    prepare_view,
+    sample_inputs,
+    usual_inputs,
+)
+from linkage_ros.messages import JointStateWriter
 from linkage_ros.resources import shipped_path
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tools.drawing.drawing_data import drawn_in_frames
-from linkage_ros.tools.view.report.data import link_poses, page_data
+from linkage_ros.tick import Pipeline
+from linkage_ros.tools.drawing import drawn_in_frames
+from linkage_ros.tools.view.report import link_poses, page_data
 import numpy as np
 import pytest
 

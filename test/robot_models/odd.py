@@ -8,9 +8,8 @@
 
 """Linkages whose published joints take every way there is from one frame of a tree to the next."""
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.description import parse_yaml, read_linkage
+from linkage_ros.kinematics import Closure
 
 FOUR_BAR = """
 links:

@@ -16,13 +16,9 @@ launch file comes to through ``yaml.safe_load`` (launch_ros, evaluate_parameters
 import re
 from xml.etree import ElementTree as ET
 
-from hypothesis import assume, example, given
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, strategies as st
 from linkage_ros.errors import FileError
-from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart, PartError
-from linkage_ros.tools.models.robot_model_command import model_of
-from linkage_ros.tools.models.urdf import urdf_model
+from linkage_ros.tools.models import model_of, ModelPart, mujoco_model, PartError, urdf_model
 import pytest
 import yaml
 

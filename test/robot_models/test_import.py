@@ -12,15 +12,10 @@ from cmath import phase, rect
 from math import cos, hypot, remainder, sin, tau
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import linkage_text, parse_yaml, read_linkage
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
-from linkage_ros.tools.models.from_urdf import linkage_from_urdf
-from linkage_ros.tools.models.planar import find_pinned
-from linkage_ros.tools.models.urdf_file import read_urdf
+from linkage_ros.kinematics import Closure, Limits, RevoluteJoint
+from linkage_ros.tools.models import find_pinned, linkage_from_urdf, read_urdf
 import numpy as np
 import pytest
 

@@ -11,17 +11,17 @@
 from dataclasses import replace
 from xml.etree import ElementTree as ET
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import load
+from hypothesis import given, settings, strategies as st
+from linkage_ros.description import load
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.tools.models.from_urdf import linkage_from_urdf
-from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.urdf import urdf_model
-from linkage_ros.tools.models.urdf_file import read_urdf
+from linkage_ros.kinematics import Closure, Limits
+from linkage_ros.tools.models import (
+    linkage_from_urdf,
+    ModelPart,
+    mujoco_model,
+    read_urdf,
+    urdf_model,
+)
 import mujoco
 import pytest
 

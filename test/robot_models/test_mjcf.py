@@ -16,14 +16,11 @@ linkage's size that is measured here, and not to rounding.
 
 from cmath import rect
 
-from linkage_ros.description.linkage_file import load
-from linkage_ros.dynamics.loads import Loads, Spring
-from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.description import load
+from linkage_ros.dynamics import Loads, Mechanics, Spring
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.robot_model_command import model_of
+from linkage_ros.kinematics import usual_inputs
+from linkage_ros.tools.models import model_of, ModelPart, mujoco_model
 import numpy as np
 import pytest
 

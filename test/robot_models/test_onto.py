@@ -13,12 +13,8 @@ import io
 
 from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.tools.models.from_urdf import linkage_from_urdf
-from linkage_ros.tools.models.onto import urdf_onto
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.urdf_file import read_urdf
+from linkage_ros.kinematics import Closure, RevoluteJoint
+from linkage_ros.tools.models import linkage_from_urdf, ModelPart, read_urdf, urdf_onto
 import numpy as np
 import pytest
 import yourdfpy

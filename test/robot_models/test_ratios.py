@@ -12,14 +12,15 @@ from math import hypot, remainder, tau
 from random import Random
 
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Ratio
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
-from linkage_ros.tools.models.from_urdf import ImportedLinkage, linkage_from_urdf
-from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.urdf import urdf_model
-from linkage_ros.tools.models.urdf_file import read_urdf
+from linkage_ros.kinematics import Closure, InputSweep, Ratio, sample_inputs
+from linkage_ros.tools.models import (
+    ImportedLinkage,
+    linkage_from_urdf,
+    ModelPart,
+    mujoco_model,
+    read_urdf,
+    urdf_model,
+)
 import numpy as np
 import pytest
 

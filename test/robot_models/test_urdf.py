@@ -12,20 +12,20 @@ from collections import Counter
 from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description.linkage_file import load
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import linkage_text, load, load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tools.models.from_urdf import linkage_from_urdf
-from linkage_ros.tools.models.part import ModelPart, PartError
-from linkage_ros.tools.models.robot_model_command import model_of
-from linkage_ros.tools.models.scene_model import make_scene_model
-from linkage_ros.tools.models.urdf import urdf_model
-from linkage_ros.tools.models.urdf_file import read_urdf
+from linkage_ros.kinematics import Closure, InputSweep, sample_inputs, usual_inputs
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tick import Pipeline
+from linkage_ros.tools.models import (
+    linkage_from_urdf,
+    make_scene_model,
+    model_of,
+    ModelPart,
+    PartError,
+    read_urdf,
+    urdf_model,
+)
 import pytest
 
 from .odd import closure_of, ODD, UNTOLD

@@ -16,9 +16,7 @@ links compared with the closure: turned by the link's angle, with their origin o
 from cmath import rect
 from math import cos, sin
 
-from linkage_ros.tools.models.part import ModelPart, prefix_names
-from linkage_ros.tools.models.tree import grow_tree
-from linkage_ros.tools.models.urdf import add_frames, urdf_model
+from linkage_ros.tools.models import add_frames, grow_tree, ModelPart, prefix_names, urdf_model
 import numpy as np
 import pytest
 

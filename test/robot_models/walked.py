@@ -10,9 +10,9 @@
 
 import io
 
-from linkage_ros.description.scene_file import load_scene, parse_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import load_scene, parse_scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tick import Pipeline
 import yourdfpy
 
 from ..support.messages import read_joint_state
@@ -70,9 +70,7 @@ def moving(file):
 
 def moving_text(text):
     """Return the pipeline of a linkage that is the text of a file, driven as a file alone is."""
-    from linkage_ros.description.linkage_file import read_closure
-    from linkage_ros.description.linkage_writer import scene_text_for
-    from linkage_ros.description.yaml_file import parse_yaml
+    from linkage_ros.description import parse_yaml, read_closure, scene_text_for
 
     scene = scene_text_for(read_closure(parse_yaml(text.encode(), 'it')), 'linkage.yaml')
     files = {'scene.yaml': scene.encode(), 'linkage.yaml': text.encode()}

@@ -11,9 +11,9 @@
 from pathlib import Path
 import re
 
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import FileError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import pytest
 
 CONFIG = Path(__file__).parents[2] / 'config'

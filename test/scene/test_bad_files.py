@@ -10,7 +10,7 @@
 
 import re
 
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import FileError
 import pytest
 

@@ -13,16 +13,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, HealthCheck, settings
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.scene_file import load_scene, parse_scene
-from linkage_ros.description.section import Section
-from linkage_ros.description.yaml_file import read_yaml
+from hypothesis import given, HealthCheck, settings, strategies as st
+from linkage_ros.description import load_scene, parse_scene, read_linkage, read_yaml, Section
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.tick import Pipeline
 import pytest
 import yaml
 

@@ -13,20 +13,16 @@ from math import inf
 import os
 import resource
 
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import linkage_text, number_text, write_linkage
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.linkage import (
-    AssemblyPose,
-    Limits,
-    Linkage,
-    Mass,
-    RevoluteJoint,
-    SlideJoint,
+from hypothesis import example, given, settings, strategies as st
+from linkage_ros.description import (
+    linkage_text,
+    number_text,
+    parse_yaml,
+    read_linkage,
+    write_linkage,
 )
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics import AssemblyPose, Limits, Linkage, Mass, RevoluteJoint, SlideJoint
 import pytest
 import yaml
 

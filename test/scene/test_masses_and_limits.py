@@ -10,11 +10,9 @@
 
 from math import inf
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import linkage_text, parse_yaml, read_linkage
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.linkage import Limits, Mass
+from linkage_ros.kinematics import Limits, Mass
 import pytest
 
 from .conftest import CONFIG, is_one_line

@@ -8,13 +8,9 @@
 
 """Errors that a newcomer meets: the whole line, with what to write instead."""
 
-from linkage_ros.description.linkage_file import load
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.description.schema import scene_schema
-from linkage_ros.description.violations import find_violations
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.description import find_violations, load, load_scene, read_yaml, scene_schema
 from linkage_ros.errors import FileError
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import pytest
 
 LINKAGE = """

@@ -9,8 +9,7 @@
 """Values that look like those of another unit get a note, and nothing is refused."""
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.notes import scene_notes
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene, scene_notes
 import pytest
 
 from .conftest import CONFIG

@@ -10,16 +10,13 @@
 
 from math import acos, hypot, pi, tau
 
-from linkage_ros.description.scene import RecordParameters, StorageParameters
-from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description import load_scene, parse_scene, RecordParameters, StorageParameters
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.drives.constant_rate import ConstantRateParameters
-from linkage_ros.stages.drives.topic import TopicParameters
-from linkage_ros.stages.effects.velocity import VelocityParameters
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.kinematics import RevoluteJoint, SlideJoint, Status
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.drives import ConstantRateParameters, TopicParameters
+from linkage_ros.stages.effects import VelocityParameters
+from linkage_ros.tick import Pipeline
 import pytest
 
 from .conftest import CONFIG, FOUR_BAR, is_one_line, SCENE

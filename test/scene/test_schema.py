@@ -18,10 +18,9 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from hypothesis import given, HealthCheck, settings
-from hypothesis import strategies as st
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.parameters import (
+from hypothesis import given, HealthCheck, settings, strategies as st
+from linkage_ros.description import (
+    as_text,
     choice,
     ChoiceOf,
     declared_fields,
@@ -31,7 +30,10 @@ from linkage_ros.description.parameters import (
     file,
     Flag,
     flag,
+    import_jsonschema,
     KINDS,
+    linkage_schema,
+    load_scene,
     Name,
     NamesOf,
     Number,
@@ -40,27 +42,28 @@ from linkage_ros.description.parameters import (
     number_rows,
     NumberList,
     parameter_section,
+    parameter_types,
     ParameterGroup,
     parameters_schema,
+    parse_scene,
+    parse_yaml,
     part_name,
     part_names,
     Point,
     point,
+    read_linkage,
     read_parameters,
     RowsOf,
+    scene_schema,
+    Section,
     text,
     TextOf,
+    Units,
     whole_number,
 )
-from linkage_ros.description.scene_file import load_scene, parse_scene
-from linkage_ros.description.schema import as_text, linkage_schema, parameter_types, scene_schema
-from linkage_ros.description.section import Section
-from linkage_ros.description.units import Units
-from linkage_ros.description.violations import import_jsonschema
-from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import EFFECTS
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
 import pytest
 import yaml

@@ -8,7 +8,7 @@
 
 """Keys with dots in their names, as those of points, set beside a scene's file."""
 
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import FileError
 import pytest
 

@@ -11,15 +11,12 @@
 from fractions import Fraction
 from math import pi
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.cli.main import main
-from linkage_ros.description.linkage_file import load
-from linkage_ros.description.scene_file import load_scene, parse_scene
-from linkage_ros.description.units import LENGTHS, Units
+from linkage_ros.description import LENGTHS, load, load_scene, parse_scene, Units
 from linkage_ros.errors import FileError
-from linkage_ros.stages.drives.clocked import LARGEST
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.stages.drives import LARGEST
+from linkage_ros.tick import Pipeline
 import pytest
 
 IN_SI = """

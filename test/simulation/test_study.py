@@ -12,11 +12,11 @@ import csv
 from pathlib import Path
 
 from linkage_ros.cli.main import main
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import JointStateReader
-from linkage_ros.replay.simulate import BEGIN
-from linkage_ros.replay.study import (
+from linkage_ros.messages import JointStateReader
+from linkage_ros.replay import (
+    BEGIN,
     instants_of,
     ParameterSweep,
     run_one,
@@ -24,7 +24,7 @@ from linkage_ros.replay.study import (
     Study,
     sweep_of,
 )
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick import Pipeline
 import numpy as np
 import pytest
 from scipy.stats import kstest

@@ -12,8 +12,7 @@ from math import remainder, tau
 from pathlib import Path
 
 from hypothesis import strategies as st
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Closure, Linkage
 from mpmath import mp, mpf
 
 from ..kinematics.linkages import four_bar_linkage

@@ -12,12 +12,9 @@ from itertools import pairwise
 from math import log10, pi, tau
 import random
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
-from linkage_ros.solvers.loops import LoopFinder
-from linkage_ros.solvers.newton import NewtonClosure, NewtonDyad
+from hypothesis import given, settings, strategies as st
+from linkage_ros.kinematics import Closure, Status
+from linkage_ros.solvers import LoopFinder, NewtonClosure, NewtonDyad
 import pytest
 
 from .linkages import (

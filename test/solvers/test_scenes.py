@@ -11,22 +11,27 @@
 from math import tau
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.run_events import CHOSEN, read_run_metadata
-from linkage_ros.description.scene_file import load_scene, parse_scene
-from linkage_ros.description.schema import scene_schema
-from linkage_ros.description.violations import find_violations
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.bag import CHOSEN, read_bag, read_run_metadata
+from linkage_ros.description import (
+    find_violations,
+    load_scene,
+    parse_scene,
+    parse_yaml,
+    scene_schema,
+)
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.replay.replay import replay_ticks
-from linkage_ros.solvers import choose as choosing
-from linkage_ros.solvers.choose import choose_solver, only_closed_form
-from linkage_ros.solvers.newton import NewtonClosure
-from linkage_ros.solvers.solver import Solver
-from linkage_ros.solvers.table import TableClosure
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.replay import replay_ticks
+from linkage_ros.solvers import (
+    choose as choosing,
+    choose_solver,
+    NewtonClosure,
+    only_closed_form,
+    Solver,
+    TableClosure,
+)
+from linkage_ros.tick import Pipeline
 import pytest
 
 from .linkages import apart, CRANK_ROCKER, crank_rocker, worst_error

@@ -11,19 +11,18 @@
 from math import acos, degrees, log2, tau
 import random
 
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.solvers.loops import LoopFinder
-from linkage_ros.solvers.table import TableClosure
-from linkage_ros.solvers.validated_enclosure import (
+from linkage_ros.kinematics import Closure
+from linkage_ros.solvers import (
     Cells,
     Disc,
     enclose_coordinates,
     jet_product,
+    LoopFinder,
     multiply_discs,
     sum_discs,
+    TableClosure,
     unit_vector,
 )
 from mpmath import mp, mpc, mpf

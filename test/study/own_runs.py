@@ -17,9 +17,8 @@ integrated by LSODA. A crank of constant inertia moves in parabolas, whose meeti
 from cmath import phase, rect
 from math import acos, copysign, inf, sin, sqrt
 
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, POSITION, RATE
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JOINT_STATE_TYPE, JointStateWriter, MessageValues, POSITION, RATE
+from linkage_ros.tick import Pipeline
 from scipy.integrate import solve_ivp
 
 BEGIN = 10**9
@@ -28,7 +27,7 @@ BEGIN = 10**9
 def run_scene(scene, ticks, messages=()):
     """Yield time, positions and rates by joint, of each tick, in [ns] since the first one."""
     pipeline = Pipeline(scene)
-    reader = MessageValues(JOINT_STATE, scene.dependent_joints)
+    reader = MessageValues(JOINT_STATE_TYPE, scene.dependent_joints)
     waiting = list(messages)
     for index in range(ticks):
         now = round(index * 1e9 / scene.rate)

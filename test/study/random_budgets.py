@@ -15,8 +15,7 @@ from math import inf
 import os
 from random import Random
 
-from linkage_ros.tools.study.budget import Budget, JointError, Knob, Price, RecordingLoss, Setting
-from linkage_ros.tools.study.measuring import Spread
+from linkage_ros.tools.study import Budget, JointError, Knob, Price, RecordingLoss, Setting, Spread
 
 COUNT = int(os.environ.get('LINKAGE_STATES', '300'))
 

@@ -10,8 +10,7 @@
 
 from __future__ import annotations
 
-from linkage_ros.tools.study.budget import Budget, JointError, Knob, Price, RecordingLoss, Setting
-from linkage_ros.tools.study.measuring import Spread
+from linkage_ros.tools.study import Budget, JointError, Knob, Price, RecordingLoss, Setting, Spread
 
 
 def price(middle: float, half: float = 0.1, rate: float = 1000.0) -> Price:

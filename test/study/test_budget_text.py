@@ -15,8 +15,8 @@ from math import inf, isclose
 from random import Random
 import re
 
-from linkage_ros.tools.study.budget import Budget, JointError, Price, Setting
-from linkage_ros.tools.study.budget_text import (
+from linkage_ros.tools.study import (
+    Budget,
     budget_json,
     change_text,
     closing_lines,
@@ -24,16 +24,19 @@ from linkage_ros.tools.study.budget_text import (
     error_knobs,
     error_text,
     heads_of,
+    JointError,
     lead_lines,
     neighbours_of,
     NOISE,
+    Price,
     price_text,
     rows_of,
+    Setting,
     share_text,
+    Spread,
     time_text,
     total_error,
 )
-from linkage_ros.tools.study.measuring import Spread
 import pytest
 
 from .random_budgets import random_budgets

@@ -13,11 +13,14 @@ from math import remainder, tau
 import os
 import random
 
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.tools.study.age import errors_in_use, measure_age_of_command
-from linkage_ros.tools.study.drive_step import measure_drive_step
-from linkage_ros.tools.study.scene_motion import motions_of
+from linkage_ros.description import load_scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.tools.study import (
+    errors_in_use,
+    measure_age_of_command,
+    measure_drive_step,
+    motions_of,
+)
 import numpy as np
 import pytest
 

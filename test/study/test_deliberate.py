@@ -13,13 +13,16 @@ from __future__ import annotations
 from itertools import islice
 from math import cos, hypot, sqrt, tau
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import FileError
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.study.budget_text import ALL_TOGETHER
-from linkage_ros.tools.study.deliberate import compare_runs, measure_deliberate, published_states
-from linkage_ros.tools.study.prices import turn_crank
+from linkage_ros.tools.study import (
+    ALL_TOGETHER,
+    compare_runs,
+    measure_deliberate,
+    published_states,
+    turn_crank,
+)
 import numpy as np
 import pytest
 

@@ -12,17 +12,21 @@ from math import pi
 from typing import Any
 
 from campaigns.accuracy.adversarial import four_bar
-from campaigns.accuracy.reference import Outcome
-from campaigns.accuracy.reference import Reference as Elsewhere
+from campaigns.accuracy.reference import Outcome, Reference as Elsewhere
 from campaigns.accuracy.run import make
 from flint import ctx
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.kinematics import (
+    Closure,
+    Input,
+    Linkage,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+    usual_inputs,
+)
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.study.enclosure import prove, SingularError, solve
+from linkage_ros.tools.study import prove, SingularError, solve
 from mpmath import mp, mpf
 import pytest
 

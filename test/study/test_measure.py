@@ -10,24 +10,24 @@
 
 from math import cos, inf, sin
 
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.tools.study.age import (
+from linkage_ros.messages import JOINT_STATE_TYPE, JointStateWriter
+from linkage_ros.tools.study import (
+    compare_hard_cases,
+    ERRORS,
     errors_in_use,
     IN_USE,
     measure_age_in_use,
     measure_age_of_command,
+    measure_budget,
+    measure_drive_step,
+    measure_solving,
+    motions_of,
+    NAME as STEP,
     OF_COMMAND,
 )
-from linkage_ros.tools.study.drive_step import measure_drive_step
-from linkage_ros.tools.study.drive_step import NAME as STEP
-from linkage_ros.tools.study.measure import ERRORS, measure_budget
-from linkage_ros.tools.study.scene_motion import motions_of
-from linkage_ros.tools.study.solving import compare_hard_cases, measure_solving
 import pytest
 
 from ..support.scenes import PENDULUM
@@ -151,7 +151,7 @@ def test_in_hard_cases_the_closed_form_never_fails_and_the_textbook_does():
 def bag_of(folder, delay, count=400, rate=200.0):
     """Write a bag of samples of a sine, each recorded a delay after its stamp, in [s]."""
     write = JointStateWriter(['drive_joint']).write
-    topics = [Topic('/crank_states', JOINT_STATE, '', '')]
+    topics = [Topic('/crank_states', JOINT_STATE_TYPE, '', '')]
     writer = BagWriter(folder, topics, {})
     for index in range(count):
         time = index / rate

@@ -11,14 +11,23 @@
 from itertools import pairwise, product
 import random
 
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.tools.study.age import CARRY, IN_USE, measure_age_in_use
-from linkage_ros.tools.study.budget import Budget, JointError, Knob, Price, Setting
-from linkage_ros.tools.study.drive_step import measure_drive_step
-from linkage_ros.tools.study.measuring import Spread
-from linkage_ros.tools.study.need import answer_need, answers_of
-from linkage_ros.tools.study.prices import change_scene
-from linkage_ros.tools.study.scene_motion import motions_of
+from linkage_ros.description import load_scene
+from linkage_ros.tools.study import (
+    answer_need,
+    answers_of,
+    Budget,
+    CARRY,
+    change_scene,
+    IN_USE,
+    JointError,
+    Knob,
+    measure_age_in_use,
+    measure_drive_step,
+    motions_of,
+    Price,
+    Setting,
+    Spread,
+)
 import pytest
 
 RATE, HORIZON = 1000.0, 1.0

@@ -14,9 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.tools.study.budget import NeedAnswer
-from linkage_ros.tools.study.budget_text import lead_lines, rows_of
-from linkage_ros.tools.study.page import budget_html
+from linkage_ros.tools.study import budget_html, lead_lines, NeedAnswer, rows_of
 import pytest
 
 from .shown_budget import BUDGET

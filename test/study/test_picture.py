@@ -15,8 +15,7 @@ from math import hypot
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.tools.study.budget import Budget, Knob
-from linkage_ros.tools.study.picture import budget_svg
+from linkage_ros.tools.study import Budget, budget_svg, Knob
 import pytest
 
 from .random_budgets import random_budgets

@@ -14,16 +14,17 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from random import Random
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene, parse_scene
+from linkage_ros.description import load_scene, parse_scene, Scene
 from linkage_ros.errors import FileError, LinkageError
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tools.study import prices
-from linkage_ros.tools.study.budget import JointError, Knob, Setting
-from linkage_ros.tools.study.prices import (
+from linkage_ros.tick import Pipeline
+from linkage_ros.tools.study import (
     add_prices,
     change_scene,
+    JointError,
+    Knob,
     price_scenes,
+    prices,
+    Setting,
     tick_price,
     time_ticks,
     TimedScene,

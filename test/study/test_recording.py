@@ -13,10 +13,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.bag import BagWriter
+from linkage_ros.description import load_scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.tools.study.recording import measure_recording
+from linkage_ros.tools.study import measure_recording
 import pytest
 
 SCENE = load_scene('demo', ['record={directory: runs, flush_period: 0.1}'])

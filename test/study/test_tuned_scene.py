@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.description import load_scene
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.study.tuned_scene import tune_scene
+from linkage_ros.tools.study import tune_scene
 import pytest
 
 from ..cli.recorded import Recorded, scene_file

@@ -35,7 +35,7 @@ import time
 
 import linkage_ros
 from linkage_ros.cli.main import main
-from linkage_ros.description.violations import import_jsonschema
+from linkage_ros.description import import_jsonschema
 from linkage_ros.processes import private_domain
 
 # What commands import only where they need it.

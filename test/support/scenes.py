@@ -10,13 +10,9 @@
 
 from pathlib import Path
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import parse_scene
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import parse_scene, parse_yaml, read_linkage, Scene
+from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.tick import Pipeline
 
 ROOT = Path(__file__).parents[2]
 LINKAGES = ROOT / 'config' / 'linkages'

@@ -11,7 +11,7 @@
 from cmath import phase, rect
 from math import pi, radians, sqrt
 
-from linkage_ros.tools.design.design import Assembly, Design, DesignRequest, FourBar
+from linkage_ros.tools.design import Assembly, Design, DesignRequest, FourBar
 
 Lengths = tuple[float, float, float, float]
 """Of crank, coupler, rocker and ground."""

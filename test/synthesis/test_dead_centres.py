@@ -12,8 +12,7 @@ from math import degrees, pi, radians, tau
 import random
 
 from linkage_ros import Closure, SynthesisError
-from linkage_ros.tools.design.dead_centres import crank_rockers, DeadCentreTask
-from linkage_ros.tools.design.defects import assess
+from linkage_ros.tools.design import assess, crank_rockers, DeadCentreTask
 import pytest
 
 from ..support.commands import linkage

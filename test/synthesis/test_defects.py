@@ -19,8 +19,7 @@ from math import acos, asin, cos, degrees, pi, radians, sin, tau
 import random
 from typing import NamedTuple
 
-from linkage_ros.tools.design.defects import assess
-from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
+from linkage_ros.tools.design import assess, Design, DesignRequest, FourBar
 import numpy as np
 import pytest
 

@@ -16,7 +16,7 @@ import warnings
 
 from hypothesis import example, given, settings, strategies
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.function.expression import Expression, FUNCTIONS
+from linkage_ros.tools.design import Expression, FUNCTIONS
 from mpmath import mp
 import numpy as np
 import pytest

@@ -17,11 +17,9 @@ from math import acos, atan, cos, pi, radians
 from typing import Any, NamedTuple
 
 from flint import arb, arb_mat, ctx
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.pairs.free_zeros import five_pairs, four_pairs, FreeZeros
-from linkage_ros.tools.design.proof import prove
+from linkage_ros.tools.design import five_pairs, four_pairs, FreeZeros, prove
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest

@@ -17,18 +17,17 @@ a general solver at 60 digits.
 from math import nan, pi, radians
 
 from campaigns.synthesis import FAMILIES, parts, run
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.double_double import sine_cosine
-from linkage_ros.tools.design.pairs.freudenstein import (
+from linkage_ros.tools.design import (
     exact_four_bar,
     fit_equation,
+    prove,
+    sine_cosine,
     solve_links,
     three_pairs,
-    TRUSTED,
 )
-from linkage_ros.tools.design.proof import prove
+from linkage_ros.tools.design.pairs.freudenstein import TRUSTED
 from mpmath import cos, lu_solve, matrix, mp, mpf, sin, sqrt
 import numpy as np
 import pytest

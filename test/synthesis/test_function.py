@@ -12,11 +12,11 @@ from math import cos, inf, nan, pi, radians, sqrt
 
 from hypothesis import given, strategies
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.function.expression import Expression
-from linkage_ros.tools.design.function.task import (
+from linkage_ros.tools.design import (
     angle_pairs,
     chebyshev_points,
     check_defined,
+    Expression,
     FunctionTask,
     on_scale,
     wanted_rocker,

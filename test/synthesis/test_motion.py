@@ -12,16 +12,16 @@ from cmath import phase, rect
 from math import inf, nan, pi, radians, tau
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.tools.design.motion import (
+from linkage_ros.kinematics import UNIT_ROUNDOFF
+from linkage_ros.tools.design import (
     fixed_pivots,
     from_fixed_pivots,
     from_moving_pivots,
     moving_pivots,
     Pose,
-    TRUSTED,
+    prove,
 )
-from linkage_ros.tools.design.proof import prove
+from linkage_ros.tools.design.motion import TRUSTED
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest

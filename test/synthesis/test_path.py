@@ -15,9 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.design import Design
-from linkage_ros.tools.design.path.curves import PathTask
-from linkage_ros.tools.design.path.generate import generate_path, PathResult
+from linkage_ros.tools.design import Design, generate_path, PathResult, PathTask
 import numpy as np
 import pytest
 from scipy.optimize import least_squares

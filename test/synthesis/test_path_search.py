@@ -13,20 +13,20 @@ from math import inf, pi, tan
 import pickle
 from typing import Any
 
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from linkage_ros.tools.design.path.curves import (
+from hypothesis import assume, given, strategies as st
+from linkage_ros.tools.design import (
     Aim,
+    are_allowed,
     COLUMNS,
     curve_distances,
+    improve,
     point_slopes,
+    problem_of,
     resample,
     stay_closed,
     theta_at,
     transmission_cotangents,
 )
-from linkage_ros.tools.design.path.generate import are_allowed, improve
-from linkage_ros.tools.design.path.search import problem_of
 import numpy as np
 import pytest
 

@@ -14,16 +14,20 @@ from math import inf, log, nan, pi, radians, sqrt
 import random
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.status import Status
-from linkage_ros.tools.design.defects import (
+from linkage_ros.kinematics import Status
+from linkage_ros.tools.design import (
+    assemble,
     assess,
+    Design,
+    DesignRequest,
+    FourBar,
     Needs,
     needs_penalties,
     needs_penalty,
+    prove,
+    prove_both_sides,
     unmet_needs,
 )
-from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
-from linkage_ros.tools.design.proof import assemble, prove, prove_both_sides
 from mpmath import mp, mpf
 import numpy as np
 import pytest

@@ -13,25 +13,26 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import acos, isnan, pi, radians, remainder, sqrt, tau
 
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.design import Assembly, Design, DesignRequest, FourBar
-from linkage_ros.tools.design.function.task import (
+from linkage_ros.tools.design import (
     angle_pairs,
+    Assembly,
     chebyshev_points,
-    FunctionTask,
-    structural_error,
-    wanted_rocker,
-)
-from linkage_ros.tools.design.pairs.angle_fit import (
+    closure_of,
+    Design,
+    DesignRequest,
+    exact_four_bar,
     fit_angles,
+    fit_equation,
+    FourBar,
+    FunctionTask,
     nearest_four_bar,
     rocker_errors,
     root_mean_square,
+    structural_error,
+    wanted_rocker,
 )
-from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar, fit_equation
-from linkage_ros.tools.design.proof import closure_of
 from mpmath import mp
 import numpy as np
 import pytest

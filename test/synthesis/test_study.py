@@ -14,7 +14,7 @@ import tracemalloc
 
 from linkage_ros.dask_workers import import_distributed
 from linkage_ros.errors import LinkageError
-from linkage_ros.tools.design.study import CHUNK, DesignFound, scipy_optimize, search
+from linkage_ros.tools.design import CHUNK, DesignFound, scipy_optimize, search
 import numpy as np
 import pytest
 

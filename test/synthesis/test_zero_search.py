@@ -13,11 +13,20 @@ from math import degrees, hypot, inf, isfinite, pi, radians, remainder
 import pickle
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.tools.design.defects import assess, Assessment, Needs, needs_penalty, unmet_needs
-from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
-from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar
-from linkage_ros.tools.design.pairs.zero_search import search_zeros, ZeroProblem
-from linkage_ros.tools.design.proof import assemble
+from linkage_ros.tools.design import (
+    assemble,
+    assess,
+    Assessment,
+    Design,
+    DesignRequest,
+    exact_four_bar,
+    FourBar,
+    Needs,
+    needs_penalty,
+    search_zeros,
+    unmet_needs,
+    ZeroProblem,
+)
 import numpy as np
 import pytest
 

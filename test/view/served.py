@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import aiohttp
-from linkage_ros.tools.view.server import Route, Server
+from linkage_ros.tools.view import Route, Server
 
 _PATIENCE = 60.0
 """A guard against a test that hangs, in [s]."""

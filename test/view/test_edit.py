@@ -14,14 +14,11 @@ from itertools import zip_longest
 import random
 from typing import Any
 
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import parse_yaml, read_closure
 from linkage_ros.errors import FileError, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Status
 from linkage_ros.resources import linkage_names, shipped_path
-from linkage_ros.tools.view.edit import edit_text, EditResult, pin_of
-from linkage_ros.tools.view.model import build_model
+from linkage_ros.tools.view import build_model, edit_text, EditResult, pin_of
 import pytest
 
 SEED = 20261123

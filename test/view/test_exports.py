@@ -21,11 +21,15 @@ from xml.etree import ElementTree as ET
 
 import linkage_ros as lr
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view import exports
-from linkage_ros.tools.view.exports import export_linkage, KINDS
-from linkage_ros.tools.view.requests import read_request, RequestHandler
+from linkage_ros.tools.view import (
+    EXPORT_KINDS,
+    export_linkage,
+    exports,
+    read_request,
+    RequestHandler,
+)
 from PIL import Image
 import pytest
 
@@ -39,7 +43,7 @@ def exported(kind: str, name: str, inputs: list[float] | None = None) -> bytes:
     request = read_request(json.dumps(content | ({'inputs': inputs} if inputs else {})))
     answer = json.loads(RequestHandler('mine', None, pytest.fail).answer_request(1, request))
     assert answer['ok']['name'] == f'{name}.{kind}'
-    assert answer['ok']['type'] == KINDS[kind][0]
+    assert answer['ok']['type'] == EXPORT_KINDS[kind][0]
     return b64decode(answer['ok']['data'])
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import pi, tau
 
-from linkage_ros.tools.view.hand_crank import HandCrank, HELD
+from linkage_ros.tools.view import HandCrank, HELD
 import pytest
 
 STEP = 1e-4

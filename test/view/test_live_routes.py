@@ -18,8 +18,7 @@ import socket as sockets
 from typing import Any
 from urllib.parse import urlsplit
 
-from linkage_ros.tools.view.live import add_live
-from linkage_ros.tools.view.server import Server
+from linkage_ros.tools.view import add_live, Server
 
 from .served import opened, served
 

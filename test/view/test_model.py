@@ -19,12 +19,11 @@ import shutil
 import subprocess
 from typing import Any
 
-from linkage_ros.description.linkage_file import load
+from linkage_ros.description import load
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Status
 from linkage_ros.resources import linkage_names, shipped_path
-from linkage_ros.tools.view.model import build_model, model_of, ViewState
+from linkage_ros.tools.view import build_model, model_of, ViewState
 import pytest
 
 needs_node = pytest.mark.skipif(shutil.which('node') is None, reason='needs node')

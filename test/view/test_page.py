@@ -17,13 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import linkage_ros as lr
-from linkage_ros.description.linkage_file import load, read_closure
-from linkage_ros.description.yaml_file import parse_yaml
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.description import load, parse_yaml, read_closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.resources import linkage_names, shipped_path
-from linkage_ros.tools.view.conversation import Conversation, UserFile
-from linkage_ros.tools.view.model import build_model
-from linkage_ros.tools.view.page import page_html as page_of
+from linkage_ros.tools.view import build_model, Conversation, page_html as page_of, UserFile
 import pytest
 
 from .served import Served, served

@@ -14,12 +14,9 @@ import json
 from typing import Any
 
 import linkage_ros as lr
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.shapes import frames_of_links
+from linkage_ros.kinematics import Closure, frames_of_links, Position
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view import requests
-from linkage_ros.tools.view.requests import LARGEST, read_request, RequestError, RequestHandler
+from linkage_ros.tools.view import LARGEST, read_request, RequestError, RequestHandler, requests
 import pytest
 
 from .test_server import FOUR_BAR, LONGER

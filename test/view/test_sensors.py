@@ -15,11 +15,10 @@ from math import pi, remainder, tau
 from pathlib import Path
 
 import linkage_ros as lr
-from linkage_ros.description.scene_file import load_scene, SCENE_FILE
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.shapes import frames_of_links
+from linkage_ros.description import load_scene, SCENE_FILE
+from linkage_ros.kinematics import Closure, frames_of_links
 from linkage_ros.resources import scene_names, shipped_path
-from linkage_ros.tools.view.sensors import SceneFiles, Sensors
+from linkage_ros.tools.view import SceneFiles, Sensors
 import pytest
 
 RATE = 2.0

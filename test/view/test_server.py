@@ -32,12 +32,8 @@ from urllib.request import urlopen
 
 import aiohttp
 from linkage_ros.errors import LinkageError
-from linkage_ros.tools.view.conversation import Conversation, UserFile
-from linkage_ros.tools.view.report.run import Window
-from linkage_ros.tools.view.report_command import bag_page
-from linkage_ros.tools.view.requests import LARGEST
-from linkage_ros.tools.view.server import MOST_PAGES
-from linkage_ros.tools.view.worker import Worker
+from linkage_ros.tools.view import bag_page, Conversation, LARGEST, MOST_PAGES, UserFile, Worker
+from linkage_ros.tools.view.report import Window
 import pytest
 
 from .served import asked, opened, Page, Served, served

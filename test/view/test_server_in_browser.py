@@ -15,7 +15,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 from typing import Any
 
-from linkage_ros.tools.view.conversation import Conversation
+from linkage_ros.tools.view import Conversation
 import pytest
 
 from .served import Served, served

@@ -30,11 +30,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import nan
 
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.run_events import read_raw_metadata
-from linkage_ros.description.parameters import choice, file, flag, number, text
+from linkage_ros.bag import Bag, read_bag, read_raw_metadata
+from linkage_ros.description import choice, file, flag, number, text
 from linkage_ros.errors import BagError, DefinitionError, list_names
-from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
+from linkage_ros.messages import CrankSample, JointStateReader, Rejection
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive
 from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
 

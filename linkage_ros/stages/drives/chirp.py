@@ -31,8 +31,8 @@ from functools import partial
 from math import cos, exp, expm1, inf, log, sin, tau
 from typing import NamedTuple
 
-from linkage_ros.description.parameters import choice, each_part, flag, number
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.description import choice, each_part, flag, number
+from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 
 

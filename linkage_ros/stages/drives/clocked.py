@@ -20,8 +20,7 @@ from typing import Any
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.generated_code import Lines
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import Closure, InputSweep
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive
 
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from linkage_ros.description.parameters import each_part, number
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.description import each_part, number
+from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 
 

@@ -14,13 +14,12 @@ from math import floor, isfinite, nan
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import CrankSample, JointStateReader, Rejection
 from linkage_ros.stages.drives.drive import LARGEST
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.crank_branches import CrankBranch
-    from linkage_ros.kinematics.inverse_closure import InverseClosure
+    from linkage_ros.kinematics import CrankBranch, InverseClosure
 
 
 def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure:

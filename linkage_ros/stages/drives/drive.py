@@ -33,13 +33,10 @@ from random import Random
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.generated_code import Lines
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import without_limits
+from linkage_ros.kinematics import Closure, without_limits
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics.loads import Friction, Loads
-    from linkage_ros.dynamics.mechanics import Mechanics
-    from linkage_ros.dynamics.reactions import Reactions
+    from linkage_ros.dynamics import Friction, Loads, Mechanics, Reactions
 
 DRIVES = {
     'topic': 'linkage_ros.stages.drives.topic',
@@ -217,14 +214,14 @@ class Context:
     @cached_property
     def mechanics(self) -> Mechanics:
         """Return the force model of the linkage; all users share it."""
-        from linkage_ros.dynamics.mechanics import Mechanics  # local import: only with forces
+        from linkage_ros.dynamics import Mechanics  # local import: only with forces
 
         return Mechanics(self.closure, self.loads, self.friction)
 
     @cached_property
     def reactions(self) -> Reactions:
         """Return the forces in pins and sliders; all users share them."""
-        from linkage_ros.dynamics.reactions import Reactions  # local import: only with forces
+        from linkage_ros.dynamics import Reactions  # local import: only with forces
 
         return Reactions(self.mechanics)
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import floor, tau
 
-from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages import JointStateWriter
 
 
 class MotorEncoder:

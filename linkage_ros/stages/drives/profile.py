@@ -32,9 +32,9 @@ from functools import partial
 from itertools import pairwise
 from math import copysign, inf, sqrt
 
-from linkage_ros.description.parameters import choice, each_part, flag, number_rows
+from linkage_ros.description import choice, each_part, flag, number_rows
 from linkage_ros.errors import DefinitionError
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import build_clocked, Curve, LARGEST
 
 

@@ -29,12 +29,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import expm1, isfinite, isnan, nan, remainder, tau
 
-from linkage_ros.description.parameters import choice, flag, number, part_name, whole_number
+from linkage_ros.description import choice, flag, number, part_name, whole_number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.generated_code import Lines
-from linkage_ros.kinematics.linkage import Input
-from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.kinematics import Input
+from linkage_ros.messages import CrankSample, JointStateReader, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive, LARGEST, Reader
 
 TOPIC = 'crank_states'

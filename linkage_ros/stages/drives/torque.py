@@ -25,26 +25,25 @@ from dataclasses import dataclass, replace
 from math import copysign, inf, isfinite, pi
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.description.parameters import choice, number, optional_section, whole_number
-from linkage_ros.dynamics.integrators import METHODS
-from linkage_ros.dynamics.motion import LARGEST, Motion, SingleDofMechanism
+from linkage_ros.description import choice, number, optional_section, whole_number
+from linkage_ros.dynamics import LARGEST, METHODS, Motion, SingleDofMechanism
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import describe_ranges
-from linkage_ros.messages.joint_state import EffortCommand, JointEffortReader, Rejection
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.kinematics import Closure, describe_ranges
+from linkage_ros.messages import (
+    EffortCommand,
+    JOINT_STATE_TYPE,
+    JointEffortReader,
+    NANOSECONDS,
+    Rejection,
+)
 from linkage_ros.stages.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics.mechanics import Mechanics
-    from linkage_ros.dynamics.motor import Motor
-    from linkage_ros.dynamics.winding import Winding
-    from linkage_ros.dynamics.wrenches import HeldWrench
-    from linkage_ros.messages.wrench import PlanarWrench
+    from linkage_ros.dynamics import HeldWrench, Mechanics, Motor, Winding
+    from linkage_ros.messages import PlanarWrench
 
 TOPIC = 'crank_commands'
-EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE
+EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE_TYPE
 """The topic of the motor's encoder, if the motor is published."""
 
 _MADE_UP = NANOSECONDS
@@ -272,7 +271,7 @@ def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
     )
     if parameters.play is None:
         return motion
-    from linkage_ros.dynamics.two_masses import TwoMasses  # local import: only with play
+    from linkage_ros.dynamics import TwoMasses  # local import: only with play
 
     play = parameters.play
     return TwoMasses.from_motor(motion, play.inertia, play.width, play.restitution)
@@ -320,7 +319,7 @@ def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -
 
 def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
     """Return the motor of an input that bears an effort of at most ``most``."""
-    from linkage_ros.dynamics.motor import Motor  # local import: only with a motor
+    from linkage_ros.dynamics import Motor  # local import: only with a motor
 
     voltage = given.command == 'voltage' or given.voltage < LARGEST
     if voltage and given.resistance < _LEAST_RESISTANCE:
@@ -351,7 +350,7 @@ def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
             'the current is commanded, and without a limit of voltage nothing holds it back',
             'write voltage, or leave it out',
         )
-    from linkage_ros.dynamics.winding import Winding  # local import: only with an inductance
+    from linkage_ros.dynamics import Winding  # local import: only with an inductance
 
     by_current = replace(motor, supply=LARGEST, command='current')
     return Winding(by_current, given.inductance, given.voltage, given.command)

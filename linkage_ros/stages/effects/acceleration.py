@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.kinematics.arithmetic import all_finite
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.kinematics import all_finite
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stage, Writer
 
 TOPIC = '~/motion'

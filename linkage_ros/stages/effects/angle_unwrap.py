@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import pi, remainder, tau
 from operator import add
 
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _NO_TURN = -0.0

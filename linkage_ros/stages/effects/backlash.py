@@ -38,8 +38,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, tau
 
-from linkage_ros.description.parameters import each_part, Number, number
-from linkage_ros.stages.drives.drive import Context, CrankBehindPlay, CrankState
+from linkage_ros.description import each_part, Number, number
+from linkage_ros.stages.drives import Context, CrankBehindPlay, CrankState
 from linkage_ros.stages.effects.stage import DriveStage
 
 _LARGEST = 6.0

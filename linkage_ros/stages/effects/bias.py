@@ -32,9 +32,9 @@ from dataclasses import dataclass
 from math import cos, sin
 from operator import add
 
-from linkage_ros.description.parameters import each_part, Number, number
+from linkage_ros.description import each_part, Number, number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _Systematic = tuple[int, float, float, float]

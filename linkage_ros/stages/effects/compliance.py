@@ -29,11 +29,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from linkage_ros.description.parameters import each_part, Number
+from linkage_ros.description import each_part, Number
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.arithmetic import unit_vector
-from linkage_ros.kinematics.topology import Joint
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.kinematics import Joint, unit_vector
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import MechanismState, Stage, with_deflection
 
 _STIFFEST = 1e15

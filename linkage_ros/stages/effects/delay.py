@@ -53,9 +53,9 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from random import Random
 
-from linkage_ros.description.parameters import choice, flag, number, own_parameters
+from linkage_ros.description import choice, flag, number, own_parameters
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.history import History
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 

@@ -27,7 +27,7 @@ from linkage_ros.stages.effects.stage import (
 )
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.linkage import Linkage
+    from linkage_ros.kinematics import Linkage
 
 
 def module_of(effect: str) -> ModuleType:

@@ -40,9 +40,9 @@ from dataclasses import dataclass
 from decimal import Context as Rounding
 from random import Random
 
-from linkage_ros.description.parameters import choice, number, own_parameters
+from linkage_ros.description import choice, number, own_parameters
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 

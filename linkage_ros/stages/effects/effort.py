@@ -31,8 +31,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.kinematics.arithmetic import all_finite
-from linkage_ros.stages.drives.drive import Context, CrankAtRest, CrankBehindPlay
+from linkage_ros.kinematics import all_finite
+from linkage_ros.stages.drives import Context, CrankAtRest, CrankBehindPlay
 from linkage_ros.stages.effects.stage import MechanismState, Stage
 
 

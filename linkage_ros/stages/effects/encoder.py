@@ -50,9 +50,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import expm1, floor, tau
 
-from linkage_ros.description.parameters import choice, each_part, flag, number, whole_number
+from linkage_ros.description import choice, each_part, flag, number, whole_number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 

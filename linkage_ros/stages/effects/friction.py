@@ -31,8 +31,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from linkage_ros.description.parameters import each_part, flag
-from linkage_ros.dynamics.loads import Friction, JointFriction
+from linkage_ros.description import each_part, flag
+from linkage_ros.dynamics import Friction, JointFriction
 
 
 @dataclass(frozen=True, slots=True)

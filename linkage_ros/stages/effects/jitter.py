@@ -31,8 +31,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from random import Random
 
-from linkage_ros.description.parameters import choice, number
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.description import choice, number
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.history import History
 from linkage_ros.stages.effects.stage import restamp, SensorReading
 

@@ -23,24 +23,28 @@ from itertools import pairwise
 from math import log1p, pi
 from typing import NamedTuple
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Input, links_by_point
-from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics import (
+    all_places,
     bounding_corners,
     carried_shapes,
     Circle,
+    Closure,
     COLOURS,
     FACES,
+    GROUND,
     INK,
+    Input,
+    links_by_point,
     Polygon,
+    Position,
+    prepare_view,
     Segment,
     Shape,
     shape_outline,
+    symbol_size,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.messages.marker_array import (
+from linkage_ros.messages import (
     ARROW,
     Colour,
     LINE_LIST,

@@ -32,15 +32,10 @@ from collections import deque
 from dataclasses import dataclass
 from math import pi, radians, sin, sqrt
 
-from linkage_ros.description.parameters import number, text
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import links_of
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.description import number, text
+from linkage_ros.kinematics import GROUND, links_of, Position, Status, usual_inputs
+from linkage_ros.messages import DELETE, MarkerArrayWriter, NANOSECONDS
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Writer
 

@@ -24,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from linkage_ros.description.parameters import each_part, number
+from linkage_ros.description import each_part, number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _LARGEST = 1e9

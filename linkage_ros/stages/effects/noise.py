@@ -39,9 +39,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, sqrt
 
-from linkage_ros.description.parameters import each_part, number
+from linkage_ros.description import each_part, number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _Source = tuple[int, float, Callable[[float, float], float]]

@@ -32,7 +32,7 @@ from dataclasses import asdict, replace
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 if TYPE_CHECKING:

@@ -38,8 +38,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from linkage_ros.description.parameters import choice, number, own_parameters
-from linkage_ros.stages.drives.drive import Context
+from linkage_ros.description import choice, number, own_parameters
+from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 if TYPE_CHECKING:

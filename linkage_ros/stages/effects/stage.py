@@ -54,13 +54,13 @@ from collections.abc import Callable
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.stages.drives.drive import CrankState
+from linkage_ros.kinematics import Acceleration, Position, Velocity
+from linkage_ros.stages.drives import CrankState
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics.reactions import Reaction
+    from linkage_ros.dynamics import Reaction
 
-EFFECTS = {
+EFFECTS: dict[str, str] = {
     # The mechanism as it was made.
     'tolerance': 'linkage_ros.stages.effects.tolerance',
     # Between motor and crank.

@@ -39,10 +39,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
 
-from linkage_ros.description.parameters import each_part, number, part_names, Point
+from linkage_ros.description import each_part, number, part_names, Point
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Closure, Linkage
 
 TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""

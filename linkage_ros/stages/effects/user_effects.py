@@ -32,7 +32,7 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.description.parameters import declared_fields
+from linkage_ros.description import declared_fields
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.stages.effects.stage import EFFECTS, NEEDS
 

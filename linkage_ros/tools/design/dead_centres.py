@@ -27,7 +27,7 @@ from math import acos, inf, pi, tan
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.ranges import golden_section
+from linkage_ros.kinematics import golden_section
 from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
 
 _SAMPLES = 1000

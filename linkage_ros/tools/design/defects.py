@@ -22,7 +22,7 @@ from math import degrees, inf, log, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import did_you_mean, list_names, SynthesisError
-from linkage_ros.kinematics.grashof import (
+from linkage_ros.kinematics import (
     CHANGE_POINTS,
     four_bar_type,
     FourBarType,

@@ -20,14 +20,7 @@ from cmath import rect
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from linkage_ros.kinematics.linkage import (
-    AssemblyPose,
-    GROUND,
-    Input,
-    Linkage,
-    Point,
-    RevoluteJoint,
-)
+from linkage_ros.kinematics import AssemblyPose, GROUND, Input, Linkage, Point, RevoluteJoint
 
 CRANK, COUPLER, ROCKER = 'crank', 'coupler', 'rocker'
 

@@ -36,8 +36,7 @@ from math import degrees, isfinite, remainder, tau
 from typing import Any, NamedTuple, TypeAlias
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.kinematics.batch import Array, Complex
+from linkage_ros.kinematics import Array, Complex, UNIT_ROUNDOFF
 from linkage_ros.tools.design.design import Design, DesignRequest, FARTHEST, FourBar
 from linkage_ros.tools.design.double_double import (
     add,

@@ -21,13 +21,13 @@ from math import degrees, remainder, tau
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.kinematics.curves import drawn_once
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics import (
     bar_size,
     bounding_corners,
     draw_shapes,
     draw_skeleton,
+    drawn_once,
+    GROUND,
     INK,
     shape_outline,
 )
@@ -45,7 +45,7 @@ from linkage_ros.tools.design.picture_curves import (
     paint_error,
     swept_branches,
 )
-from linkage_ros.tools.drawing.painting import (
+from linkage_ros.tools.drawing import (
     LAYERS,
     NameLabels,
     OTHER,

@@ -15,10 +15,7 @@ from math import degrees, pi, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import InputRange, Position
-from linkage_ros.kinematics.shapes import INK
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import Closure, INK, InputRange, InputSweep, Position
 from linkage_ros.tools.design.design import Assembly, COUPLER, Design, DesignRequest
 from linkage_ros.tools.design.proof import (
     AchievedPosition,
@@ -27,7 +24,7 @@ from linkage_ros.tools.design.proof import (
     prove,
     SIDES,
 )
-from linkage_ros.tools.drawing.painting import degree_step, NameLabels, OTHER, OTHER_TEXT, WANTED
+from linkage_ros.tools.drawing import degree_step, NameLabels, OTHER, OTHER_TEXT, WANTED
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -29,10 +29,7 @@ from dataclasses import replace
 from math import inf, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Position, Status, UNIT_ROUNDOFF
 from linkage_ros.tools.design.design import Assembly, COUPLER, Design, DesignRequest
 import numpy as np
 from numpy.typing import NDArray

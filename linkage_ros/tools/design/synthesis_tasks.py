@@ -20,9 +20,8 @@ from collections.abc import Iterator, Sequence
 from math import degrees, hypot, isfinite, pi, radians, remainder
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.cli.arguments import AngleUnit
-from linkage_ros.cli.terminal import ProgressCallback
-from linkage_ros.description.tables import numbers_of
+from linkage_ros.cli import AngleUnit, ProgressCallback
+from linkage_ros.description import numbers_of
 from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.tools.design.defects import assess, Assessment, Needs, unmet_needs
 from linkage_ros.tools.design.design import Design

@@ -23,7 +23,7 @@ from shlex import quote
 import sys
 from threading import Event
 
-from linkage_ros.cli.arguments import (
+from linkage_ros.cli import (
     add_output,
     add_radians,
     AngleUnit,
@@ -31,10 +31,12 @@ from linkage_ros.cli.arguments import (
     LINKAGES,
     output_path,
     PICTURES,
+    print_tables,
+    ProgressCallback,
+    show_progress,
+    TerminalTable,
 )
-from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
-from linkage_ros.description.file_access import check_new
-from linkage_ros.description.linkage_writer import write_linkage
+from linkage_ros.description import check_new, write_linkage
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.design.defects import Assessment, Needs, needs_penalty, unmet_needs
 from linkage_ros.tools.design.design import FourBar

@@ -25,20 +25,21 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description.file_access import atomic_write, check_output_name
+from linkage_ros.description import atomic_write, check_output_name
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics.curves import Curve
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import LinkageView, symbol_size
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics import (
     bounding_corners,
     carried_shapes,
     COLOURS,
+    Curve,
     frames_of_links,
+    GROUND,
+    InputSweep,
+    LinkageView,
     Shape,
     shape_outline,
+    symbol_size,
 )
-from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.names import picture_text
 from linkage_ros.tools.drawing.figure import (
     joint_axes,
@@ -56,7 +57,7 @@ from linkage_ros.tools.drawing.painting import (
 )
 import numpy as np
 
-KINDS = ('.gif', '.mp4', '.svg')
+ANIMATION_KINDS = ('.gif', '.mp4', '.svg')
 """The files that can be written."""
 
 RATE = 20
@@ -124,7 +125,7 @@ def check_kind(file: Path) -> None:
     MP4.
     """
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
-    check_output_name(file, KINDS)
+    check_output_name(file, ANIMATION_KINDS)
     if file.suffix.lower() == '.mp4':
         from matplotlib.animation import FFMpegWriter  # local import: an extra, and slow to load
 

@@ -18,7 +18,7 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import (
+from linkage_ros.cli import (
     add_at,
     add_file,
     add_output,
@@ -27,15 +27,16 @@ from linkage_ros.cli.arguments import (
     PICTURES,
     read_inputs,
 )
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import find_assemblies, load, written_linkage
-from linkage_ros.description.linkage_writer import pose_text
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.description import (
+    atomic_write,
+    find_assemblies,
+    load,
+    pose_text,
+    read_yaml,
+    written_linkage,
+)
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.drawn_pose import read_drawn_pose
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics import Closure, prepare_view, read_drawn_pose, usual_inputs
 from linkage_ros.resources import named_file
 from linkage_ros.tools.drawing.dxf import links_dxf
 from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture

@@ -14,19 +14,21 @@ from cmath import rect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import traced_carriers
-from linkage_ros.kinematics.pose_view import all_places, LinkageView, symbol_size
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics import (
+    all_places,
     bounding_corners,
     carried_shapes,
     Circle,
+    Closure,
     frames_of_links,
+    LinkageView,
     LinkFrame,
+    Position,
     Segment,
     Shape,
     shape_outline,
+    symbol_size,
+    traced_carriers,
 )
 
 _DIGITS = 6

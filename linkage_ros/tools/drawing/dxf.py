@@ -24,11 +24,17 @@ from math import tan, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import links_by_point
-from linkage_ros.kinematics.pose_view import LinkageView, prepare_view, symbol_size
-from linkage_ros.kinematics.shapes import bounding_corners, convex_hull, frames_of_links
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics import (
+    bounding_corners,
+    Closure,
+    convex_hull,
+    frames_of_links,
+    LinkageView,
+    links_by_point,
+    prepare_view,
+    symbol_size,
+    usual_inputs,
+)
 from linkage_ros.names import dxf_text
 
 _MM = 1e3

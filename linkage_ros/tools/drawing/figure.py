@@ -16,25 +16,23 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-from linkage_ros.kinematics.curves import Curve
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import (
+from linkage_ros.kinematics import (
     all_places,
-    LinkageView,
-    pose_text,
-    SAME_ANGLE,
-    symbol_size,
-)
-from linkage_ros.kinematics.shapes import (
     bounding_corners,
     Circle,
     COLOURS,
+    Curve,
     draw_shapes,
     draw_skeleton,
+    GROUND,
     INK,
+    LinkageView,
     Polygon,
+    pose_text,
+    SAME_ANGLE,
     Shape,
     shape_outline,
+    symbol_size,
 )
 from linkage_ros.names import picture_text
 from linkage_ros.tools.drawing.painting import (

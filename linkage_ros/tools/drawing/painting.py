@@ -21,9 +21,9 @@ from statistics import fmean
 from typing import Any, NamedTuple
 from warnings import catch_warnings, filterwarnings
 
-from linkage_ros.description.file_access import atomic_write
+from linkage_ros.description import atomic_write
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics.shapes import Circle, COLOURS, FACES, INK, Polygon, Shape
+from linkage_ros.kinematics import Circle, COLOURS, FACES, INK, Polygon, Shape
 from linkage_ros.names import picture_text
 
 _DIRECTIONS = 16

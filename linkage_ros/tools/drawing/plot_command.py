@@ -20,18 +20,30 @@ from math import nan, pi, tau
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import add_bag, add_output, output_or, PICTURES
-from linkage_ros.cli.bag_reading import add_trust, open_bag, path_beside, scene_of
+from linkage_ros.cli import (
+    add_bag,
+    add_output,
+    add_trust,
+    open_bag,
+    output_or,
+    path_beside,
+    PICTURES,
+    scene_of,
+)
 from linkage_ros.errors import BagError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.curves import Curve, sweep_range
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep
-from linkage_ros.messages.joint_state import JointStateReader, Rejection
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.kinematics import (
+    Closure,
+    Curve,
+    Input,
+    InputRange,
+    InputSweep,
+    Linkage,
+    RevoluteJoint,
+    sweep_range,
+)
+from linkage_ros.messages import JointStateReader, NANOSECONDS, Rejection
 from linkage_ros.names import picture_text
-from linkage_ros.replay.replay import replay_ticks
+from linkage_ros.replay import replay_ticks
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.drawing.figure import joint_axes, label_joints, plot_joints
 from linkage_ros.tools.drawing.painting import picture_settings, save_picture, show_lengths

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.shapes import COLOURS
+from linkage_ros.kinematics import COLOURS
 from linkage_ros.names import picture_text
 from linkage_ros.tools.drawing.painting import picture_settings, save_picture
 import numpy as np

@@ -14,21 +14,23 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
 from linkage_ros.errors import quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import all_places, prepare_view, symbol_size
-from linkage_ros.kinematics.results import Position
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics import (
+    all_places,
     bounding_corners,
     Circle,
+    Closure,
     COLOURS,
     draw_shapes,
     draw_skeleton,
     FACES,
     INK,
     Polygon,
+    Position,
+    prepare_view,
     shape_outline,
+    symbol_size,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.tools.drawing.painting import GHOST, STROKES
 
 _LONGER_SIDE = 420.0

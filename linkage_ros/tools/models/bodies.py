@@ -21,10 +21,14 @@ from collections.abc import Mapping
 from statistics import median
 from typing import NamedTuple
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, SlideJoint
-from linkage_ros.kinematics.ranges import link_lengths, slide_bound
-from linkage_ros.kinematics.shapes import convex_hull
+from linkage_ros.kinematics import (
+    Closure,
+    convex_hull,
+    GROUND,
+    link_lengths,
+    slide_bound,
+    SlideJoint,
+)
 from linkage_ros.tools.models.orientation import AngleSpan, named_joints
 
 _COLOURS = (

@@ -20,14 +20,12 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.arguments import add_file, add_output
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import linkage_content, read_closure
+from linkage_ros.cli import add_file, add_output
+from linkage_ros.description import atomic_write, linkage_content, read_closure
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
-from linkage_ros.tools.models.source_code.languages import C_NAME, c_name, LANGUAGES
-from linkage_ros.tools.models.source_code.source import Subject, write_source
+from linkage_ros.tools.models.source_code import C_NAME, c_name, LANGUAGES, Subject, write_source
 
 EXAMPLE = 'linkage compile four_bar -o four_bar.c'
 

@@ -18,10 +18,9 @@ from __future__ import annotations
 import argparse
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, add_set, SCENE_HELP
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.tools.models.fmu.build import scene_fmu
+from linkage_ros.cli import add_output, add_set, SCENE_HELP
+from linkage_ros.description import atomic_write, load_scene
+from linkage_ros.tools.models.fmu import scene_fmu
 
 EXAMPLE = 'linkage fmu four_bar -o four_bar.fmu'
 

@@ -18,11 +18,15 @@ from math import hypot, inf, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
     AssemblyPose,
+    assur_groups,
+    Closure,
+    count_mobility,
+    Dyad,
     GROUND,
     Input,
+    Iterated,
     Limits,
     Linkage,
     NO_LIMITS,
@@ -30,9 +34,8 @@ from linkage_ros.kinematics.linkage import (
     Ratio,
     RevoluteJoint,
     Side,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import assur_groups, count_mobility, Dyad, Iterated
 from linkage_ros.tools.models.planar import (
     add_places,
     find_closings,

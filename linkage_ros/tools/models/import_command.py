@@ -22,10 +22,8 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, LINKAGES
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.linkage_writer import linkage_text
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.cli import add_output, LINKAGES
+from linkage_ros.description import linkage_text, parse_yaml, read_linkage
 from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.robot_model_command import write_or_print
 from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file

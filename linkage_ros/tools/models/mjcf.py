@@ -23,8 +23,8 @@ from math import inf, prod, remainder, tau
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
+    Closure,
     GROUND,
     Limits,
     links_by_point,
@@ -32,8 +32,8 @@ from linkage_ros.kinematics.linkage import (
     NO_LIMITS,
     RevoluteJoint,
     SlideJoint,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.tools.models.bodies import bar_width, link_bodies, LinkBody, Solid
 from linkage_ros.tools.models.orientation import joint_spans, named_joints
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames

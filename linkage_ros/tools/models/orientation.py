@@ -23,14 +23,20 @@ from heapq import heappop, heappush
 from math import pi, remainder, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import slide_bound
-from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs, usual_inputs
+from linkage_ros.kinematics import (
+    Closure,
+    InputRange,
+    InputSweep,
+    Linkage,
+    RevoluteJoint,
+    sample_inputs,
+    slide_bound,
+    SlideJoint,
+    usual_inputs,
+)
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Array
+    from linkage_ros.kinematics import Array
 
 
 # The orientation of one link relative to another, as a sum of published joints.

@@ -13,10 +13,9 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.tools.models.orientation import named_joints
 
 

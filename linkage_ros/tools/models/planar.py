@@ -23,7 +23,7 @@ import re
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
-from linkage_ros.kinematics.linkage import Mass, NO_LIMITS
+from linkage_ros.kinematics import Mass, NO_LIMITS
 from linkage_ros.tools.models.urdf_file import MOVING, UrdfFile, UrdfJoint, UrdfLink
 import numpy as np
 

@@ -21,11 +21,8 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, SCENE_HELP
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.scene_file import kind_of
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.cli import add_output, SCENE_HELP
+from linkage_ros.description import atomic_write, kind_of, read_closure, read_yaml
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.onto import urdf_onto
@@ -90,8 +87,8 @@ def model_of(named: str, write: Write) -> bytes:
     file = named_file(named, 'linkages', 'scenes')
     content, _ = read_yaml(file)
     if kind_of(content) == 'scene':
-        from linkage_ros.description.scene_file import load_scene
-        from linkage_ros.tick.pipeline import Pipeline
+        from linkage_ros.description import load_scene
+        from linkage_ros.tick import Pipeline
 
         scene = load_scene(file)
         return make_scene_model(scene, Pipeline(scene).closures, write)

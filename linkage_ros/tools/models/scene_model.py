@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.description import Scene
+from linkage_ros.kinematics import Closure
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.urdf import urdf_model
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
-from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.tools.models.orientation import named_joints, Orientations, Turn
 from linkage_ros.tools.models.part import free_name, ModelNames, PrefixedNames
 

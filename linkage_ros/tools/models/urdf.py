@@ -23,8 +23,8 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics import (
+    Closure,
     GROUND,
     Limits,
     Linkage,
@@ -33,8 +33,8 @@ from linkage_ros.kinematics.linkage import (
     NO_LIMITS,
     Ratio,
     RevoluteJoint,
+    usual_inputs,
 )
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.tools.models.bodies import link_bodies, LinkBody
 from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames

@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description.file_access import read_regular
-from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
+from linkage_ros.description import kind_of_bytes, kind_of_folder, read_regular
 from linkage_ros.errors import FileError, LinkageError, list_names, quote
-from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
+from linkage_ros.kinematics import Limits, NO_LIMITS
 
 # The content of a URDF: links and joints by name.
 

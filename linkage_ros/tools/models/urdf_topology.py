@@ -16,7 +16,7 @@ from re import fullmatch
 from typing import NamedTuple
 
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics import GROUND, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.tools.models.part import free_name
 from linkage_ros.tools.models.planar import Closing, Frame, Planar, PlanarJoint
 from linkage_ros.tools.models.urdf_file import UrdfFile

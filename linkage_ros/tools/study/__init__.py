@@ -7,3 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """Where the error of a scene comes from, and what each digit costs."""
+
+from linkage_ros.faces import lazy_names
+
+__getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -23,12 +23,19 @@ from pathlib import Path
 from threading import Event
 from typing import NamedTuple
 
-from linkage_ros.cli.arguments import add_output, add_set, bounded_number, LINKAGES, output_path
-from linkage_ros.cli.bag_reading import open_bag, scene_of
-from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import load_scene
+from linkage_ros.cli import (
+    add_output,
+    add_set,
+    bounded_number,
+    LINKAGES,
+    open_bag,
+    output_path,
+    print_tables,
+    scene_of,
+    show_progress,
+    TerminalTable,
+)
+from linkage_ros.description import atomic_write, load_scene, Scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
 from linkage_ros.tools.study.budget_text import (

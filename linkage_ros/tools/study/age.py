@@ -26,12 +26,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import HIGHEST_RATE, LOWEST_RATE
-from linkage_ros.messages.joint_state import CrankSample, JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stages.drives import topic as topic_drive
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.description import HIGHEST_RATE, LOWEST_RATE, Scene
+from linkage_ros.messages import CrankSample, JointStateWriter, NANOSECONDS
+from linkage_ros.stages.drives import topic as topic_drive, TopicDrive, TopicParameters
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Spread, time_in_turn

@@ -23,13 +23,12 @@ from itertools import islice
 from math import remainder, sqrt, tau
 from typing import NamedTuple
 
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import FileError, list_names
-from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, POSITION
-from linkage_ros.replay.verify import turning_joints
-from linkage_ros.stages.effects.dispatch import effects_requiring, in_order
-from linkage_ros.stages.effects.stage import FORCE_EFFECTS
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JOINT_STATE_TYPE, MessageValues, POSITION
+from linkage_ros.replay import turning_joints
+from linkage_ros.stages.effects import effects_requiring, FORCE_EFFECTS, in_order
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.budget import JointError, Knob, Setting
 from linkage_ros.tools.study.budget_text import ALL_TOGETHER
 from linkage_ros.tools.study.measuring import Progress
@@ -53,7 +52,7 @@ def published_states(
     """Yield after each tick whether it published, and the newest published positions by joint."""
     pipeline = Pipeline(scene)
     injection = pipeline.injection
-    reader = MessageValues(JOINT_STATE, scene.dependent_joints)
+    reader = MessageValues(JOINT_STATE_TYPE, scene.dependent_joints)
     newest: dict[str, float] = {}
     last = 0
     for now, sample in islice(feed(scene, pipeline), ticks):

@@ -26,10 +26,10 @@ from math import inf
 from time import process_time
 from typing import Any
 
-from linkage_ros.dynamics.integrators import METHODS
+from linkage_ros.dynamics import METHODS
 from linkage_ros.errors import DefinitionError
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stages.drives.torque import TorqueParameters
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.stages.drives import TorqueParameters
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn

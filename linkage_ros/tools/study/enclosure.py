@@ -33,8 +33,7 @@ from math import frexp
 from typing import Any, NamedTuple
 
 from flint import acb, arb, arb_mat, ctx
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics import Closure, GROUND, Linkage, RevoluteJoint
 
 _PRECISIONS = (512, 1024, 2048)
 """Precisions in bits; the next is tried if one proves nothing."""

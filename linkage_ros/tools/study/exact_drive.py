@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import copysign, inf, ulp
 from typing import Any, NamedTuple
 
-from linkage_ros.dynamics.motion import Motion, SingleDofMechanism
+from linkage_ros.dynamics import Motion, SingleDofMechanism
 import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq

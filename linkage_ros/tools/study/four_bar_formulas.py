@@ -36,11 +36,16 @@ from collections.abc import Callable, Sequence
 from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.grashof import four_bars
-from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.sides import written_sides
-from linkage_ros.kinematics.topology import assur_groups, Driven
+from linkage_ros.kinematics import (
+    assur_groups,
+    Closure,
+    Driven,
+    four_bars,
+    GROUND,
+    Linkage,
+    RevoluteJoint,
+    written_sides,
+)
 import numpy as np
 
 

@@ -15,8 +15,7 @@ from itertools import combinations
 from math import nan, tau
 from typing import Any
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
+from linkage_ros.kinematics import Closure, Linkage, RevoluteJoint
 from linkage_ros.tools.study.budget import JointError
 from linkage_ros.tools.study.member_motion import Crank
 import numpy as np

@@ -16,10 +16,10 @@ from math import floor
 from pathlib import Path
 from time import process_time
 
-from linkage_ros.description.scene import Scene
+from linkage_ros.description import Scene
 from linkage_ros.errors import FileError
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.age import measure_age_in_use, measure_age_of_command
 from linkage_ros.tools.study.budget import Budget, Knob, RecordingLoss, Setting
 from linkage_ros.tools.study.deliberate import measure_deliberate

@@ -19,13 +19,11 @@ from dataclasses import replace
 from math import inf, pi
 from typing import Any, NamedTuple
 
-from linkage_ros.description.scene import SceneLinkage
+from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.messages.joint_state import EffortCommand
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stages.drives import torque
-from linkage_ros.stages.drives.drive import Context, CrankState
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import EffortCommand, NANOSECONDS
+from linkage_ros.stages.drives import Context, CrankState, torque
 
 BEGIN = NANOSECONDS
 """Time of the first tick, in [ns]."""

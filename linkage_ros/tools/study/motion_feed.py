@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.drives.torque import TOPIC as TORQUE_TOPIC
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.description import Scene
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.drives import TOPIC as TORQUE_TOPIC
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.member_motion import BEGIN, Crank, LinkageMotion
 from linkage_ros.tools.study.prices import Feed, turn_crank, USUAL_RATE
 

@@ -18,19 +18,21 @@ from cmath import phase
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.equations import (
+from linkage_ros.kinematics import (
     BodyDirection,
+    Closure,
     CoincidentPoints,
     Constraint,
     End,
     evaluate_constraints,
+    GROUND,
+    Linkage,
+    LinkState,
     OnLine,
     Parallel,
     point_in_line_frame,
+    RevoluteJoint,
 )
-from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.step import LinkState
 import numpy as np
 
 

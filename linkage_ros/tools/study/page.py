@@ -16,7 +16,7 @@ from html import escape
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
 from linkage_ros.tools.study.budget_text import closing_lines, heads_of, lead_lines, rows_of
 from linkage_ros.tools.study.picture import budget_svg
-from linkage_ros.tools.view.pages.document import facts_html, html_document, table_html
+from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 
 _HERE = 'linkage_ros.tools.study'
 

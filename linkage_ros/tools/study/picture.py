@@ -23,8 +23,8 @@ from math import ceil, floor, log10
 from typing import NamedTuple
 from xml.sax.saxutils import escape
 
-from linkage_ros.kinematics.shapes import COLOURS, INK
-from linkage_ros.tools.drawing.painting import GHOST
+from linkage_ros.kinematics import COLOURS, INK
+from linkage_ros.tools.drawing import GHOST
 from linkage_ros.tools.study.budget import Budget, Knob, Setting
 from linkage_ros.tools.study.budget_text import error_knobs, error_text, rate_text, share_text
 

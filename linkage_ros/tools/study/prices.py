@@ -28,14 +28,12 @@ from random import Random
 from statistics import fmean, median
 from time import perf_counter
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.stages.drives.dependent_samples import sampled_inverse
-from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.stages.drives import sampled_inverse
+from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.study.budget import Knob, Price
 from linkage_ros.tools.study.measuring import Progress, Spread, spread_of, thread_clock
 

@@ -13,14 +13,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.reader import Bag
-from linkage_ros.bag.run_events import read_raw_metadata
-from linkage_ros.dynamics.motion import LARGEST
+from linkage_ros.bag import Bag, read_raw_metadata
+from linkage_ros.dynamics import LARGEST
 from linkage_ros.errors import BagError, list_names
-from linkage_ros.messages.joint_state import JointStateReader, Rejection
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.stages.drives import topic as topic_drive
-from linkage_ros.stages.drives import torque as torque_drive
+from linkage_ros.messages import JOINT_STATE_TYPE, JointStateReader, Rejection
+from linkage_ros.stages.drives import topic as topic_drive, torque as torque_drive
 from linkage_ros.tools.study.member_motion import Command, Crank, LinkageMotion
 
 
@@ -96,7 +93,7 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     else:
         use = topic_drive.TopicParameters(max_age=use.max_age)
     topic = topic or str(read_raw_metadata(bag).get('crank_topic') or '')
-    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
+    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
     received: dict[str, list[tuple[int, Any]]] = {}
     for heard, log_time, _, data in bag.messages():
         if heard in of_type and (heard == topic or not topic):
@@ -135,7 +132,7 @@ def follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
     """Return the motion of a torque drive by the commands of a bag, as they came; or by none."""
     read = torque_drive.reader(motion.scene_linkage.drive[1], motion.context)
     topic = read_raw_metadata(bag).get('crank_topic')
-    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE}
+    of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
     heard: dict[str, list[Command]] = {}
     begin = end = None
     for name, log_time, _, data in bag.messages():

@@ -28,15 +28,11 @@ import tempfile
 from time import monotonic_ns, sleep, thread_time_ns
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.storage import FLUSH_AFTER, Storage
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
-from linkage_ros.description.scene import LEAST_FLUSH_PERIOD, Scene
+from linkage_ros.bag import BagSummary, BagWriter, FLUSH_AFTER, Recorder, Storage, Topic
+from linkage_ros.description import LEAST_FLUSH_PERIOD, Scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.messages import JOINT_STATE_TYPE
+from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.budget import Price, RecordingLoss
 from linkage_ros.tools.study.measuring import alternate_order, Progress, spread_of
 from linkage_ros.tools.study.prices import Feed, turn_crank, USUAL_RATE
@@ -165,8 +161,8 @@ def _record_run(
 
 def _recorded_topics(pipeline: Pipeline) -> list[Topic]:
     """Return the topics the node would record, without diagnostics and message definitions."""
-    names = [(pipeline.topic, JOINT_STATE)] if pipeline.topic else []
-    names.append(('/joint_states', JOINT_STATE))
+    names = [(pipeline.topic, JOINT_STATE_TYPE)] if pipeline.topic else []
+    names.append(('/joint_states', JOINT_STATE_TYPE))
     names += [(extra.topic.replace('~', '/node'), extra.message) for extra in pipeline.extras]
     return [Topic(name, kind, '', '') for name, kind in names]
 

@@ -19,13 +19,12 @@ from __future__ import annotations
 from dataclasses import replace
 from math import cos, pi, sin, tau
 
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.description.scene import Scene
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stages.drives.drive import CrankState
-from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.bag import Bag, read_bag
+from linkage_ros.description import Scene
+from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
+from linkage_ros.messages import NANOSECONDS
+from linkage_ros.stages.drives import CrankState
+from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.study.member_motion import (
     BEGIN,
     build_drive,

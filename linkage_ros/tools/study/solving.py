@@ -22,14 +22,9 @@ from importlib.util import find_spec
 from math import inf, sqrt
 from typing import Any, NamedTuple
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
-from linkage_ros.kinematics.ranges import slide_bound
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import Closure, InputSweep, Linkage, RevoluteJoint, slide_bound, Status
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.budget_text import error_text

@@ -15,10 +15,14 @@ import os
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.description.scene_file import kind_of, SCENE_FILE
-from linkage_ros.description.scene_settings import apply_settings
-from linkage_ros.description.yaml_file import parse_yaml, read_yaml
+from linkage_ros.description import (
+    apply_settings,
+    kind_of,
+    parse_yaml,
+    read_yaml,
+    Scene,
+    SCENE_FILE,
+)
 from linkage_ros.errors import FileError
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.tools.study.prices import Change, settings_of

@@ -19,24 +19,20 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.bag.contents import layout_of
-from linkage_ros.bag.other_formats import is_bag_name
-from linkage_ros.cli.arguments import add_output, output_or
-from linkage_ros.cli.bag_reading import open_bag
-from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description.linkage_file import load
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.bag import is_bag_name, layout_of
+from linkage_ros.cli import add_output, open_bag, output_or, show_progress
+from linkage_ros.description import load
+from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.signals import StoppedError
-from linkage_ros.tools.drawing.animation import (
+from linkage_ros.tools.drawing import (
     animate,
     AnimatedMotion,
+    ANIMATION_KINDS,
     check_kind,
-    KINDS,
     range_motion,
 )
 from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
-from linkage_ros.tools.view.report.run_motion import find_run_motion
+from linkage_ros.tools.view.report import find_run_motion
 
 _TURN = 4.0
 """How long a range is shown, in [s]."""
@@ -49,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'file', metavar='FILE|BAG', help='linkage file, a name of linkage gallery, or a bag'
     )
-    add_output(parser, KINDS, 'FILE.gif in this folder')
+    add_output(parser, ANIMATION_KINDS, 'FILE.gif in this folder')
     parser.add_argument(
         '--seconds',
         type=float,

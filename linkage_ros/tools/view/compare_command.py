@@ -23,17 +23,21 @@ from pathlib import Path
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.arguments import add_output, PICTURES
-from linkage_ros.cli.bag_reading import BagReading, open_bag, run_or_blank
-from linkage_ros.cli.replay import deviations_account, joints_table
-from linkage_ros.cli.terminal import print_tables
+from linkage_ros.bag import Bag
+from linkage_ros.cli import (
+    add_output,
+    BagReading,
+    deviations_account,
+    joints_table,
+    open_bag,
+    PICTURES,
+    print_tables,
+    run_or_blank,
+)
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
-from linkage_ros.messages.joint_values import JOINT_STATE, Key, MessageValues, POSITION
-from linkage_ros.replay.compare import Deviation, TickPlace
-from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.verify import turning_joints
-from linkage_ros.tools.view.report.decimation import DecimatedCurves
+from linkage_ros.messages import JOINT_STATE_TYPE, Key, MessageValues, POSITION
+from linkage_ros.replay import Deviation, recorded_scene, TickPlace, turning_joints
+from linkage_ros.tools.view.report import DecimatedCurves
 import numpy as np
 
 EXAMPLE = 'linkage compare my_bag other_bag -o difference.png'
@@ -187,15 +191,15 @@ def _find_wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
 
 def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
     """Yield the joint states of a bag whose time goes on."""
-    held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
+    held = [topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE]
     topic = run_or_blank(bag).joint_states_topic or '/joint_states'
     if topic not in held:
         raise BagError(
             bag.path,
-            f'holds no {topic} of {JOINT_STATE}',
+            f'holds no {topic} of {JOINT_STATE_TYPE}',
             f'it holds {list_names(held) or "none"}',
         )
-    read = MessageValues(JOINT_STATE).read
+    read = MessageValues(JOINT_STATE_TYPE).read
     begin = last = None
     for name, _, publish_time, data in messages:
         if name != topic:
@@ -225,10 +229,7 @@ def _compare_states(
 def _draw_differences(
     differences: BagDifferences, turning: Mapping[str, bool], file: Path
 ) -> None:
-    from linkage_ros.tools.drawing.painting import (  # local import: only for a picture
-        picture_settings,
-        save_picture,
-    )
+    from linkage_ros.tools.drawing import picture_settings, save_picture
 
     context = picture_settings()
     from matplotlib.figure import Figure

@@ -23,8 +23,7 @@ import os
 from pathlib import Path
 
 from aiohttp import web, WSMsgType
-from linkage_ros.description.file_access import atomic_write, read_regular
-from linkage_ros.description.yaml_file import LARGEST_FILE
+from linkage_ros.description import atomic_write, LARGEST_FILE, read_regular
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.view.requests import (
     encode_text,

@@ -24,8 +24,7 @@ from itertools import islice, product
 from math import copysign, floor, isfinite, log10, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.description.linkage_file import FARTHEST, written_linkage
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import FARTHEST, parse_yaml, written_linkage
 from linkage_ros.errors import (
     DefinitionError,
     did_you_mean,
@@ -34,11 +33,18 @@ from linkage_ros.errors import (
     list_names,
     quote,
 )
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point, RevoluteJoint
-from linkage_ros.kinematics.sides import assembly_sides, without_drawn_pose, written_sides
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import assur_groups
+from linkage_ros.kinematics import (
+    assembly_sides,
+    assur_groups,
+    Closure,
+    GROUND,
+    Linkage,
+    links_by_point,
+    RevoluteJoint,
+    usual_inputs,
+    without_drawn_pose,
+    written_sides,
+)
 from linkage_ros.tools.view.linkage_rewriting import rewrite_linkage
 
 _NAME = 'the page'

@@ -16,13 +16,9 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from linkage_ros.errors import did_you_mean, LinkageError, list_names, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.pose_view import LinkageView, prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.drawing.animation import animate, range_motion
-from linkage_ros.tools.drawing.figure import paint_picture
-from linkage_ros.tools.models.source_code.languages import c_name, LANGUAGES
-from linkage_ros.tools.models.source_code.source import Subject, write_source
+from linkage_ros.kinematics import Closure, LinkageView, prepare_view, usual_inputs
+from linkage_ros.tools.drawing import animate, paint_picture, range_motion
+from linkage_ros.tools.models.source_code import c_name, LANGUAGES, Subject, write_source
 
 _SECONDS = 4.0
 """How long an animation shows the range, in [s]."""
@@ -73,10 +69,10 @@ def export_linkage(
         is missing.
 
     """
-    if kind not in KINDS:
-        remedy = did_you_mean(kind, KINDS, f'ask for one of {list_names(KINDS)}')
+    if kind not in EXPORT_KINDS:
+        remedy = did_you_mean(kind, EXPORT_KINDS, f'ask for one of {list_names(EXPORT_KINDS)}')
         raise LinkageError('kind', f'{quote(kind)} cannot be written', remedy)
-    media_type, write = KINDS[kind]
+    media_type, write = EXPORT_KINDS[kind]
     shown = usual_inputs(closure) if inputs is None else tuple(inputs)
     data = write(_ExportedLinkage(closure, text, name, shown))
     return Export(f'{name}.{kind}', media_type, data)
@@ -96,7 +92,7 @@ def _to_gif(linkage: _ExportedLinkage) -> bytes:
 
 
 def _to_dxf(linkage: _ExportedLinkage) -> bytes:
-    from linkage_ros.tools.drawing.dxf import links_dxf  # local import: ezdxf is slow to load
+    from linkage_ros.tools.drawing import links_dxf  # local import: ezdxf is slow to load
 
     return links_dxf(linkage.closure)
 
@@ -120,7 +116,7 @@ def _written_bytes(kind: str, write: Callable[[Path], None]) -> bytes:
         return file.read_bytes()
 
 
-KINDS: dict[str, tuple[str, Callable[[_ExportedLinkage], bytes]]] = {
+EXPORT_KINDS: dict[str, tuple[str, Callable[[_ExportedLinkage], bytes]]] = {
     'yaml': ('application/yaml', _to_yaml),
     'svg': ('image/svg+xml', _to_svg),
     'gif': ('image/gif', _to_gif),

@@ -20,16 +20,14 @@ from math import dist, isfinite, nan
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from linkage_ros.bag.run_events import read_run_metadata, RunMetadata
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.bag import read_run_metadata, RunMetadata
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.messages.joint_state import CrankSample
-from linkage_ros.messages.layout import MalformedError
-from linkage_ros.replay.replay import read_announced, recorded_scene
+from linkage_ros.kinematics import Closure, GROUND
+from linkage_ros.messages import CrankSample, MalformedError
+from linkage_ros.replay import read_announced, recorded_scene
 from linkage_ros.tools.view.model import model_of
-from linkage_ros.tools.view.report.data import link_poses
+from linkage_ros.tools.view.report import link_poses
 import numpy as np
 
 _LONGEST_LEAD = 0.25

@@ -17,7 +17,7 @@ from linkage_ros.tools.view.model import model_of
 from linkage_ros.tools.view.page import page_html
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics import Closure
 
 _HEIGHT = 900
 """Of the cell, in pixels; what is below is scrolled to."""

@@ -21,12 +21,9 @@ from itertools import takewhile
 from math import dist
 from typing import Any
 
-from linkage_ros.description.linkage_file import written_linkage
-from linkage_ros.description.linkage_writer import content_of, linkage_text
-from linkage_ros.description.units import Units
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import content_of, linkage_text, parse_yaml, Units, written_linkage
 from linkage_ros.errors import check_installed
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics import Linkage
 
 _DIGITS = 13
 """Significant digits of a converted number: the last ones are those of the conversion."""

@@ -24,9 +24,9 @@ import json
 from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
-from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
+from linkage_ros.kinematics import COLOURS, FACES, INK
 from linkage_ros.tools.view.page import SERVED_POLICY
-from linkage_ros.tools.view.pages.document import html_document
+from linkage_ros.tools.view.pages import html_document
 from linkage_ros.tools.view.server import SERVER_KEY
 
 KINDS = ('model', 'node', 'state')

@@ -32,7 +32,7 @@ from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.srv import GetState
-from linkage_ros.description.scene import SceneLinkage
+from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import (
     did_you_mean,
     escape_unprintable,
@@ -41,23 +41,18 @@ from linkage_ros.errors import (
     quote,
     shorten,
 )
-from linkage_ros.messages.joint_state import CrankSample, JointStateReader, JointStateWriter
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.real_time import leave_out_shared_memory
-from linkage_ros.node.scene_topics import (
+from linkage_ros.messages import CrankSample, JointStateReader, JointStateWriter, NANOSECONDS
+from linkage_ros.node import (
     CHANGES_QOS,
+    leave_out_shared_memory,
     never_called,
     SCENE_QOS,
     SCENE_TOPIC,
     TakenByTick,
 )
-from linkage_ros.replay.replay import read_change
+from linkage_ros.replay import read_change
 from linkage_ros.signals import bounded_end
-from linkage_ros.stages.drives.dependent_samples import (
-    DependentSampleReader,
-    joint_of,
-    sampled_inverse,
-)
+from linkage_ros.stages.drives import DependentSampleReader, joint_of, sampled_inverse
 from linkage_ros.tools.view.followed_run import diagnostics_content, FollowedRun, read_run
 from linkage_ros.tools.view.hand_crank import HandCrank, HELD
 from linkage_ros.tools.view.live import KINDS
@@ -73,7 +68,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.crank_branches import CrankBranch
+    from linkage_ros.kinematics import CrankBranch
 
 Floats = Sequence[float]
 

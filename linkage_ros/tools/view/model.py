@@ -19,23 +19,32 @@ from itertools import chain, combinations
 from math import degrees, dist, inf, isfinite, radians
 from typing import Any, NamedTuple
 
-from linkage_ros.description.linkage_file import checked_closure, find_closures, written_linkage
-from linkage_ros.description.notes import linkage_notes
-from linkage_ros.description.section import Section
-from linkage_ros.description.units import Units
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import (
+    checked_closure,
+    find_closures,
+    linkage_notes,
+    parse_yaml,
+    Section,
+    Units,
+    written_linkage,
+)
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Linkage, links_by_point
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.ranges import is_iterated
-from linkage_ros.kinematics.shapes import driven_links
-from linkage_ros.kinematics.sides import assembly_sides, written_sides
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
-from linkage_ros.tools.drawing.drawing_data import drawn_in_frames, pose_in_frames
-from linkage_ros.tools.models.source_code.javascript import JavaScript
-from linkage_ros.tools.models.source_code.source import STATUSES, Subject, write_source
+from linkage_ros.kinematics import (
+    assembly_sides,
+    Closure,
+    driven_links,
+    GROUND,
+    InputSweep,
+    is_iterated,
+    Linkage,
+    links_by_point,
+    prepare_view,
+    Status,
+    usual_inputs,
+    written_sides,
+)
+from linkage_ros.tools.drawing import drawn_in_frames, pose_in_frames
+from linkage_ros.tools.models.source_code import JavaScript, STATUSES, Subject, write_source
 
 _STATUSES = {name: index for index, name in enumerate(STATUSES)}
 

@@ -15,8 +15,8 @@ from html import escape
 from typing import Any
 
 from linkage_ros.errors import escape_unprintable
-from linkage_ros.kinematics.shapes import COLOURS, FACES, INK
-from linkage_ros.tools.view.pages.document import html_document, POLICY
+from linkage_ros.kinematics import COLOURS, FACES, INK
+from linkage_ros.tools.view.pages import html_document, POLICY
 
 SERVED_POLICY = POLICY.replace(
     "script-src 'unsafe-inline'",

@@ -16,16 +16,12 @@ from functools import partial
 from math import isfinite
 from threading import Event
 
-from linkage_ros.bag.contents import Layout
-from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.bag_reading import add_trust, scene_of
-from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description.scene import Scene
+from linkage_ros.bag import Bag, Layout
+from linkage_ros.cli import add_trust, scene_of, show_progress
+from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.signals import StoppedError
-from linkage_ros.tools.view.report.blocks import Progress
-from linkage_ros.tools.view.report.reading import read_run
-from linkage_ros.tools.view.report.run import ReportedRun, Window
+from linkage_ros.tools.view.report import Progress, read_run, ReportedRun, Window
 
 _MIB = 2**20
 

@@ -23,25 +23,31 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.contents import layout_of
-from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.arguments import add_bag, add_output, DEGREES, output_or
-from linkage_ros.cli.bag_reading import (
+from linkage_ros.bag import Bag, layout_of
+from linkage_ros.cli import (
+    add_bag,
+    add_output,
     bag_json,
+    bag_tables,
+    DEGREES,
     describe_gaps,
     open_bag,
+    output_or,
     path_beside,
     scene_json,
 )
-from linkage_ros.cli.info import bag_tables
-from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.scene import Scene
+from linkage_ros.description import atomic_write, Scene
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
-from linkage_ros.tools.view.report.html import ReportHeader, run_html, TableOf
-from linkage_ros.tools.view.report.labels import seconds_text
-from linkage_ros.tools.view.report.run import ReportedRun, Window
+from linkage_ros.tools.view.report import (
+    ReportedRun,
+    ReportHeader,
+    run_html,
+    seconds_text,
+    TableOf,
+    Window,
+)
 
 EXAMPLE = 'linkage report my_bag -o my_bag.html'
 

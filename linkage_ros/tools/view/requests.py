@@ -22,8 +22,7 @@ from functools import lru_cache, partial
 import json
 from typing import Any, NamedTuple, NoReturn
 
-from linkage_ros.description.linkage_file import FARTHEST, read_closure
-from linkage_ros.description.yaml_file import parse_yaml
+from linkage_ros.description import FARTHEST, parse_yaml, read_closure
 from linkage_ros.errors import (
     did_you_mean,
     escape_unprintable,
@@ -33,7 +32,7 @@ from linkage_ros.errors import (
     quote,
     shorten,
 )
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.tools.view.edit import edit_text, pin_of
 from linkage_ros.tools.view.exports import export_linkage

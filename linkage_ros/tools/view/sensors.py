@@ -20,13 +20,12 @@ from dataclasses import replace
 from math import floor
 from typing import Any, NamedTuple
 
-from linkage_ros.description.scene import SceneLinkage
-from linkage_ros.description.scene_file import parse_scene, SCENE_FILE
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.stages.effects.stage import FORCE_EFFECTS, SensorReading
-from linkage_ros.tick.pipeline import LinkagePipeline
-from linkage_ros.tools.view.report.data import link_poses
+from linkage_ros.description import parse_scene, SCENE_FILE, SceneLinkage
+from linkage_ros.kinematics import Closure
+from linkage_ros.stages.drives import TopicDrive, TopicParameters
+from linkage_ros.stages.effects import FORCE_EFFECTS, SensorReading
+from linkage_ros.tick import LinkagePipeline
+from linkage_ros.tools.view.report import link_poses
 import numpy as np
 
 _NANOSECONDS = 1_000_000_000

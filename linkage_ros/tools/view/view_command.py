@@ -25,11 +25,9 @@ from threading import Event, Thread
 from typing import Any, NamedTuple
 import webbrowser
 
-from linkage_ros.bag.other_formats import is_bag_name
-from linkage_ros.cli.arguments import add_output
-from linkage_ros.description.linkage_file import read_closure
-from linkage_ros.description.scene_file import kind_of, load_scene, SCENE_FILE
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.bag import is_bag_name
+from linkage_ros.cli import add_output
+from linkage_ros.description import kind_of, load_scene, read_closure, read_yaml, SCENE_FILE
 from linkage_ros.errors import (
     check_installed,
     escape_unprintable,
@@ -38,7 +36,7 @@ from linkage_ros.errors import (
 )
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.signals import heed_signals
-from linkage_ros.tools.view.report.run import Window
+from linkage_ros.tools.view.report import Window
 from linkage_ros.tools.view.report_command import bag_page, check_page, write_page
 
 EXAMPLE = 'linkage view jansen_leg -o jansen_leg.html'

@@ -28,9 +28,7 @@ import subprocess
 from typing import Any
 import warnings
 
-from linkage_ros.bag.metadata import DISCARDED
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.topic import CHANNELS_FILE
+from linkage_ros.bag import Bag, CHANNELS_FILE, DISCARDED, read_bag
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message

@@ -21,21 +21,14 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.bag.metadata import UNFINISHED_DATA
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag import BagWriter, read_bag, Storage, UNFINISHED_DATA
 from linkage_ros.cli.main import main
-from linkage_ros.description.scene_file import load_scene
-from linkage_ros.messages.single_values import text_message
-from linkage_ros.node.bag_topics import bag_topic
-from linkage_ros.node.run_recording import RunRecording
-from linkage_ros.replay.replay import change_text
-from linkage_ros.replay.run_files import EXTRA
-from linkage_ros.replay.topic_description import message_type
-from linkage_ros.tick.pipeline import Pipeline
-from linkage_ros.tick.tick_loop import TickLoop
-from linkage_ros.tools.study.prices import turn_crank
+from linkage_ros.description import load_scene
+from linkage_ros.messages import text_message
+from linkage_ros.node import bag_topic, RunRecording
+from linkage_ros.replay import change_text, EXTRA, message_type
+from linkage_ros.tick import Pipeline, TickLoop
+from linkage_ros.tools.study import turn_crank
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

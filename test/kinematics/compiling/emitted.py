@@ -20,10 +20,9 @@ import subprocess
 from tempfile import mkdtemp
 from typing import NamedTuple
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.trace import motion_at
-from linkage_ros.tools.models.source_code.c import C
-from linkage_ros.tools.models.source_code.source import FUNCTIONS, STATUSES, Subject, write_source
+from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics.compiling import motion_at
+from linkage_ros.tools.models.source_code import C, FUNCTIONS, STATUSES, Subject, write_source
 import pytest
 
 COMPILERS = {'C99': ('cc', '-x', 'c', '-std=c99'), 'C++': ('c++', '-x', 'c++', '-std=c++11')}

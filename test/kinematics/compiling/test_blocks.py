@@ -17,20 +17,19 @@ import re
 from typing import Any
 
 from campaigns.topologies.families import FAMILIES
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.dynamics.loads import Loads
-from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import sin, sqrt
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction
-from linkage_ros.kinematics.compiling.python import compile_function, python_source
-from linkage_ros.kinematics.compiling.tape import Tape
-from linkage_ros.kinematics.compiling.trace import TracedMotion
-from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Closure, Limits, sin, sqrt, Status
+from linkage_ros.kinematics.compiling import (
+    ArrayForm,
+    BlockFunction,
+    compile_function,
+    Compiled,
+    python_source,
+    Tape,
+    TracedMotion,
+)
 import numpy as np
 import pytest
 

@@ -15,10 +15,8 @@ import random
 
 from campaigns.topologies.families import FAMILIES
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
-from linkage_ros.tools.models.source_code.c import C
-from linkage_ros.tools.models.source_code.source import write_source
+from linkage_ros.kinematics import Closure, Limits, RevoluteJoint
+from linkage_ros.tools.models.source_code import C, write_source
 import pytest
 
 from .emitted import (

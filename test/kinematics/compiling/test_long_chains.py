@@ -10,9 +10,8 @@
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.tape import Tape
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics import Closure, Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics.compiling import Tape
 import numpy as np
 import pytest
 

@@ -17,9 +17,13 @@ from pathlib import Path
 import subprocess
 from typing import Any
 
-from linkage_ros.tools.models.source_code.javascript import JavaScript
-from linkage_ros.tools.models.source_code.python_module import PythonModule
-from linkage_ros.tools.models.source_code.source import FUNCTIONS, Subject, write_source
+from linkage_ros.tools.models.source_code import (
+    FUNCTIONS,
+    JavaScript,
+    PythonModule,
+    Subject,
+    write_source,
+)
 import pytest
 
 from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told

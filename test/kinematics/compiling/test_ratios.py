@@ -10,8 +10,7 @@
 
 from pathlib import Path
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Ratio
+from linkage_ros.kinematics import Closure, Ratio
 import pytest
 
 from .emitted import COUNT, needs, plain, run_c, states, subject

@@ -10,9 +10,8 @@
 
 from pathlib import Path
 
-from linkage_ros.description.linkage_file import read_linkage
-from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.kinematics import Closure
 
 FOLDER = Path(__file__).parent
 

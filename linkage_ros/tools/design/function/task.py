@@ -28,8 +28,7 @@ from math import degrees, floor, isfinite, log10, nan, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import quote, SynthesisError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics import Closure, InputSweep
 from linkage_ros.tools.design.design import Design, ROCKER
 from linkage_ros.tools.design.function.expression import Array, Expression, formula_name
 from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar

@@ -47,7 +47,7 @@ from math import cos, hypot, log10, pi, sin
 from typing import Literal, NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.arithmetic import SMALLEST, UNIT_ROUNDOFF
+from linkage_ros.kinematics import SMALLEST, UNIT_ROUNDOFF
 from linkage_ros.tools.design.design import Design, FourBar
 from linkage_ros.tools.design.double_double import (
     add,

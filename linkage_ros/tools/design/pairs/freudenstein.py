@@ -43,7 +43,7 @@ from math import degrees, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
+from linkage_ros.kinematics import UNIT_ROUNDOFF
 from linkage_ros.tools.design.design import Design, DesignRequest, FARTHEST, FourBar, SHORTEST
 from linkage_ros.tools.design.double_double import (
     add,

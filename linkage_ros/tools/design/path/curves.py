@@ -32,7 +32,7 @@ from math import degrees, inf, isfinite, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch import Array, Complex, Mask
+from linkage_ros.kinematics import Array, Complex, Mask
 from linkage_ros.tools.design.design import FARTHEST, SHORTEST
 import numpy as np
 from numpy.typing import NDArray

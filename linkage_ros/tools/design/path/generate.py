@@ -40,7 +40,7 @@ from math import remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch import Array, Complex, Mask
+from linkage_ros.kinematics import Array, Complex, Mask
 from linkage_ros.tools.design.design import Design, DesignRequest, FourBar
 from linkage_ros.tools.design.path.curves import (
     Aim,

@@ -29,7 +29,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import tau
 
-from linkage_ros.kinematics.batch import Array, Complex
+from linkage_ros.kinematics import Array, Complex
 from linkage_ros.tools.design.path.curves import (
     Aim,
     coupler_directions,

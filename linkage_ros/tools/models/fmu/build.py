@@ -24,10 +24,10 @@ from uuid import NAMESPACE_URL, uuid5
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from linkage_ros import __version__
-from linkage_ros.description.scene import Scene
+from linkage_ros.description import Scene
 from linkage_ros.errors import check_installed
 from linkage_ros.tools.models.fmu.stepped_scene import SteppedScene
-from linkage_ros.tools.models.source_code.languages import c_name
+from linkage_ros.tools.models.source_code import c_name
 
 _MODULE = 'linkage_fmu.py'
 

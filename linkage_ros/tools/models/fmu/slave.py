@@ -18,8 +18,7 @@ from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element
 
 from linkage_ros import __version__
-from linkage_ros.description.file_access import read_regular
-from linkage_ros.description.scene_file import parse_scene
+from linkage_ros.description import parse_scene, read_regular
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.models.fmu.border import guard_call, GuardedSlave, SlaveState
 from linkage_ros.tools.models.fmu.stepped_scene import (

@@ -22,15 +22,19 @@ from itertools import islice
 from math import isfinite
 from typing import NamedTuple
 
-from linkage_ros.description.scene import Scene, SceneLinkage
+from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, list_names
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues
-from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stages.drives.drive import DRIVES
-from linkage_ros.stages.effects.stage import PUBLISHED_WITH
-from linkage_ros.tick.pipeline import LinkagePipeline, LinkageState, Pipeline
+from linkage_ros.kinematics import Status
+from linkage_ros.messages import (
+    JOINT_STATE_TYPE,
+    JointStateWriter,
+    MessageValues,
+    NANOSECONDS,
+    Rejection,
+)
+from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.effects import PUBLISHED_WITH
+from linkage_ros.tick import LinkagePipeline, LinkageState, Pipeline
 
 FIRST_TICK = NANOSECONDS
 """Time of the first tick, in [ns]; not 0, since a sample stamped 0 is rejected as unstamped."""
@@ -207,7 +211,7 @@ class MotorOutputs:
         ]
         self.values = [0.0] * len(fields)
         """The newest values, in the order of the variables; 0 before the first."""
-        self._writer, self._read = writer, MessageValues(JOINT_STATE).read
+        self._writer, self._read = writer, MessageValues(JOINT_STATE_TYPE).read
 
     def set_messages(self, messages: Sequence[bytes]) -> None:
         """Take the auxiliary messages of a tick."""

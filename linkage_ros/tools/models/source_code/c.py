@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from linkage_ros.kinematics.compiling.tape import Operation
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import Status
+from linkage_ros.kinematics.compiling import Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,

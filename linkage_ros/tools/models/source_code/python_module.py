@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from linkage_ros.kinematics.compiling.tape import Operation
+from linkage_ros.kinematics.compiling import Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,

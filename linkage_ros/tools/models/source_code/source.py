@@ -24,16 +24,26 @@ import textwrap
 from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros import __version__
-from linkage_ros.kinematics.arithmetic import ROUNDING, SMALLEST
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.real_program import compile_program, Program
-from linkage_ros.kinematics.compiling.tape import Operation
-from linkage_ros.kinematics.compiling.trace import DecisionBranch, SolvedLeaf, TracedMotion, Tree
-from linkage_ros.kinematics.compiling.writer import count_uses, TextWriter
-from linkage_ros.kinematics.doubles import SHRINK
-from linkage_ros.kinematics.limits import Bound
-from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics import (
+    Bound,
+    Closure,
+    RevoluteJoint,
+    ROUNDING,
+    SHRINK,
+    SMALLEST,
+    Status,
+)
+from linkage_ros.kinematics.compiling import (
+    compile_program,
+    count_uses,
+    DecisionBranch,
+    Operation,
+    Program,
+    SolvedLeaf,
+    TextWriter,
+    TracedMotion,
+    Tree,
+)
 from linkage_ros.names import comment_text
 
 WIDTH = 99
@@ -331,17 +341,19 @@ class _SourceBody:
         """Write that a value is beyond its limits, as `Bound.is_beyond` does."""
         language = self._language
 
-        def compared(value: str) -> str:
+        def compare_with_bounds(value: str) -> str:
             low, high = language.write_constant(bound.low), language.write_constant(bound.high)
             return f'({value} < {low} {language.disjunction} {value} > {high})'
 
         if bound.middle is None:
-            return compared(name)
+            return compare_with_bounds(name)
         middle, turn = language.write_constant(bound.middle), language.write_constant(tau)
         turns = f'{language.nearest}(({name} - {middle}) / {turn})'
         turned = f'{name}_turned'
         self._writer.lines.append(language.assign(turned, f'{name} - {turn} * {turns}'))
-        return f'({compared(name)} {language.conjunction} {compared(turned)})'
+        return (
+            f'({compare_with_bounds(name)} {language.conjunction} {compare_with_bounds(turned)})'
+        )
 
     def _constant_text(self, value: float) -> str:
         text = self._language.write_constant(value)

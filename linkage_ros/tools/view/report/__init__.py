@@ -6,8 +6,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""
-A run as an HTML page: the bag is read once, its curves are decimated, and a browser shows them.
+"""The page of a recorded run."""
 
-Memory and page size are bounded, whatever the size of the bag; minima and maxima are kept.
-"""
+from linkage_ros.faces import lazy_names
+
+__getattr__, __dir__, __all__ = lazy_names(__name__)

@@ -19,8 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from linkage_ros.bag.contents import Contents, RECORD_SIZE, Tallies
-from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag import Bag, BagMessage, Contents, RECORD_SIZE, Tallies
 from linkage_ros.errors import BagError
 from linkage_ros.tools.view.report.decimation import Times
 import numpy as np

@@ -28,11 +28,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from linkage_ros.description.scene import Scene
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.messages.joint_values import MessageContent, MessageValues, WRENCHES
-from linkage_ros.messages.wrench import read_wrench
-from linkage_ros.replay.verify import turning_joints
+from linkage_ros.description import Scene
+from linkage_ros.messages import MessageContent, MessageValues, read_wrench, Rejection, WRENCHES
+from linkage_ros.replay import turning_joints
 from linkage_ros.tools.view.report.decimation import (
     DecimatedCurves,
     Decimation,

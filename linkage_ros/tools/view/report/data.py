@@ -30,15 +30,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.link_frames import separate_blocks
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.shapes import COLOURS, FACES, frames_of_links, INK
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.drawing.drawing_data import drawn_in_frames
-from linkage_ros.tools.models.part import prefix_names
-from linkage_ros.tools.models.tree import grow_tree, Tree
+from linkage_ros.kinematics import (
+    Closure,
+    COLOURS,
+    FACES,
+    frames_of_links,
+    GROUND,
+    INK,
+    prepare_view,
+    separate_blocks,
+    usual_inputs,
+)
+from linkage_ros.tools.drawing import drawn_in_frames
+from linkage_ros.tools.models import grow_tree, prefix_names, Tree
 from linkage_ros.tools.view.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.tools.view.report.labels import (
     EVENT_TRACKS,

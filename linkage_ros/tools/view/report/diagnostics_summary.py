@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from linkage_ros.messages.layout import MalformedError, parse_declaration, parse_message
+from linkage_ros.messages import MalformedError, parse_declaration, parse_message
 from linkage_ros.tools.view.report.labels import shorten_text
 from linkage_ros.tools.view.report.run import EventTrack
 

@@ -19,7 +19,7 @@ from html import escape
 from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.tools.view.pages.document import facts_html, html_document, table_html
+from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 from linkage_ros.tools.view.report.data import (
     event_tracks,
     facts_of_thinning,

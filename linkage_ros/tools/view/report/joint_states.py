@@ -20,8 +20,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from linkage_ros.messages.joint_state import arrays_of, Rejection
-from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages import arrays_of, NANOSECONDS, Rejection
 from linkage_ros.tools.view.report.decimation import Flags, Numbers, Times
 import numpy as np
 from numpy.typing import NDArray

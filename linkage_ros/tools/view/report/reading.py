@@ -18,20 +18,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from linkage_ros.bag.contents import Contents
-from linkage_ros.bag.reader import Bag
-from linkage_ros.bag.run_events import (
+from linkage_ros.bag import (
+    Bag,
+    Contents,
     missing_start_reason,
     read_raw_metadata,
     read_run_metadata,
     RunMetadata,
 )
-from linkage_ros.description.scene import Scene
+from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.batch import CODES
-from linkage_ros.kinematics.status import Status
-from linkage_ros.messages.joint_values import JOINT_STATE, WRENCHES
-from linkage_ros.replay.replay import own_joint_states, recorded_scene
+from linkage_ros.kinematics import CODES, Status
+from linkage_ros.messages import JOINT_STATE_TYPE, WRENCHES
+from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.tools.view.report.blocks import (
     Blocks,
     Entry,
@@ -78,7 +77,7 @@ class ForeignRun:
     """Reads the window of a bag without a scene, block by block."""
 
     def __init__(self, bag: Bag, window: Window) -> None:
-        found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE]
+        found = [topic.name for topic in bag.topics if topic.type == JOINT_STATE_TYPE]
         self._window, self._clock = window, RunClock(_DISORDER)
         self.topics = set(found[:_MOST_TOPICS])
         self._more = found[_MOST_TOPICS:]

@@ -21,8 +21,8 @@ from itertools import pairwise
 from operator import attrgetter
 from typing import NamedTuple
 
-from linkage_ros.bag.contents import Contents
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.bag import Contents
+from linkage_ros.kinematics import Closure
 from linkage_ros.tools.view.report.decimation import Histogram, Intervals, Numbers, Times
 from linkage_ros.tools.view.report.labels import shorten_text, size_in_json
 import numpy as np

@@ -11,10 +11,8 @@
 from __future__ import annotations
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.curves import Curve, unwrap_angles
-from linkage_ros.kinematics.pose_view import prepare_view
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.tools.drawing.animation import AnimatedMotion, count_of
+from linkage_ros.kinematics import Curve, prepare_view, unwrap_angles, usual_inputs
+from linkage_ros.tools.drawing import AnimatedMotion, count_of
 from linkage_ros.tools.view.report.data import link_poses
 from linkage_ros.tools.view.report.decimation import Numbers
 from linkage_ros.tools.view.report.run import ReportedRun

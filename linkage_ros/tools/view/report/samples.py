@@ -18,13 +18,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from linkage_ros.bag.reader import Bag
-from linkage_ros.description.scene import Scene
+from linkage_ros.bag import Bag
+from linkage_ros.description import Scene
 from linkage_ros.errors import BagError
-from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.replay.replay import read_change, turn_fault
-from linkage_ros.stages.drives.dependent_samples import crank_of, sampled_inverse
-from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
+from linkage_ros.messages import Rejection
+from linkage_ros.replay import read_change, turn_fault
+from linkage_ros.stages.drives import crank_of, sampled_inverse
+from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.view.report.blocks import MessageRows
 from linkage_ros.tools.view.report.decimation import Flags, Numbers, Times
 from linkage_ros.tools.view.report.labels import shorten_text

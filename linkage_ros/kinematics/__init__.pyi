@@ -1,0 +1,195 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+from linkage_ros.kinematics.arithmetic import (
+    all_finite as all_finite,
+    call as call,
+    copysign as copysign,
+    cross_product as cross_product,
+    has_result as has_result,
+    make_vector as make_vector,
+    remainder as remainder,
+    ROUNDING as ROUNDING,
+    sin as sin,
+    SMALLEST as SMALLEST,
+    sqrt as sqrt,
+    UNIT_ROUNDOFF as UNIT_ROUNDOFF,
+    unit_vector as unit_vector,
+    where as where,
+)
+from linkage_ros.kinematics.assembly_modes import (
+    other_assemblies as other_assemblies,
+    STARTS as STARTS,
+)
+from linkage_ros.kinematics.batch import (
+    Array as Array,
+    Batch as Batch,
+    CODES as CODES,
+    Complex as Complex,
+    Mask as Mask,
+)
+from linkage_ros.kinematics.built_once import (
+    BUILD_LOCK as BUILD_LOCK,
+    BuiltProperty as BuiltProperty,
+)
+from linkage_ros.kinematics.closure import Closure as Closure
+from linkage_ros.kinematics.crank_branches import CrankBranch as CrankBranch
+from linkage_ros.kinematics.curves import (
+    Curve as Curve,
+    drawn_once as drawn_once,
+    sweep_range as sweep_range,
+    traced_carriers as traced_carriers,
+    unwrap_angles as unwrap_angles,
+)
+from linkage_ros.kinematics.doubles import (
+    HUGE as HUGE,
+    SHRINK as SHRINK,
+    to_double as to_double,
+    to_doubles as to_doubles,
+)
+from linkage_ros.kinematics.drawn_pose import read_drawn_pose as read_drawn_pose
+from linkage_ros.kinematics.dyads.rpr import (
+    RPRDyad as RPRDyad,
+    RPRPose as RPRPose,
+    swivel_diagonal as swivel_diagonal,
+)
+from linkage_ros.kinematics.dyads.rrr import (
+    crank_diagonal as crank_diagonal,
+    RRRDyad as RRRDyad,
+    RRRPose as RRRPose,
+)
+from linkage_ros.kinematics.equations import (
+    BodyDirection as BodyDirection,
+    CoincidentPoints as CoincidentPoints,
+    Constraint as Constraint,
+    End as End,
+    evaluate_constraints as evaluate_constraints,
+    OnLine as OnLine,
+    Parallel as Parallel,
+    point_in_line_frame as point_in_line_frame,
+)
+from linkage_ros.kinematics.grashof import (
+    CHANGE_POINTS as CHANGE_POINTS,
+    four_bar_type as four_bar_type,
+    four_bars as four_bars,
+    FourBarType as FourBarType,
+    GRASHOF as GRASHOF,
+    TRIPLE_ROCKERS as TRIPLE_ROCKERS,
+)
+from linkage_ros.kinematics.inverse_closure import InverseClosure as InverseClosure
+from linkage_ros.kinematics.limits import Bound as Bound
+from linkage_ros.kinematics.link_frames import separate_blocks as separate_blocks
+from linkage_ros.kinematics.linkage import (
+    AssemblyPose as AssemblyPose,
+    GROUND as GROUND,
+    Input as Input,
+    Limits as Limits,
+    Linkage as Linkage,
+    links_by_point as links_by_point,
+    Mass as Mass,
+    NO_LIMITS as NO_LIMITS,
+    Point as Point,
+    Ratio as Ratio,
+    RevoluteJoint as RevoluteJoint,
+    Side as Side,
+    SlideJoint as SlideJoint,
+    Slider as Slider,
+    without_limits as without_limits,
+)
+from linkage_ros.kinematics.pose_view import (
+    all_places as all_places,
+    LinkageView as LinkageView,
+    pose_text as pose_text,
+    prepare_view as prepare_view,
+    SAME_ANGLE as SAME_ANGLE,
+    symbol_size as symbol_size,
+)
+from linkage_ros.kinematics.ranges import (
+    describe_ranges as describe_ranges,
+    golden_section as golden_section,
+    is_iterated as is_iterated,
+    link_lengths as link_lengths,
+    slide_bound as slide_bound,
+)
+from linkage_ros.kinematics.results import (
+    Acceleration as Acceleration,
+    InputRange as InputRange,
+    PointMotion as PointMotion,
+    Position as Position,
+    SingularInput as SingularInput,
+    SingularityMargin as SingularityMargin,
+    Velocity as Velocity,
+)
+from linkage_ros.kinematics.shapes import (
+    bar_size as bar_size,
+    bounding_corners as bounding_corners,
+    carried_shapes as carried_shapes,
+    Circle as Circle,
+    COLOURS as COLOURS,
+    convex_hull as convex_hull,
+    draw_shapes as draw_shapes,
+    draw_skeleton as draw_skeleton,
+    driven_links as driven_links,
+    FACES as FACES,
+    frames_of_links as frames_of_links,
+    INK as INK,
+    LinkFrame as LinkFrame,
+    Polygon as Polygon,
+    round_corners as round_corners,
+    Segment as Segment,
+    Shape as Shape,
+    shape_outline as shape_outline,
+)
+from linkage_ros.kinematics.sides import (
+    assembly_sides as assembly_sides,
+    closes_in_two_ways as closes_in_two_ways,
+    closing_name as closing_name,
+    sides_at as sides_at,
+    without_drawn_pose as without_drawn_pose,
+    written_sides as written_sides,
+)
+from linkage_ros.kinematics.singularity_margin import signed_distance as signed_distance
+from linkage_ros.kinematics.solved_links import Angle as Angle, SolvedLinks as SolvedLinks
+from linkage_ros.kinematics.status import Status as Status
+from linkage_ros.kinematics.step import (
+    FixedPoint as FixedPoint,
+    LinkState as LinkState,
+    PLACED as PLACED,
+    PointOnLink as PointOnLink,
+    PointOnRail as PointOnRail,
+    RelativeAngle as RelativeAngle,
+    Step as Step,
+)
+from linkage_ros.kinematics.sweep_analysis import (
+    check_closes as check_closes,
+    check_limits as check_limits,
+    check_turns as check_turns,
+    conditioning_curves as conditioning_curves,
+    Extreme as Extreme,
+    find_extremes as find_extremes,
+    grid_positions as grid_positions,
+    InputSweep as InputSweep,
+    pose_alone as pose_alone,
+    sample_inputs as sample_inputs,
+    starts_at_pose as starts_at_pose,
+    SweptCurve as SweptCurve,
+    transmission_angles as transmission_angles,
+    usual_inputs as usual_inputs,
+    worst_residual as worst_residual,
+)
+from linkage_ros.kinematics.topology import (
+    assur_groups as assur_groups,
+    count_mobility as count_mobility,
+    Driven as Driven,
+    Dyad as Dyad,
+    Group as Group,
+    Iterated as Iterated,
+    Joint as Joint,
+    links_of as links_of,
+    Structure as Structure,
+)

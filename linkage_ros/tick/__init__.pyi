@@ -1,0 +1,26 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+from linkage_ros.tick.compiled_tick import CompiledState as CompiledState, StateTuple as StateTuple
+from linkage_ros.tick.pipeline import (
+    LinkagePipeline as LinkagePipeline,
+    LinkageState as LinkageState,
+    Pipeline as Pipeline,
+    Tick as Tick,
+)
+from linkage_ros.tick.sample_router import SampleRouter as SampleRouter
+from linkage_ros.tick.tick_loop import (
+    Counts as Counts,
+    DurationHistogram as DurationHistogram,
+    Pace as Pace,
+    RecordedTopics as RecordedTopics,
+    Stall as Stall,
+    TakeMessage as TakeMessage,
+    TickLoop as TickLoop,
+    WrenchCounts as WrenchCounts,
+)

@@ -1,0 +1,51 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+from linkage_ros.tools.drawing.animation import (
+    animate as animate,
+    AnimatedMotion as AnimatedMotion,
+    ANIMATION_KINDS as ANIMATION_KINDS,
+    check_kind as check_kind,
+    count_of as count_of,
+    range_motion as range_motion,
+    RATE as RATE,
+)
+from linkage_ros.tools.drawing.drawing_data import (
+    drawn_in_frames as drawn_in_frames,
+    pose_in_frames as pose_in_frames,
+)
+from linkage_ros.tools.drawing.dxf import links_dxf as links_dxf
+from linkage_ros.tools.drawing.figure import (
+    assemblies_picture as assemblies_picture,
+    paint_background as paint_background,
+    paint_picture as paint_picture,
+)
+from linkage_ros.tools.drawing.painting import (
+    degree_step as degree_step,
+    GHOST as GHOST,
+    Label as Label,
+    LAYERS as LAYERS,
+    NameLabels as NameLabels,
+    OTHER as OTHER,
+    OTHER_TEXT as OTHER_TEXT,
+    paint_shapes as paint_shapes,
+    picture_settings as picture_settings,
+    place_labels as place_labels,
+    plot_places as plot_places,
+    save_picture as save_picture,
+    set_plane as set_plane,
+    TRACE as TRACE,
+    WANTED as WANTED,
+)
+from linkage_ros.tools.drawing.plot_command import (
+    crank_curves as crank_curves,
+    curves_over_time as curves_over_time,
+    is_after_gap as is_after_gap,
+)
+from linkage_ros.tools.drawing.spread import draw_spread as draw_spread, JointSpread as JointSpread
+from linkage_ros.tools.drawing.svg_picture import svg as svg
