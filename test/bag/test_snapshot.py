@@ -165,7 +165,7 @@ def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
     memory = memory()
     for message in messages[:5000]:
         memory.offer(*message)
-    kept = memory.take()
+    kept = memory.take_content()
     assert list(kept.messages()) == [tuple(message) for message in messages[:5000]]
     assert kept.whole
     assert [(c.received, c.kept) for c in memory.stop()] == [(2500, 2500), (2500, 2500)]
@@ -175,7 +175,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
     memory = memory(1.0)
     for message in messages:
         memory.offer(*message)
-    kept = memory.take()
+    kept = memory.take_content()
     assert not kept.whole
     counts = memory.read_counts()
     assert closes(counts)
@@ -201,9 +201,9 @@ def test_threads_that_offer_at_once_lose_no_count(memory, messages):
         thread.start()
     while any(thread.is_alive() for thread in threads):
         assert closes(memory.read_counts())
-        kept = memory.take()
+        kept = memory.take_content()
         assert len(list(kept.messages())) == sum(kept.counts)
-    kept = memory.take()
+    kept = memory.take_content()
     counts = memory.stop()
     assert closes(counts)
     assert [c.received for c in counts] == [10_000, 10_000]
@@ -216,7 +216,7 @@ def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
     impossible = [messages[2]._replace(log_time=-1), messages[3]._replace(publish_time=2**63)]
     for message in [*messages[:2], *impossible, *messages[4:6]]:
         memory.offer(*message)
-    assert list(memory.take().messages()) == [tuple(m) for m in (*messages[:2], *messages[4:6])]
+    assert list(memory.take_content().messages()) == [tuple(m) for m in (*messages[:2], *messages[4:6])]
     assert [(c.received, c.kept, c.dropped) for c in memory.stop()] == [(3, 2, 1), (3, 2, 1)]
 
 
@@ -252,14 +252,14 @@ def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
 
     memory = memory()
     memory.offer(*messages[0])
-    memory.take()
+    memory.take_content()
     monkeypatch.setattr(memory._last, 'add', broken)
     memory.offer(*messages[1])
     memory._thread.join(20)
     memory.offer(*messages[2])
     assert 'ended early: ZeroDivisionError: a slip; please report this' in str(memory.failure)
     with pytest.raises(RecordingError, match='a slip'):
-        memory.take()
+        memory.take_content()
     assert [(c.received, c.kept, c.discarded, c.dropped) for c in memory.stop()] == [
         (2, 0, 1, 1),
         (1, 0, 1, 0),
@@ -273,7 +273,7 @@ def test_after_the_end_nothing_is_kept(memory, messages):
     memory.offer(*messages[0])
     assert [c.dropped for c in memory.read_counts()] == [1, 0]
     with pytest.raises(RecordingError, match='has ended; ask while the node is active'):
-        memory.take()
+        memory.take_content()
 
 
 # The bags.
@@ -300,7 +300,7 @@ def test_two_snapshots_are_two_bags_that_overlap(tmp_path, topics, messages, mem
         for message in messages[begin:end]:
             memory.offer(*message)
         folder = tmp_path / f'run_{index}'
-        kept = memory.take()
+        kept = memory.take_content()
         done = threading.Event()
         make = partial(BagWriter, folder, topics)
         outcome = SnapshotWriting(kept, make, done.set).wait()
@@ -323,7 +323,7 @@ def test_a_snapshot_is_packed_as_any_bag(tmp_path, topics, messages, memory, rea
         memory.offer(*message)
     storage = Storage(compression=compression, snapshot_seconds=1000.0)
     folder = tmp_path / 'run'
-    written(memory.take(), lambda: BagWriter(folder, topics, storage=storage))
+    written(memory.take_content(), lambda: BagWriter(folder, topics, storage=storage))
     readers.agree(folder, topics, messages[:2000])
     assert (folder / 'run_0.mcap').stat().st_size < 250_000
 
@@ -334,7 +334,7 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     memory = memory()
     for message in messages:
         memory.offer(*message)
-    kept = memory.take()
+    kept = memory.take_content()
     outcome = written(kept, lambda: BagWriter(small_disk / 'run', topics))
     assert outcome.failure.startswith(
         f'{small_disk}/run: the recording was interrupted: No space left on device; '
@@ -351,21 +351,21 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     with (small_disk / 'other').open('wb', buffering=0) as other, suppress(OSError):
         while True:
             other.write(bytes(4096))
-    outcome = written(memory.take(), lambda: BagWriter(small_disk / 'more', topics))
+    outcome = written(memory.take_content(), lambda: BagWriter(small_disk / 'more', topics))
     assert isinstance(outcome, RecordingError)
     assert 'cannot be recorded to: No space left on device' in str(outcome)
     assert not (small_disk / 'more').exists()
-    assert list(memory.take().messages()) == list(kept.messages())
+    assert list(memory.take_content().messages()) == list(kept.messages())
 
 
 def test_a_folder_that_cannot_be_made(tmp_path, topics, messages, memory):
     memory = memory()
     memory.offer(*messages[0])
     (tmp_path / 'file').write_text('')
-    outcome = written(memory.take(), lambda: BagWriter(tmp_path / 'file' / 'run', topics))
+    outcome = written(memory.take_content(), lambda: BagWriter(tmp_path / 'file' / 'run', topics))
     assert isinstance(outcome, RecordingError)
     assert 'Not a directory' in str(outcome)
-    outcome = written(memory.take(), lambda: BagWriter(tmp_path / 'run', topics))
+    outcome = written(memory.take_content(), lambda: BagWriter(tmp_path / 'run', topics))
     assert counts_of(outcome) == [(1, 1, 0), (0, 0, 0)]
 
 
@@ -390,11 +390,11 @@ def test_a_disk_that_stalls_stalls_nobody(tmp_path, topics, messages, memory, re
     for message in messages[:6000]:
         memory.offer(*message)
     writer = stalled(tmp_path / 'run', topics)
-    writing = SnapshotWriting(memory.take(), lambda: writer, lambda: None)
+    writing = SnapshotWriting(memory.take_content(), lambda: writer, lambda: None)
     for message in messages[6000:]:
         memory.offer(*message)
     # All offers are back, and in memory, and nothing has reached the disk.
-    assert sum(memory.take().counts) == len(messages)
+    assert sum(memory.take_content().counts) == len(messages)
     assert writing.outcome is None
     writer.answer.set()
     assert counts_of(writing.wait()) == [(3000, 3000, 0), (3000, 3000, 0)]
@@ -407,10 +407,10 @@ def test_a_disk_that_never_answers_is_given_up(tmp_path, topics, messages, memor
     for message in messages:  # more than a recorder is handed at once
         memory.offer(*message)
     writer = stalled(tmp_path / 'run', topics)
-    outcome = written(memory.take(), lambda: writer)
+    outcome = written(memory.take_content(), lambda: writer)
     assert 'the disk has not answered for 0.1 s' in outcome.failure
     assert counts_of(outcome) == [(6000, 0, 6000), (6000, 0, 6000)]
-    assert sum(memory.take().counts) == len(messages)
+    assert sum(memory.take_content().counts) == len(messages)
     writer.answer.set()
 
 
@@ -426,7 +426,7 @@ def test_a_disk_that_does_not_even_make_a_folder_is_given_up(
         answer.wait(30)
         raise RecordingError('run', 'too late', 'nobody reads this')
 
-    outcome = written(memory.take(), make)
+    outcome = written(memory.take_content(), make)
     assert 'does not answer' in str(outcome)
     answer.set()
 
@@ -434,7 +434,7 @@ def test_a_disk_that_does_not_even_make_a_folder_is_given_up(
 def test_an_error_nobody_thought_of_is_an_outcome_too(messages, memory):
     memory = memory()
     memory.offer(*messages[0])
-    outcome = written(memory.take(), lambda: 1 // 0)
+    outcome = written(memory.take_content(), lambda: 1 // 0)
     assert str(outcome).startswith('snapshot: ZeroDivisionError: ')
     assert str(outcome).endswith('please report this')
 
@@ -446,7 +446,7 @@ def test_a_bag_of_times_that_go_back_is_read_in_its_order(tmp_path, topics, mess
     for message in order:
         memory.offer(*message)
     folder = tmp_path / 'run'
-    outcome = written(memory.take(), lambda: BagWriter(folder, topics))
+    outcome = written(memory.take_content(), lambda: BagWriter(folder, topics))
     there = [message.data for message in read_bag(folder).messages()]
     begin = len(order) - len(there)
     assert there == [message.data for message in order[begin:]]
