@@ -60,7 +60,7 @@ LONGEST_TEST = 180.0
 """Time for one test, in [s]: a mutant that loops fails it."""
 KINEMATICS = 'kinematics', 'test_pipeline.py', 'solvers', 'drives/test_limits.py'
 DYNAMICS = 'dynamics', 'drives', 'effects/test_effort.py', 'effects/test_pin_forces.py'
-TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_straight_tick.py', 'solvers'
+TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py', 'solvers'
 BAG = ('bag',)
 TESTS: dict[str, Sequence[str]] = {
     'kinematics/closure': KINEMATICS,
@@ -74,11 +74,11 @@ TESTS: dict[str, Sequence[str]] = {
     'dynamics/motion': ('dynamics/test_motion.py', *DYNAMICS),
     'dynamics/mechanics': DYNAMICS,
     'dynamics/reactions': ('dynamics/test_reactions.py', *DYNAMICS),
-    'drives/topic': ('drives', 'test_pipeline.py'),
-    'drives/torque': ('drives', 'dynamics'),
-    'effects/delay': ('effects/test_delay.py', 'effects', 'test_contracts.py'),
-    'pipeline/pipeline': (*TICK, 'test_contracts.py', 'effects'),
-    'pipeline/tick_loop': (*TICK, 'node'),
+    'stages/drives/topic': ('drives', 'test_pipeline.py'),
+    'stages/drives/torque': ('drives', 'dynamics'),
+    'stages/effects/delay': ('effects/test_delay.py', 'effects', 'test_contracts.py'),
+    'tick/pipeline': (*TICK, 'test_contracts.py', 'effects'),
+    'tick/tick_loop': (*TICK, 'node'),
     'bag/writer': BAG,
     'bag/recorder': ('bag/test_recorder.py', *BAG),
     'bag/salvage': ('bag/test_salvage.py', *BAG),

@@ -212,7 +212,7 @@ def _inverse_table(
         if joint in closure.input_names:
             raise LinkageError(option, 'is an input', f'write --at {typed:g}')
         turning = closure.branches(joint)[0].turning
-        value = arguments.angles.read(typed) if turning else typed
+        value = arguments.angles.to_radians(typed) if turning else typed
         cranks = closure.cranks(joint, value)
         if not cranks:
             raise _unreached_error(closure, joint, value, option, arguments.angles)

@@ -167,7 +167,7 @@ def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
         memory.offer(*message)
     kept = memory.take_content()
     assert list(kept.messages()) == [tuple(message) for message in messages[:5000]]
-    assert kept.whole
+    assert kept.is_complete
     assert [(c.received, c.kept) for c in memory.stop()] == [(2500, 2500), (2500, 2500)]
 
 
@@ -176,7 +176,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
     for message in messages:
         memory.offer(*message)
     kept = memory.take_content()
-    assert not kept.whole
+    assert not kept.is_complete
     counts = memory.read_counts()
     assert closes(counts)
     assert tuple(c.kept for c in counts) == kept.counts

@@ -76,11 +76,11 @@ class Followed:
         self.bridge = bridge
 
     def newest(self, kind):
-        _, text = self.bridge.newest(kind)
+        _, text = self.bridge.newest_message(kind)
         return json.loads(text)[kind] if text else {}
 
     def ask(self, do, **content):
-        return self.bridge.ask({'do': do, **content}).result(20.0)
+        return self.bridge.send_request({'do': do, **content}).result(20.0)
 
     def wait_for_node(self, condition, what):
         return wait_for(lambda: (node := self.newest('node')) and condition(node), what)
@@ -199,13 +199,13 @@ def test_a_node_that_is_killed_is_said_and_one_that_starts_again_is_found(graph,
     node = start(scene)
     with bridged(graph, 'linkage_node') as followed:
         followed.wait_for_node(lambda node: node['there'], 'the node')
-        first, _ = followed.bridge.newest('model')
+        first, _ = followed.bridge.newest_message('model')
         node.end(signal.SIGKILL)
         followed.wait_for_node(lambda node: not node['there'], 'the end of the node')
         assert 'does not answer' in followed.ask('reset')
         start(scene)
         followed.wait_for_node(lambda node: node['there'], 'the node again')
-        wait_for(lambda: followed.bridge.newest('model')[0] > first, 'its linkage')
+        wait_for(lambda: followed.bridge.newest_message('model')[0] > first, 'its linkage')
         assert followed.newest('model')['name'] == 'live'
 
 

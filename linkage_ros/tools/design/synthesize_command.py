@@ -337,7 +337,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     except LinkageError as error:
         if arguments.angles.in_degrees:
             raise
-        told = arguments.angles.told
+        told = arguments.angles.convert_text
         raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
 
 
@@ -374,7 +374,7 @@ def find_solutions(
 
 def needs_of(typed: argparse.Namespace) -> Needs:
     """Return the requirements; if there are any, a solution must also be free of defects."""
-    needs = Needs(typed.need, typed.angles.read(typed.min_transmission), typed.max_link_ratio)
+    needs = Needs(typed.need, typed.angles.to_radians(typed.min_transmission), typed.max_link_ratio)
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())
 
@@ -410,7 +410,7 @@ def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
-    told = arguments.angles.told
+    told = arguments.angles.convert_text
     lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
     names = ' and '.join(one.name for one in answer.assessment.defects)
