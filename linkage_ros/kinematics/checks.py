@@ -32,15 +32,7 @@ _LEAST_RATIO = 1e-30
 
 
 def check_linkage(linkage: Linkage) -> None:
-    """
-    Refuse a linkage whose parts do not match.
-
-    Raises
-    ------
-    DefinitionError
-        With the key of the part and the remedy.
-
-    """
+    """Refuse a linkage whose parts do not match; the error names the key of the part."""
     if GROUND not in linkage.links:
         raise DefinitionError(
             'links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}'

@@ -324,13 +324,8 @@ class Closure:
         """
         Return the linkage compiled; for the same numbers it is compiled once.
 
-        Parameters
-        ----------
-        derivatives
-            Positions (0), velocities too (1), and accelerations (2).
-        wanted
-            Which numbers of these; all published joints if not given.
-
+        ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
+        selects the numbers; without it they are all published joints.
         """
         from linkage_ros.kinematics.compiling import (
             linkage,  # local import: they trace
@@ -468,18 +463,8 @@ class Closure:
         """
         Return the branches of a joint over the single input: on each it moves one way.
 
-        Parameters
-        ----------
-        joint
-            As in `driven_by`.
-        limited
-            Whether the limits of joints cut the branches.
-
-        Raises
-        ------
-        DefinitionError
-            As `driven_by`.
-
+        The joint is as in `driven_by`, and so are the errors. If ``limited``, limits of joints cut
+        the branches.
         """
         from linkage_ros.kinematics.crank_branches import (
             inverse_of,  # local import: only few ask for it
@@ -539,11 +524,7 @@ class Closure:
         """
         Return a tracker of certain points of links, which computes no others.
 
-        Parameters
-        ----------
-        points
-            Each with the name of its link, and where it lies in that link's frame, in [m].
-
+        Each point is the name of its link and its place in that link's frame, in [m].
         """
         from linkage_ros.kinematics.point_tracker import (
             PointTracker,  # local import: only forces need it

@@ -144,26 +144,12 @@ class CrankDiagonal:
     u·span·(F + terms of F)/(F·S), and alike from S. Chosen by their values alone, a needle lost
     8 u·κ where the transmission angle was near 90°.
 
-    Parameters
-    ----------
-    a, d
-        Lengths of OA and OD, in one unit; at best near 1.
-    fold, stretch
-        The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
-        the dyad has no upper limit.
-    limits
-        lower and upper, and the span, which their difference would cancel; upper and span may be
-        infinite.
-    arms
-        Indices, among the coordinates, of the directions of OA and OD.
-    offset
-        φ minus the difference of those two coordinates, in (−π, π] rad.
-
-    Attributes
-    ----------
-    along, quad, root
-        a·(d − a), 4ad and 2·√(ad), correctly rounded.
-
+    a and d are in one unit; at best near 1. ``fold`` and ``stretch`` are the margins |d − a| −
+    lower and upper − a − d, correctly rounded; stretch is infinite where the dyad has no upper
+    limit. ``limits`` are lower, upper and span; upper and span may be infinite. ``arms`` are the
+    indices, among the coordinates, of the directions of OA and OD. ``offset`` is φ minus their
+    difference, in (−π, π] rad. The attributes along, quad and root are a·(d − a), 4ad and 2·√(ad),
+    correctly rounded.
     """
 
     __slots__ = (
@@ -398,13 +384,8 @@ class NearlyCrossingDiagonal(CrankDiagonal):
     Its roots have the sign of the half angle, as those at the change point have. So the dyad stays
     next to the one without deviations, where a side alone would leave it.
 
-    Parameters
-    ----------
-    a, d, fold, stretch, limits, arms, offset
-        As in `CrankDiagonal`.
-    crosses
-        Whether the dyad without deviations changes its side where it folds and where it stretches.
-
+    ``crosses``: whether the dyad without deviations changes its side where it folds and where it
+    stretches.
     """
 
     __slots__ = ('_crosses',)
@@ -448,19 +429,10 @@ def crank_diagonal_of(
     """
     Return the diagonal between two pinned links, by the change points that it passes.
 
-    Parameters
-    ----------
-    a, d, limits
-        As in `CrankDiagonal`.
-    margins
-        Its margins fold and stretch.
-    hinge
-        Its arms and its offset.
-    turns_matter
-        Whether a whole turn may lead to another pose, and the whole turns are unknown.
-    crosses
-        The change points of the linkage without deviations; None for those of these lengths.
-
+    ``margins`` are its fold and stretch, ``hinge`` its arms and its offset, as in `CrankDiagonal`.
+    ``turns_matter``: whether a whole turn may lead to another pose, and the whole turns are
+    unknown. ``crosses`` are the change points of the linkage without deviations; None for the
+    change points of these lengths.
     """
     fold, stretch = margins
     if turns_matter:
@@ -474,13 +446,8 @@ class FreeDiagonal:
     """
     The diagonal between two pins, from their coordinates.
 
-    Parameters
-    ----------
-    ends
-        Indices of A and D among the pins.
-    limits
-        lower and upper of s, and upper² − lower², as in `CrankDiagonal`.
-
+    ``ends`` are the indices of A and D among the pins. ``limits`` are lower and upper of s, and
+    upper² − lower², as in `CrankDiagonal`.
     """
 
     __slots__ = ('_ends', '_limits')

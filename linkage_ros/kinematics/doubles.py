@@ -39,13 +39,8 @@ def to_double(what: str, value: Any, remedy: str = '') -> float:
     """
     Return a number as a double.
 
-    Raises
-    ------
-    TypeError
-        If it is not a number; the line begins with ``what`` and ends with the remedy.
-    ValueError
-        If it is masked.
-
+    What is not a number raises TypeError, and a masked number ValueError; the line begins with
+    ``what`` and ends with the remedy.
     """
     try:
         if hasattr(value, 'dtype'):

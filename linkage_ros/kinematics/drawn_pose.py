@@ -113,22 +113,10 @@ def drawn_signs(
     linkage: Linkage, plan: SolvedLinks, ways: Sequence[TwoWays]
 ) -> list[tuple[TwoWays, int]]:
     """
-    Return the signs with which dyads close as drawn; none if the pose says nothing of them.
+    Return the signs with which dyads close as drawn; none if the pose does not determine them.
 
-    Parameters
-    ----------
-    linkage
-        The linkage, with a pose.
-    plan
-        Its links and steps up to these dyads; those before are in their assembly.
-    ways
-        The dyads that close in two ways.
-
-    Raises
-    ------
-    DefinitionError
-        If the pose contradicts a side, does not tell two assemblies apart, or does not close.
-
+    ``plan`` has the links and steps up to these dyads, those before in their assembly. A pose that
+    contradicts a side, fits two assemblies or does not close raises DefinitionError.
     """
     pose = linkage.pose
     assert pose is not None, 'the caller has one'

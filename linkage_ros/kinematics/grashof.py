@@ -77,16 +77,8 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     Two shortest or two longest links cause no doubt: they make one of the inequalities impossible;
     at a change point they come in pairs.
 
-    Parameters
-    ----------
-    a, b, c, d
-        Lengths of input, coupler, output and frame, above 0.
-
-    Returns
-    -------
-    type : FourBarType
-        Without a code if one link is longer than the others together: there is no loop.
-
+    a, b, c and d are the lengths of input, coupler, output and frame, above 0. The type has no
+    code if one link is longer than the others together: there is no loop.
     """
     sides = (a, b, c, d)
     shortest, p, q, longest = sorted(sides)

@@ -36,13 +36,7 @@ class LinkFrames:
 
     Such a block has its frame at the slider's point, with the angle of the link it slides along.
 
-    Parameters
-    ----------
-    linkage, structure
-        The linkage, and its groups.
-    known
-        Its links, all of them known.
-
+    All links of ``known`` are known.
     """
 
     def __init__(self, linkage: Linkage, structure: Structure, known: SolvedLinks) -> None:

@@ -177,23 +177,13 @@ class Ratio:
 
 @dataclass(frozen=True, slots=True)
 class AssemblyPose:
-    """
-    The linkage as drawn, at some inputs; what it names tells the assembly.
+    """The linkage as drawn, at some inputs; what it names determines the assembly."""
 
-    Attributes
-    ----------
-    inputs
-        One value for each input, in [rad] or [m]; the linkage starts there.
-    points
-        Approximate places of points, in the frame of the ground, in [m]. Those of links that no
-        dyad covers are the initial guess of their iteration.
-    angles
-        Approximate angles of links to the ground, in [rad].
-
-    """
-
-    inputs: tuple[float, ...]
+    inputs: tuple[float, ...]  # Of each input, in [rad] or [m]; the linkage starts there
+    # Approximate places of points, in the frame of the ground, in [m]; points of links that no
+    # dyad covers are the initial guess of their iteration.
     points: Mapping[str, Point]
+    # Approximate angles of links to the ground, in [rad].
     angles: Mapping[str, float] = field(default_factory=dict)
 
     @property

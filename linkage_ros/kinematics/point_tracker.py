@@ -46,13 +46,8 @@ class PointTracker:
 
     Each method returns a list of every point on the way; the requested points are at `indices`.
 
-    Parameters
-    ----------
-    known
-        The links of a closure, all of them known.
-    points
-        Each with the name of its link and its place in the frame of that link, in [m].
-
+    All links of ``known`` are known. Each point is the name of its link and its place in that
+    link's frame, in [m].
     """
 
     __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')

@@ -238,18 +238,8 @@ def find_intervals(
     """
     Yield the parts of an interval in which a condition holds, such as that loops close.
 
-    Parameters
-    ----------
-    closes
-        Whether it holds at a value.
-    low, high
-        The interval.
-    samples
-        Number of samples.
-    margin
-        Margin by which it holds at a value, negative if it does not. Its valleys and summits
-        between samples are tested too; without it, parts narrower than a sample are missed.
-
+    ``margin`` is the margin by which it holds at a value, negative if it does not. Its valleys and
+    summits between samples are tested too; without it, parts narrower than a sample are missed.
     """
     values = [low + (high - low) * i / samples for i in range(samples)] + [high]
     known: dict[float, bool] = {}

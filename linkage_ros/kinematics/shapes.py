@@ -125,17 +125,10 @@ def draw_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[Shape]:
     """
-    Draw a linkage.
+    Return the shapes of a linkage at a position that closes.
 
-    Parameters
-    ----------
-    closure, position
-        The linkage, and a position that closes.
-    size
-        Half the width of a bar, in [m]; all symbols scale with it.
-    travels
-        Range of the slides, for the length of rails.
-
+    ``size`` is half the width of a bar, in [m]; all symbols scale with it. ``travels`` are the
+    ranges of the slides, for the length of rails.
     """
     return [shape for _, shape in carried_shapes(closure, position, size, travels)]
 

@@ -103,17 +103,7 @@ class SlideLine:
 
 
 class SolvedLinks:
-    """
-    The known links of a linkage; at first the ground.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its links and sliders.
-
-    """
+    """The known links of a linkage; at first the ground."""
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         self._linkage = linkage

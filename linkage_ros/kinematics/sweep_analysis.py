@@ -43,17 +43,8 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
     """
     Return a function that gives the pose of a step at inputs, in [rad] and [m].
 
-    Of a hundred independent loops on a crank it closes one.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    number
-        Number of the step.
-    *inputs
-        Inputs at which the linkage closes: they show where each step appends its results.
-
+    If a crank drives a hundred independent loops, it closes only one. ``inputs`` are inputs at
+    which the linkage closes: they show where each step appends its results.
     """
     needed = _needed_groups(closure, closure.step_groups[number])
     walked = closure.initial_state(*inputs)
@@ -155,15 +146,8 @@ class InputSweep:
     """
     A linkage as a function of one of its inputs; the others are held.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    held
-        Values of all inputs, in [rad] or [m]; not needed for a single input.
-    index
-        Number of the input that moves.
-
+    ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input;
+    ``index`` is the number of the input that moves.
     """
 
     def __init__(
@@ -518,15 +502,8 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
     """
     Return the worst residual over the range, or over a grid of several inputs.
 
-    Returns
-    -------
-    residual : float
-        In [m].
-    inputs : tuple[float, ...]
-        The inputs at which it occurs, in [rad] or [m].
-    count : int
-        Number of poses that were tried. None in place of all three if no loop closed.
-
+    The result is the residual in [m], its inputs in [rad] or [m], and the number of poses that
+    were tried; None if no loop closed.
     """
     if len(closure.linkage.inputs) > 1:
         tried = grid_positions(closure)

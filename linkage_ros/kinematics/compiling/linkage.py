@@ -65,17 +65,8 @@ class Compiled:
     straight-line code. Where that is not valid, at toggles, change points and where a loop is
     open, the plain steps answer.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    derivatives
-        0: positions; 1: velocities too; 2: accelerations too.
-    wanted
-        Selects the numbers; by default all published joints.
-    within_limits
-        Whether a state with a joint beyond its limits has the status limited.
-
+    ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. If
+    ``within_limits``, a state with a joint beyond its limits has the status limited.
     """
 
     def __init__(
@@ -124,11 +115,7 @@ class Compiled:
         """
         Return the first path as lines of Python, which are written once.
 
-        Parameters
-        ----------
-        bail_out
-            The statement that leaves the lines if the path is not valid.
-
+        ``bail_out`` is the statement that leaves the lines if the path is not valid.
         """
         if bail_out not in self._bodies:
             self._bodies[bail_out] = python_body(self.paths[0], bail_out)
@@ -136,18 +123,9 @@ class Compiled:
 
     def __call__(self, *numbers: float) -> CompiledAnswer:
         """
-        Return the answer at a state.
+        Return the answer at a state: inputs in [rad] or [m], then their rates, then accelerations.
 
-        Parameters
-        ----------
-        *numbers
-            The inputs, in [rad] or [m], then their rates and their accelerations.
-
-        Raises
-        ------
-        ValueError
-            If a rate or an acceleration is not finite.
-
+        A rate or an acceleration that is not finite raises ValueError.
         """
         values = self.fast(*numbers)
         if values is not None:

@@ -73,15 +73,7 @@ _BY_TANGENT = _tangent_is_close()
 
 
 class ArrayForm:
-    """
-    Rewrites the operations of a path.
-
-    Parameters
-    ----------
-    given
-        Rates and accelerations, by name, that are 0 or 1.
-
-    """
+    """Rewrites the operations of a path; ``given`` has the rates and accelerations of 0 or 1."""
 
     def __init__(self, given: Mapping[str, int]) -> None:
         self._given = given
@@ -392,17 +384,8 @@ class BlockFunction:
     """
     Numbers of a path for many states at once, computed in blocks through reused buffers.
 
-    Parameters
-    ----------
-    inputs
-        Names of the path's inputs.
-    arrays
-        Those that are arrays; the others are numbers.
-    roots
-        The numbers to compute.
-    condition
-        Where the numbers are valid.
-
+    ``inputs`` are the names of the path's inputs; of these ``arrays`` are arrays, and the others
+    numbers. ``roots`` are the numbers to compute, valid where ``condition`` holds.
     """
 
     def __init__(
@@ -433,23 +416,11 @@ class BlockFunction:
         self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask
     ) -> Mask | None:
         """
-        Compute the numbers of a block.
+        Compute the numbers of a block; return where the condition holds, None if it always does.
 
-        Parameters
-        ----------
-        given
-            The inputs.
-        out
-            An array for each root; its values are undefined where the condition does not hold.
-            Nothing is written if the condition holds for less than half of the states.
-        rows, masks
-            Scratch arrays, as long as the block.
-
-        Returns
-        -------
-        Mask | None
-            Where the condition holds, as a scratch array; None if it always does.
-
+        ``out`` has an array for each root; its values are undefined where the condition does not
+        hold, and nothing is written if it holds for less than half of the states. ``rows`` and
+        ``masks`` are scratch arrays, as long as the block; the result is one of the masks.
         """
         holds: Mask | None = self._run(given, out, rows, masks)
         return holds

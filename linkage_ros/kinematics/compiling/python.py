@@ -156,13 +156,8 @@ def compile_function(
     """
     Return a function as straight-line code, which gives the same bits.
 
-    Parameters
-    ----------
-    function
-        Takes numbers and returns numbers, and makes no decision by them.
-    values
-        Arguments for which it works, each real or complex as in all later calls.
-
+    The function takes numbers and returns numbers, and its decisions do not depend on them.
+    ``values`` are arguments for which it works, each real or complex as in all later calls.
     """
     tape = Tape()
     given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]

@@ -67,16 +67,9 @@ def lower_path(
     """
     Return a path in real numbers only; paths with iterated links have no such form.
 
-    Parameters
-    ----------
-    path
-        The path.
-    fallback_statuses
-        The status of the linkage where each decision differs.
-    by_squares
-        Whether lengths and quotients are computed by squares, which is fastest for arrays: the
-        last digits differ, lengths below 1e-154 are lost, and so is the sign of a zero.
-
+    ``fallback_statuses`` has the status of the linkage where each decision differs. ``by_squares``
+    computes lengths and quotients by squares, which is fastest for arrays: the last digits differ,
+    lengths below 1e-154 are lost, and so is the sign of a zero.
     """
     lower = Lowering(by_squares)
     inputs = tuple(lower.lower_operation(given) for given in path.inputs)

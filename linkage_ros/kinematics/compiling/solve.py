@@ -74,16 +74,9 @@ class SolverOutline:
     """
     Solves a linkage for certain numbers at many states.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    width
-        Number of values of a position, and of each derivative.
-    wanted
-        Selects the values; by default all published joints, and then the status also says that a
-        joint is beyond its limits.
-
+    ``width`` is the number of values of a position, and of each derivative. ``wanted`` selects the
+    values; if it selects the published joints, the status also says that a joint is beyond its
+    limits.
     """
 
     def __init__(

@@ -75,19 +75,9 @@ class TextWriter:
 
     An operation that is used once is written inline; one that is used more often gets a name.
 
-    Parameters
-    ----------
-    roots
-        All results that the program needs: its conditions and its outputs.
-    constant
-        Writes a constant.
-    call
-        Writes the call of a function, given its name and its arguments.
-    choice
-        Writes a choice between two expressions, given a condition.
-    assign
-        Writes a line that gives a name to an expression of an operation.
-
+    ``roots`` are all results that the program needs: its conditions and its outputs. ``call``
+    takes an operation and its arguments, ``choice`` a condition and two expressions, ``assign`` a
+    name, an expression and its operation.
     """
 
     def __init__(

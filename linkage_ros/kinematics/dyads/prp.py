@@ -77,15 +77,9 @@ class PRPDyad(_CrossingLines):
     """
     A pin on two lines.
 
-    Parameters
-    ----------
-    starts
-        Indices of E1 and E2 among the pins.
-    arms
-        Indices, among the coordinates, of the angles of the links that carry the lines.
-    units
-        Directions of the lines at coordinates of 0.
-
+    ``starts`` are the indices of E1 and E2 among the pins, and ``arms`` the indices, among the
+    coordinates, of the angles of the links that carry the lines. ``units`` are the directions of
+    the lines at coordinates of 0.
     """
 
     __slots__ = ('_starts', '_units')
@@ -182,18 +176,10 @@ class CrankPRPDyad(_CrossingLines):
     frame of the ground, which may be far from the intersection: it lost 8,000 u·κ where the points
     were 1,000 times as far, and 23 u·κ in random linkages.
 
-    Parameters
-    ----------
-    offsets
-        h1 and h2, in the unit of the lengths.
-    size
-        Size of the coordinates from which the offsets were computed: it bounds, in units of u, the
-        distance of parallel lines that rounding causes.
-    arms
-        Indices, among the coordinates, of the angles of the links that carry the lines.
-    across
-        e^{iδ} if those coordinates are equal.
-
+    ``offsets`` are h1 and h2, in the unit of the lengths. ``size`` is the size of the coordinates
+    from which they were computed: it bounds, in units of u, the distance of parallel lines that
+    rounding causes. ``arms`` are the indices, among the coordinates, of the angles of the links
+    that carry the lines. ``across`` is e^{iδ} if those coordinates are equal.
     """
 
     __slots__ = ('_offsets', '_size')
