@@ -85,15 +85,8 @@ class Knots:
     """
     Knots of a linkage.
 
-    Parameters
-    ----------
-    closed
-        The linkage in closed form.
-    orientations
-        Returns the orientation (a sign) of each dyad at the coordinates of a closed position.
-    repeats
-        Whether everything repeats after two turns of an input.
-
+    ``orientations`` returns the orientation (a sign) of each dyad at the coordinates of a closed
+    position. ``repeats``: whether all poses repeat after two turns of an input.
     """
 
     def __init__(
@@ -180,17 +173,10 @@ _ROUNDING = 16.0 * UNIT_ROUNDOFF
 
 class NewtonDyad:
     """
-    Newton's method on one dyad.
+    Newton's method on one dyad with its loop.
 
-    Parameters
-    ----------
-    loops
-        Its loop.
-    tolerance
-        Bound of the last correction of an angle, in [rad].
-    slide_tolerance
-        Bound of the last correction of a slide, in the unit of the lengths.
-
+    The tolerances bound the last correction: of an angle in [rad], of a slide in the unit of the
+    lengths.
     """
 
     __slots__ = ('_arms', '_constant', '_first', '_known', '_new', '_tolerances', '_two_arms')
@@ -222,15 +208,8 @@ class NewtonDyad:
         """
         Append p and q to the coordinates, or return False if there is no solution.
 
-        Parameters
-        ----------
-        x, pins
-            Known coordinates, and the pins that iterations have placed.
-        p, q
-            The start.
-        sign
-            Required sign of F_p × F_q.
-
+        x are the known coordinates, and ``pins`` the pins that iterations have placed. p and q are
+        the start; ``sign`` is the required sign of F_p × F_q.
         """
         known = self._constant
         for factor, arm in self._arms:
@@ -407,16 +386,9 @@ class NewtonClosure(Solver):
     """
     A linkage whose dyads Newton's method closes.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    tolerance
-        Bound of the last corrections, in [rad] or [m].
-    warm
-        True: start from the last state. False: start from the pose of the file each time. None:
-        start from the nearest knot, so that a state depends on its inputs alone.
-
+    The tolerance bounds the last corrections, in [rad] or [m]. If ``warm`` is true, each state
+    starts from the last one, if false from the pose of the file; if None from the nearest knot, so
+    that a state depends on its inputs alone.
     """
 
     by_steps = False

@@ -107,38 +107,12 @@ class _TablePart(NamedTuple):
 
 class TableClosure(Solver):
     """
-    A linkage whose joints are interpolated in a table.
+    A linkage of one input whose joints are interpolated in a table.
 
-    Parameters
-    ----------
-    linkage
-        A linkage of one input.
-    tolerance
-        Bound of the error of positions, in [rad] or [m]; the number of knots follows from it.
-    knots
-        Alternatively the number of cells in each range of the input.
-    order
-        The interpolation between the knots.
-    span
-        The range that the table covers, in [rad] or [m]; by default all that the input can reach.
-
-    Attributes
-    ----------
-    knots
-        Number of cells in each range.
-    memory
-        Size of the table, in [bytes].
-    build_time
-        Time to build it, including the proof, in [s].
-    proven, proven_rate
-        Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input;
-        infinite if knots were given.
-
-    Raises
-    ------
-    DefinitionError
-        If there are several inputs, or the tolerance cannot be proven.
-
+    The number of knots follows from the tolerance, a bound of the error of positions in [rad] or
+    [m], unless ``knots`` gives the number of cells in each range. ``span`` is the range that the
+    table covers, in [rad] or [m]; by default all that the input can reach. Several inputs, and a
+    tolerance that cannot be proven, raise DefinitionError.
     """
 
     by_steps = False
@@ -163,6 +137,7 @@ class TableClosure(Solver):
                 'write solver: closed_form',
             )
         self._period, intervals = self._covered_ranges(span)
+        # Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input.
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only

@@ -360,18 +360,8 @@ def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> P
     """
     Return the number of cells that each range of the input needs, and the proven errors.
 
-    Parameters
-    ----------
-    request
-        The table to be proven.
-    ranges
-        Ranges of the input, in [rad] or [m].
-
-    Raises
-    ------
-    DefinitionError
-        If a range holds a toggle or a change point, or the proof takes more than `MOST_KNOTS`.
-
+    A range, in [rad] or [m], that holds a toggle or a change point, and a proof that takes more
+    than `MOST_KNOTS`, raise DefinitionError.
     """
     refuse_trouble(request, ranges)
     proofs = [RangeProof(request, low, high) for low, high in ranges]
