@@ -258,15 +258,9 @@ class Friction:
 
 def check_masses(linkage: Linkage, loads: Loads) -> None:
     """
-    Refuse a linkage in which a link that moves has no mass.
+    Refuse a linkage in which a link that moves has no mass; the error has the key ``masses``.
 
     Loads other than gravity act on a linkage without any masses, too.
-
-    Raises
-    ------
-    DefinitionError
-        With the key ``masses`` of the linkage file.
-
     """
     if not linkage.masses and loads.without_masses:
         return
@@ -284,12 +278,8 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     """
     Refuse loads and friction on parts that the linkage does not have.
 
-    Raises
-    ------
-    DefinitionError
-        With the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no name)
-        or ``effects.friction.joints.NAME``.
-
+    The error has the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no
+    name) or ``effects.friction.joints.NAME``.
     """
     for count, spring in enumerate(loads.springs, 1):
         key = f'loads.springs.{spring.name or count}'

@@ -76,19 +76,9 @@ def last_before(
     computing the root of an equation, BIT 11, 1971), and bisection if it lacks two values: if the
     margin is 0 at the start too, or there is no state at the end.
 
-    Parameters
-    ----------
-    reach
-        Returns the state after some seconds; None if there is none.
-    margin
-        Returns the margin of a state, 0 or more before the instant.
-    start
-        The state at 0.
-    end
-        A time beyond the instant, in [s].
-    beyond
-        The state at that time; its margin is below 0.
-
+    ``reach`` returns the state after some seconds, None if there is none. ``margin`` is 0 or more
+    before the instant. ``end`` is a time beyond it, in [s], and ``beyond`` the state then, with a
+    margin below 0.
     """
     before, last, after, known = 0.0, start, end, True
     low, high = margin(start), margin(beyond)
@@ -217,19 +207,9 @@ class SingleDofMechanism:
         succeeds, or it falls into too many pieces, the mechanism is held as by a stop. So the work
         is bounded, whatever the force.
 
-        Parameters
-        ----------
-        motion
-            The state.
-        seconds
-            Length of the step, in [s].
-        force
-            τ on the input, in [N·m] or [N].
-        brake
-            B, the holding force of a brake on the input, in [N·m] or [N].
-        time
-            Time of the state since the first tick, in [s].
-
+        ``seconds`` is the length of the step, ``force`` is τ on the input and ``brake`` is B, the
+        holding force of a brake on it, both in [N·m] or [N]. ``time`` is the time of the state
+        since the first tick, in [s].
         """
         left = seconds
         pieces = kinks = 0

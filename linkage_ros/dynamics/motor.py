@@ -113,24 +113,10 @@ class Motor:
 
     def drive_by(self, mechanism: Driven, command: float) -> tuple[Driven, float, float]:
         """
-        Return a mechanism with this motor under a command.
+        Return a mechanism with this motor under a command, in the unit of ``command``.
 
-        Parameters
-        ----------
-        mechanism
-            The mechanism on which the motor is mounted.
-        command
-            The command, in the unit of ``command``.
-
-        Returns
-        -------
-        mechanism
-            The mechanism under this command.
-        force
-            Further force on the input: 0, since the motor is a law.
-        holding
-            Friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
-
+        The second result is a further force on the input: 0, since the motor is a law. The third
+        is the friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
         """
         law = self.effort_law(command)
         under = mechanism.driven_by(lambda moved: replace(moved, laws=(*moved.laws[:-1], law)))
@@ -151,20 +137,10 @@ class Motor:
 
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
-        Refuse a motor whose rate follows the voltage faster than the integration can.
+        Refuse a motor whose rate follows the voltage faster than a step in [s] can follow.
 
-        Parameters
-        ----------
-        inertia
-            The least inertia of the equation of motion, in [kg·m²] or [kg].
-        method, step
-            The method of integration, by name, and its step, in [s].
-
-        Raises
-        ------
-        DefinitionError
-            The remedy is the longest step that carries it.
-
+        ``inertia`` is the least inertia of the equation of motion, in [kg·m²] or [kg]. The remedy
+        is the longest step that carries it.
         """
         if self.command == 'voltage' or self._supply_limits():
             damping = -self._current_slope() * self.constant * self.ratio / self.backward

@@ -100,19 +100,10 @@ class Winding:
         self, begin: float, rate: float, command: float | None, seconds: float
     ) -> float:
         """
-        Return the current after some time at a constant rate.
+        Return the current, in [A], after some seconds at a constant rate of the input.
 
-        Parameters
-        ----------
-        begin
-            The current before, in [A].
-        rate
-            The rate of the input, in [rad/s] or [m/s].
-        command
-            In [A] or [V]; None for no current.
-        seconds
-            The time, in [s].
-
+        ``begin`` is the current before, in [A]; the rate is in [rad/s] or [m/s], the command in
+        [A] or [V], None for no current.
         """
         if command is None:
             return 0.0
