@@ -187,7 +187,7 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
     if given.of not in (*names, *linkage.joints):
         choices = {*names, *linkage.joints} - {name}
         raise DefinitionError(
-            f'{key}.of', f'{quote(given.of)} is no joint of this linkage', _one_of(choices)
+            f'{key}.of', f'{quote(given.of)} is not a joint of this linkage', _one_of(choices)
         )
     chain = [name]
     while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
     if not status.has_rates:
-        return ValueError(f'{what}: a linkage that is {status.value} has none; ask its status')
+        return ValueError(f'{what}: a linkage that is {status.value} has none; check its status')
     return ValueError(f'{what}: {list(given)} is not finite')
 
 
@@ -679,7 +679,7 @@ class Closure:
         closure = getattr(found, 'closure', None)
         linkage = getattr(closure, 'linkage', None)
         if linkage is not self.linkage and linkage != self.linkage:
-            message = f'{what}: {quote(found)} is not of {self!r}; give what that returned'
+            message = f'{what}: {quote(found)} is not from {self!r}; give one that it returned'
             raise TypeError(message)
 
     def _joint_rates(self, values: list[float]) -> tuple[float, ...]:

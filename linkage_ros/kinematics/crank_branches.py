@@ -530,7 +530,7 @@ class Inverse(NamedTuple):
         )
         if number is not None:
             raise DefinitionError(
-                f'branch {number}', f'{name} has none of this number', f'use {told}'
+                f'branch {number}', f'{name} has no branch of this number', f'use {told}'
             )
         raise DefinitionError(
             name,

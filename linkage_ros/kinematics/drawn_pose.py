@@ -133,7 +133,7 @@ def drawn_signs(
     if not found:
         raise DefinitionError(
             'pose.inputs',
-            'close the loops in no assembly',
+            'do not close the loops in any assembly',
             'give inputs that the linkage can have',
         )
     drawn = [target.drawn for target in targets]
@@ -203,7 +203,7 @@ def _closing_assemblies(
             if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
                 names = list_names(repr(one.assembly_key) for one in ways[:number])
                 raise DefinitionError(
-                    'pose', f'does not tell the sides of {names}', 'name a point of each'
+                    'pose', f'does not determine the sides of {names}', 'name a point of each'
                 )
             del found[_MOST_KEPT:]
         found = [
@@ -264,7 +264,9 @@ def _ambiguity_error(
         other = next(one for one in alike if one.signs[i] != first.signs[i])
         telling.append(_telling_text(plan, ways[i].dyad, (first.state, other.state)))
     return DefinitionError(
-        'pose', f'does not tell {list_names(sides, " from ")}', f'name {list_names(telling, "; ")}'
+        'pose',
+        f'does not distinguish {list_names(sides, " from ")}',
+        f'name {list_names(telling, "; ")}',
     )
 
 

@@ -302,7 +302,7 @@ class SolutionPlan(SolvedLinks):
         if abs((direction * outer.direction.conjugate()).imag) <= ROUNDING:
             raise DefinitionError(
                 f'sliders.{dyad.inner.name}.direction',
-                f'is parallel to that of {second.name!r}',
+                f'is parallel to the direction of {second.name!r}',
                 'give the two sliders different directions',
             )
         constant = (inner.start - point) * turn
@@ -491,7 +491,7 @@ class SolutionPlan(SolvedLinks):
             self._missing[name] = f'{name}: {choices} ({meaning})'
         elif side not in sides:
             raise DefinitionError(
-                f'assembly.{name}', f'{quote(side)} is no side', f'write {choices} ({meaning})'
+                f'assembly.{name}', f'{quote(side)} is not a side', f'write {choices} ({meaning})'
             )
         written = sides[side] if side else 0
         sign = self._nominal[name].sign if self._nominal else (written or 1) * upright

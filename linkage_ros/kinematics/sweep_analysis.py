@@ -568,8 +568,8 @@ def check_turns(closure: LoopClosure) -> None:
                 raise DefinitionError(
                     f'ratios.{step.joint}.of',
                     f'{quote(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
-                    'known, and the ratio is no whole number',
-                    f'write limits for {quote(of)}, whose middle is that of its swing',
+                    'known, and the ratio is not a whole number',
+                    f'write limits for {quote(of)}, with the middle of its swing as their middle',
                 )
 
 

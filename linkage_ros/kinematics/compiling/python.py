@@ -163,7 +163,7 @@ def compile_function(
     given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
     results = [number_of(number) for number in function(*given)]
     if tape.decisions:
-        raise ValueError('the function decides by its arguments, and has no straight line')
+        raise ValueError('the function decides by its arguments, and cannot be compiled')
     places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
     inputs = tuple(one.operation for one in given)
     line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))

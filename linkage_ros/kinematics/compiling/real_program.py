@@ -279,7 +279,7 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     if is_iterated(closure):
         raise DefinitionError(
             'links',
-            'some are only solved by iteration, which is no straight line',
+            'some are only solved by iteration, which cannot be compiled',
             'compile a linkage of dyads',
         )
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths

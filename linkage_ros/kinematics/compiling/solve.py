@@ -100,7 +100,7 @@ class SolverOutline:
     ) -> Batch:
         """Solve all states, as `Closure.solve` specifies."""
         if derivatives not in (0, 1, 2):
-            raise ValueError(f'derivatives: {derivatives!r} is none of 0, 1, 2')
+            raise ValueError(f'derivatives: {derivatives!r} is not one of 0, 1, 2')
         driven = self._driven
         if rates is None and derivatives and len(inputs) == driven:
             if driven > 1:
@@ -190,7 +190,7 @@ class SolverOutline:
         return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
     def _array_programs(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_SolveProgram]:
-        """Return the paths over arrays; none if links are iterated, which is no straight line."""
+        """Return the paths over arrays; none if links are iterated."""
         if is_iterated(self._closure):
             return []
         return [
