@@ -102,7 +102,7 @@ def _build_newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
         lengths.append(abs(complex(*points[dyad.inner.name]) - complex(*points[outer.name])))
     ratio = max(lengths) / min(lengths)
     if 2.0 * (1.0 + ratio) * accuracy > LEAST_SINE:
-        raise DefinitionError('accuracy', 'not proven for so little of it', '')
+        raise DefinitionError('accuracy', 'not proven for such a low accuracy', '')
     return newton
 
 

@@ -154,7 +154,7 @@ def refuse_ratios(linkage: Linkage, solver: str) -> None:
     if linkage.ratios:
         raise DefinitionError(
             f'solver.{solver}',
-            f'does not know ratios, such as that of {next(iter(linkage.ratios))!r}',
+            f'does not support ratios, such as the ratio of {next(iter(linkage.ratios))!r}',
             'write solver: closed_form',
         )
 

@@ -368,13 +368,15 @@ def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> P
     knots = max(one.required_knots() for one in proofs)
     while True:
         if knots > MOST_KNOTS:
-            raise unproven_error(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
+            raise unproven_error(
+                request, f'takes more than {MOST_KNOTS} knots', 'write a larger tolerance'
+            )
         position, rate = map(max, zip(*(one.error_bounds(knots) for one in proofs), strict=True))
         if position <= request.tolerance:
             return Proven(knots, position, rate)
         if position > 2.0 * request.tolerance:
             least = f'{position:.1g}'
             raise unproven_error(
-                request, f'is finer than rounding allows here, {least}', 'ask for less'
+                request, f'is finer than rounding allows here, {least}', 'write a larger tolerance'
             )
         knots *= 2
