@@ -397,7 +397,7 @@ def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
                 key, 'lies on the ground, which a force does not move', 'name another point'
             )
         if not any(force.direction):
-            raise DefinitionError(f'{key}.direction', '[0, 0] is no direction', 'write [1, 0]')
+            raise DefinitionError(f'{key}.direction', '[0, 0] is not a direction', 'write [1, 0]')
         if len(linkage.inputs) > 1 and (force.over_position or force.over_rate):
             raise DefinitionError(
                 key,

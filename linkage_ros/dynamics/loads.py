@@ -306,7 +306,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
                 key,
-                f'{quote(name)} is no pin or slider',
+                f'{quote(name)} is not a pin or slider',
                 _one_of({*pins, *linkage.sliders}),
             )
         if name in pins and name in linkage.sliders:
@@ -323,7 +323,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
             )
             raise DefinitionError(
                 f'{key}.{given}',
-                f'the force in a pin rubs by both, and there is no {missing}',
+                f'friction by the force in a pin needs both, and {missing} is missing',
                 f'write {missing} too',
             )
     if friction and friction.holds and friction.load_dependent_joint:
