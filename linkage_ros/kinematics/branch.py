@@ -78,6 +78,19 @@ KnownAt = Callable[[float], LinkState | None]
 RatesAt = Callable[[float], tuple[LinkState, LinkState] | None]
 """State of the links solved before and its derivatives by the input; None if there are none."""
 
+_MOST_TURNS = 64
+_MOST_LAPS = 32
+"""Laps of a slide: each is twice as long as the one before."""
+
+_SAME = 1e-9
+"""Largest difference of known places and angles that count as equal."""
+
+_LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
+"""Relative to the input, or to 1: how near its end a toggle and its neighbours look alike."""
+
+_NEXT_TO_END = 2.0**-10
+"""In [rad] or lengths: how far links may move while the links before are next to a toggle."""
+
 
 class BranchNode(NamedTuple):
     """A point of the curve: the unknowns followed by the input, and the unit tangent there."""
@@ -387,19 +400,6 @@ def _spectral_bound(matrix: Array) -> float:
 # without an end comes back; the number of turns followed is bounded all the same. A branch that
 # is shorter than a turn has one pose for each crank direction: as with dyads, whole turns of the
 # input change nothing there.
-
-_MOST_TURNS = 64
-_MOST_LAPS = 32
-"""Laps of a slide: each is twice as long as the one before."""
-
-_SAME = 1e-9
-"""Largest difference of known places and angles that count as equal."""
-
-_LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
-"""Relative to the input, or to 1: how near its end a toggle and its neighbours look alike."""
-
-_NEXT_TO_END = 2.0**-10
-"""In [rad] or lengths: how far links may move while the links before are next to a toggle."""
 
 
 class Interval(NamedTuple):

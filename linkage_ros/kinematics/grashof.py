@@ -22,27 +22,6 @@ from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 NEARLY = 2e-3
 """Largest relative difference of two lengths that were meant to be equal: a rounded digit."""
 
-
-class Paired(NamedTuple):
-    """A four-bar whose lengths are equal in pairs, or nearly."""
-
-    name: str  # parallelogram, kite or rhombus
-    deviation: float  # Largest difference within a pair, in the unit of the lengths
-    crosses: tuple[bool, bool]  # Whether its dyad changes its side where it folds and stretches
-
-
-class FourBarType(NamedTuple):
-    """The type of a four-bar, after Grashof and Barker."""
-
-    # Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
-    # output. RRR1 to RRR4 are triple rockers, by the longest link.
-    code: str
-    name: str  # The name in words
-    # Sum of the other two links minus the sum of the shortest and the longest, in the unit of the
-    # lengths; 0 at a change point.
-    margin: float
-
-
 # In the order of the shortest link, or of the longest: input, coupler, output, frame.
 GRASHOF = (
     ('GCRR', 'crank-rocker'),
@@ -62,6 +41,26 @@ CHANGE_POINTS = (
     ('SRRC', 'change-point rocker-crank'),
     ('SCCC', 'change-point double crank'),
 )
+
+
+class Paired(NamedTuple):
+    """A four-bar whose lengths are equal in pairs, or nearly."""
+
+    name: str  # parallelogram, kite or rhombus
+    deviation: float  # Largest difference within a pair, in the unit of the lengths
+    crosses: tuple[bool, bool]  # Whether its dyad changes its side where it folds and stretches
+
+
+class FourBarType(NamedTuple):
+    """The type of a four-bar, after Grashof and Barker."""
+
+    # Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
+    # output. RRR1 to RRR4 are triple rockers, by the longest link.
+    code: str
+    name: str  # The name in words
+    # Sum of the other two links minus the sum of the shortest and the longest, in the unit of the
+    # lengths; 0 at a change point.
+    margin: float
 
 
 def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:

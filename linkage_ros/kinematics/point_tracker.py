@@ -30,6 +30,9 @@ from linkage_ros.kinematics.step import LinkState
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
+_Place = tuple[str, int]
+"""A point: the list of `_Walk` that holds it, and its index there."""
+
 
 class _TrackerNode(NamedTuple):
     """A point: index of its base, index of its angle, vector from the base, slide or −1."""
@@ -119,10 +122,6 @@ class PointTracker:
         for index in self._pins:
             started.append(pins[index] * self._scale)
         return started
-
-
-_Place = tuple[str, int]
-"""A point: the list of `_Walk` that holds it, and its index there."""
 
 
 class _Walk:

@@ -35,6 +35,22 @@ if TYPE_CHECKING:
 
 _RATIO = (sqrt(5.0) - 1.0) / 2.0
 
+_SAMPLES = 720
+
+_POINT = 1e-9
+"""Fraction of an interval: a narrower open part is a single place without a pose, and no gap."""
+
+_ROUNDED = 1e-9
+"""A margin farther from zero than this has a certain sign."""
+
+_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
+
+_SAME = 1e-9
+"""Largest difference of joints that count as equal, in [rad] or relative to the scale."""
+
+_COPIES = 8
+"""Largest number of turns of a range that are listed for an input with wide limits."""
+
 
 def golden_section(
     function: Callable[[float], float], low: float, high: float
@@ -54,17 +70,6 @@ def golden_section(
             other = low + _RATIO * (high - low)
             at_other = function(other)
     return min((at_one, one), (at_other, other))
-
-
-_SAMPLES = 720
-
-_POINT = 1e-9
-"""Fraction of an interval: a narrower open part is a single place without a pose, and no gap."""
-
-_ROUNDED = 1e-9
-"""A margin farther from zero than this has a certain sign."""
-
-_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 
 def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
@@ -326,12 +331,6 @@ def last_inside(closes: Callable[[float], bool], inside: float, outside: float) 
 # The limits of the input itself cut exactly. Those of published joints are searched: their margin
 # is sampled over each range, its valleys and summits between samples are narrowed down, and each
 # change of its sign is narrowed down to neighbouring floats.
-
-_SAME = 1e-9
-"""Largest difference of joints that count as equal, in [rad] or relative to the scale."""
-
-_COPIES = 8
-"""Largest number of turns of a range that are listed for an input with wide limits."""
 
 
 def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:

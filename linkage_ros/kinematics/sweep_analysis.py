@@ -38,6 +38,29 @@ from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
+_SAMPLES = 720
+_GRID = 24
+_SAME = 1e-9
+"""Largest difference of values that count as equal, in [rad] or relative to a length."""
+
+_NOISE = 1e-13
+"""Largest difference of values that is rounding, in [rad]."""
+
+_DEEPER = 10.0
+"""Depth that a valley may have below its sample, relative to the height of those beside it."""
+
+_APART = 1e-4
+"""Places nearer to each other than this count as one, in [rad] or [m]."""
+
+_MANY = 12
+"""An extreme met at more places than this lists none of them; also the lines of a grid."""
+
+_NEAR_ZERO, _ZERO = 0.25, 1e-7
+"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
+
+_EASY = 0.25
+"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
+
 
 def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., StepPose]:
     """
@@ -89,30 +112,6 @@ def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
                 return set(range(number + 1))
             asked += [owner[link] for link in starts if link != GROUND]
     return needed
-
-
-_SAMPLES = 720
-_GRID = 24
-_SAME = 1e-9
-"""Largest difference of values that count as equal, in [rad] or relative to a length."""
-
-_NOISE = 1e-13
-"""Largest difference of values that is rounding, in [rad]."""
-
-_DEEPER = 10.0
-"""Depth that a valley may have below its sample, relative to the height of those beside it."""
-
-_APART = 1e-4
-"""Places nearer to each other than this count as one, in [rad] or [m]."""
-
-_MANY = 12
-"""An extreme met at more places than this lists none of them; also the lines of a grid."""
-
-_NEAR_ZERO, _ZERO = 0.25, 1e-7
-"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
-
-_EASY = 0.25
-"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
 
 
 class Extreme(NamedTuple):

@@ -31,16 +31,6 @@ import numpy as np
 Number = Any
 """An operation, or a constant: a number or a truth value."""
 
-
-class BlockBounds(NamedTuple):
-    """The range of a number, up to its rounding."""
-
-    low: float = -inf
-    high: float = inf
-
-
-_ANY = BlockBounds()
-
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '<': operator.lt,
     '<=': operator.le,
@@ -54,6 +44,42 @@ _TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
 
 _CLEAR: Final = 1e-9
 """Numbers with this relative distance are different however they are rounded."""
+
+_FUNCTIONS: Final[dict[str, Any]] = {
+    '+': np.add,
+    '-': np.subtract,
+    '*': np.multiply,
+    '/': np.divide,
+    'abs': np.abs,
+    'sin': np.sin,
+    'cos': np.cos,
+    'tan': np.tan,
+    'sqrt': np.sqrt,
+    'atan2': np.arctan2,
+    'copysign': np.copysign,
+    'maximum': np.maximum,
+    'minimum': np.minimum,
+    '<': np.less,
+    '<=': np.less_equal,
+    '>': np.greater,
+    '>=': np.greater_equal,
+    '==': np.equal,
+    '!=': np.not_equal,
+    'and': np.logical_and,
+    'or': np.logical_or,
+    'not': np.logical_not,
+    'where': np.where,
+}
+
+
+class BlockBounds(NamedTuple):
+    """The range of a number, up to its rounding."""
+
+    low: float = -inf
+    high: float = inf
+
+
+_ANY = BlockBounds()
 
 
 def _tangent_is_close() -> bool:
@@ -351,33 +377,6 @@ def _order_pair(one: Operation, other: Operation) -> tuple[Number, Number]:
 def _is_clearly_less(less: float, more: float) -> bool:
     """Return whether one number is less than another, however both are rounded."""
     return more - less > _CLEAR * max(abs(less), abs(more)) and less < inf and more > -inf
-
-
-_FUNCTIONS: Final[dict[str, Any]] = {
-    '+': np.add,
-    '-': np.subtract,
-    '*': np.multiply,
-    '/': np.divide,
-    'abs': np.abs,
-    'sin': np.sin,
-    'cos': np.cos,
-    'tan': np.tan,
-    'sqrt': np.sqrt,
-    'atan2': np.arctan2,
-    'copysign': np.copysign,
-    'maximum': np.maximum,
-    'minimum': np.minimum,
-    '<': np.less,
-    '<=': np.less_equal,
-    '>': np.greater,
-    '>=': np.greater_equal,
-    '==': np.equal,
-    '!=': np.not_equal,
-    'and': np.logical_and,
-    'or': np.logical_or,
-    'not': np.logical_not,
-    'where': np.where,
-}
 
 
 class BlockFunction:

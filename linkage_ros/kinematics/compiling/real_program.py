@@ -46,6 +46,11 @@ from linkage_ros.kinematics.status import Status
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure
 
+_MAKES_PARTS = frozenset(('facing', 'vector'))
+
+_MOST_SOLVED = 32
+"""Largest number of leaves with numbers: change points of several dyads multiply."""
+
 
 class _Parts(NamedTuple):
     """The components of a complex number along x and y."""
@@ -130,9 +135,6 @@ class Lowering:
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
         return self._formulas[name](self, *given)
-
-
-_MAKES_PARTS = frozenset(('facing', 'vector'))
 
 
 def _short_product(one: Any, other: Any) -> Any:
@@ -255,9 +257,6 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
 # paths taken at closed states of the linkage, and the change points beside them. No state is known
 # to take one of the other paths: these end in None, and code generated from the tree gives no
 # numbers there.
-
-_MOST_SOLVED = 32
-"""Largest number of leaves with numbers: change points of several dyads multiply."""
 
 
 class Program(NamedTuple):

@@ -22,6 +22,8 @@ _DEEPEST = 12
 _PRECEDENCE = {'+': 4, '-': 4, '*': 5, '/': 5, 'negative': 6, '**': 7}
 _COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
 
+_ATOM = 9
+
 
 def count_uses(roots: Iterable[Any]) -> dict[Operation, int]:
     """Return how often each operation is used, by others that the roots need or as a root."""
@@ -64,9 +66,6 @@ class WrittenText(NamedTuple):
     def in_parentheses(self, precedence: int) -> str:
         """Return it as a part of an expression of a precedence."""
         return self.text if self.precedence >= precedence else f'({self.text})'
-
-
-_ATOM = 9
 
 
 class TextWriter:
