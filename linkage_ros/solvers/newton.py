@@ -67,6 +67,19 @@ _PER_TURN = 256
 _MOST = 2**16
 """Number of knots that are kept; beyond it they are computed again."""
 
+_STEPS = 12
+"""Largest number of Newton steps; a cold start takes up to ten."""
+
+LEAST_SINE = 0.05
+"""Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
+
+_ROUNDING = 16.0 * UNIT_ROUNDOFF
+
+PLACING = (FixedPoint, PointOnLink, PointOnRail)
+"""Steps that place a pin and add no coordinate."""
+
+_CLOSED = Status.CLOSED
+
 
 class Knot(NamedTuple):
     """
@@ -160,15 +173,6 @@ class Knots:
             number * spacing * unit
             for number, spacing, unit in zip(key, self._spacing, self._units, strict=True)
         ]
-
-
-_STEPS = 12
-"""Largest number of Newton steps; a cold start takes up to ten."""
-
-LEAST_SINE = 0.05
-"""Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
-
-_ROUNDING = 16.0 * UNIT_ROUNDOFF
 
 
 class NewtonDyad:
@@ -351,10 +355,6 @@ def _vector_acceleration(
     return complex(a[slide] - turn * turn * s, change * s + 2.0 * turn * way) * unit
 
 
-PLACING = (FixedPoint, PointOnLink, PointOnRail)
-"""Steps that place a pin and add no coordinate."""
-
-
 @dataclass(frozen=True, slots=True)
 class NewtonParameters:
     """Newton's method on the loops of each dyad."""
@@ -370,9 +370,6 @@ PARAMETERS = NewtonParameters
 def build(parameters: NewtonParameters, linkage: Linkage) -> NewtonClosure:
     """Build the closure."""
     return NewtonClosure(linkage, parameters.tolerance)
-
-
-_CLOSED = Status.CLOSED
 
 
 class _NewtonRoot(list[Any]):

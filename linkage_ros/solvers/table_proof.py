@@ -48,6 +48,25 @@ _NEAR = 0.01
 
 _NARROWER = 'write solver: closed_form, or a span: [low, high] that keeps away from it'
 
+MOST_KNOTS = 2**20
+_FEWEST_KNOTS = 4
+_FIRST_CELLS = 16
+_SMALLEST_CELL = 2.0**-18
+"""Fraction of the range: if this is too large to prove anything, a toggle is there or near."""
+
+_MOST_CELLS = 2**14
+_PLENTY = 2**10
+"""Cells: for each so many, twice as many knots cost less than the cells that spare them."""
+
+_BLOCK = 4096
+_TIGHT = 1.1
+"""A bound within this factor of the value at the middle needs no smaller cells."""
+
+_ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
+"""For each order the Taylor coefficient that determines the error, and its factor."""
+
+_ROUNDING = 2.0**-49
+
 
 class TableRequest(NamedTuple):
     """The table to be proven."""
@@ -90,26 +109,6 @@ def unproven_error(request: TableRequest, reason: str, remedy: str = _NARROWER) 
     return DefinitionError(
         'solver.table', f'tolerance {request.tolerance:g} [{unit}] {reason}', remedy
     )
-
-
-MOST_KNOTS = 2**20
-_FEWEST_KNOTS = 4
-_FIRST_CELLS = 16
-_SMALLEST_CELL = 2.0**-18
-"""Fraction of the range: if this is too large to prove anything, a toggle is there or near."""
-
-_MOST_CELLS = 2**14
-_PLENTY = 2**10
-"""Cells: for each so many, twice as many knots cost less than the cells that spare them."""
-
-_BLOCK = 4096
-_TIGHT = 1.1
-"""A bound within this factor of the value at the middle needs no smaller cells."""
-
-_ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
-"""For each order the Taylor coefficient that determines the error, and its factor."""
-
-_ROUNDING = 2.0**-49
 
 
 class _ErrorBounds(NamedTuple):
