@@ -36,6 +36,9 @@ _ROUNDS = 50
 _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
+Unknown = tuple[int, bool, float]
+"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
+
 
 class LoadDependentFriction(NamedTuple):
     """A joint with such friction, and the force in it; of a slider, the force is a real number."""
@@ -86,10 +89,6 @@ def solve_frictions(
             return None
         found = [now + step for now, step in zip(found, steps, strict=True)]
     return None
-
-
-Unknown = tuple[int, bool, float]
-"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
 
 
 def friction_effort(

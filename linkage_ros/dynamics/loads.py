@@ -21,6 +21,11 @@ from linkage_ros.description import choice, each_part, number, number_rows, poin
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage
 
+GREATEST_LOAD, STIFFEST = 1e9, 1e12
+"""Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
+
+_EFFORT = 'N·m or N'
+
 
 @dataclass(frozen=True, slots=True)
 class Spring:
@@ -49,12 +54,6 @@ class Spring:
     def tension(self, length: float, growth: float) -> float:
         """Return the pulling force, in [N], for a length, in [m], and its rate, in [m/s]."""
         return self.stiffness * (length - self.free_length) + self.damping * growth
-
-
-GREATEST_LOAD, STIFFEST = 1e9, 1e12
-"""Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
-
-_EFFORT = 'N·m or N'
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,32 @@ NARROW = 1e-14
 
 State = TypeVar('State')
 
+LARGEST = 1e10
+"""
+Values and rates beyond this are no valid motion, in [rad], [m] or either per second.
+
+As doubles, angles are 2e-6 rad apart there.
+"""
+
+_LEAST = 1e-100
+"""Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
+
+_PIECES = 20
+"""
+Most pieces of a step: at stops, where it sticks, and where it is too long.
+
+After these the mechanism rests: with so many bounces in one step it comes to rest anyway.
+"""
+
+_KINKS = 20
+"""Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
+
+_BEGINNING = 1e-200
+"""A rate that has a direction and no size."""
+
+_SHORTEST = 0.5**30
+"""Smallest fraction of a step that is integrated."""
+
 
 def last_before(
     reach: Callable[[float], State | None],
@@ -105,33 +131,6 @@ def last_before(
             if now == 0.0:
                 return at, state, True
     return after, last, known
-
-
-LARGEST = 1e10
-"""
-Values and rates beyond this are no valid motion, in [rad], [m] or either per second.
-
-As doubles, angles are 2e-6 rad apart there.
-"""
-
-_LEAST = 1e-100
-"""Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
-
-_PIECES = 20
-"""
-Most pieces of a step: at stops, where it sticks, and where it is too long.
-
-After these the mechanism rests: with so many bounces in one step it comes to rest anyway.
-"""
-
-_KINKS = 20
-"""Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
-
-_BEGINNING = 1e-200
-"""A rate that has a direction and no size."""
-
-_SHORTEST = 0.5**30
-"""Smallest fraction of a step that is integrated."""
 
 
 class Motion(NamedTuple):

@@ -65,6 +65,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_SOLVED = (Status.CLOSED, Status.LIMITED)
+
 
 class PinSide(NamedTuple):
     """A link of a joint: its first row, the index of its centre among the places, its sign."""
@@ -206,9 +208,6 @@ def _fill_matrix(constant: Array, where: NDArray[np.intp], *values: float) -> Ar
     matrix = constant.copy()  # ticks and diagnostics ask for forces from different threads
     matrix.reshape(-1)[where] = values
     return matrix
-
-
-_SOLVED = (Status.CLOSED, Status.LIMITED)
 
 
 class Reaction(NamedTuple):
