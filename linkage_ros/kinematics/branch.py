@@ -429,9 +429,9 @@ class Start(NamedTuple):
 
 class _BranchSide:
     """
-    One side of the pose, followed as far as was needed.
+    Branch continuation in one direction from the pose, extended on demand.
 
-    ``inputs`` are the inputs at the ends of the ``follow_cells``, times the sign; ``end`` is the
+    ``inputs`` are the inputs at the ends of the ``cells``, times the sign; ``end`` is the
     input at which the branch ends, or None until it is known.
     """
 

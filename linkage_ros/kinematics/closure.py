@@ -616,8 +616,8 @@ class Closure:
         """
         Ranges in which a single input closes every loop, without limits; empty for several.
 
-        A cylinder has those of positive length, unless it starts in the others or is limited to
-        them.
+        A cylinder has only the ranges of positive length, unless it starts in the others or is
+        limited to them.
         """
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()

@@ -63,11 +63,11 @@ _BESIDE_TOGGLE = 1e-12
 """Distance from a toggle, of a branch's width, within which the crank is extrapolated."""
 
 _NEAR, _NEARER = 1e-6, 1e-8
-"""Where the slope is taken near an end of a branch, of its width: it tells the kind of the end."""
+"""Fractions of the width near an end of a branch where slopes show the kind of the end."""
 
 
 class Output(NamedTuple):
-    """What a branch is of: a published joint, or a coordinate of a traced point."""
+    """The output of a branch: a published joint, or a coordinate of a traced point."""
 
     name: str
     turning: bool
@@ -482,7 +482,7 @@ def _real_turns(
 
 
 def _unwrap_piece(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return a piece with angles that go on through whole turns, its middle in (−π, π]."""
+    """Return a piece with unwrapped angles, its middle in (−π, π]."""
     (first, value), *others = piece
     found = [(first, value)]
     for crank, angle in others:
@@ -525,17 +525,17 @@ class Inverse(NamedTuple):
             if branch.number == number or (number is None and len(branches) == 1):
                 return branch
         unit = 'rad' if branches[0].crank_turns else 'm'
-        told = list_names(
+        choices = list_names(
             f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches
         )
         if number is not None:
             raise DefinitionError(
-                f'branch {number}', f'{name} has no branch of this number', f'use {told}'
+                f'branch {number}', f'{name} has no branch of this number', f'use {choices}'
             )
         raise DefinitionError(
             name,
             f'several cranks reach a value: {len(branches)} branches',
-            f'name a branch, or a crank near it; branches and their cranks: {told}',
+            f'name a branch, or a crank near it; branches and their cranks: {choices}',
         )
 
 

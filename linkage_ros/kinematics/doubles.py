@@ -27,8 +27,8 @@ HUGE = 2.0**400
 """
 Rates from here on are scaled by `SHRINK`, lest a square or a product overflow.
 
-So are accelerations from its square on. Accelerations are scaled by the square of `SHRINK`: those
-of the joints are linear in those of the inputs, and quadratic in their rates.
+So are accelerations from its square on. They are scaled by the square of `SHRINK`: accelerations
+of joints are linear in the accelerations of the inputs, and quadratic in the rates.
 """
 
 SHRINK = 2.0**-700

@@ -13,7 +13,7 @@ At the inputs of the pose every dyad is closed on both of its sides, one dyad af
 the assemblies that close, the one nearest to the drawing is meant. It must be clearly nearer than
 any other, as far as the two differ in what the pose names.
 
-`drawn_pose` is the way back: the pose that tells an assembly.
+`read_drawn_pose` is the inverse: it returns a pose that determines the assembly.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _MOST_EXPLORED = 8
 """With more dyads, only those whose side is not written are closed on both sides."""
 
 _MOST_KEPT = 256
-"""Most assemblies that are followed; what the pose has not told by then, it tells too late."""
+"""Most assemblies that are followed; a pose that fits more of them equally well is refused."""
 
 _MOST_LISTED = 4
 
@@ -271,7 +271,7 @@ def _ambiguity_error(
 
 
 def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) -> str:
-    """Return what tells the side of a dyad, with its value in two states."""
+    """Return what determines the side of a dyad, with its value in two states."""
     link, point = telling_part(plan.points, dyad)
     if point:
         places = [_point_sight(plan, link, point).place_at(state) for state in states]
@@ -284,7 +284,7 @@ def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) ->
 
 def read_drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
     """
-    Return the pose that tells the assembly of a position.
+    Return the pose that determines the assembly of a position.
 
     It names a point or an angle for each dyad that closes in two ways, and of links that are
     iterated what the file's pose names of them.

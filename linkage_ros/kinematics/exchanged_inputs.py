@@ -39,7 +39,7 @@ def exchange_inputs(
     """
     Return the linkage with these published joints as its inputs, and its inputs as joints.
 
-    The assembly is that of the pose at which the linkage is shown; ``rebuild`` makes a closure.
+    The pose at which the linkage is shown gives the assembly; ``rebuild`` makes a closure.
 
     More or fewer joints than inputs, an unknown joint and a repeated one raise DefinitionError.
     """

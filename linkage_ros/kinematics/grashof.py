@@ -107,7 +107,7 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
 
 
 def nearly_equal(one: float, other: float) -> bool:
-    """Return whether two lengths were meant to be equal, as far as a rounded digit tells."""
+    """Return whether two lengths are equal up to a rounded digit."""
     return abs(one - other) <= NEARLY * max(one, other)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Block(NamedTuple):
-    """The block of a slider: its name, the link along which it slides, its point and whose."""
+    """The block of a slider: the link along which it slides, and a point of the link with it."""
 
     name: str
     along: str

@@ -50,7 +50,7 @@ class PinOnRail(NamedTuple):
     base: float  # Coordinate of the link that carries the rail, in [rad]
     arm: complex  # From O to A in the frame of a `CrankRail`, otherwise 0
     # dy/dψ/(below·above) of a `CrankRail` with a change point, otherwise 0: at the change point
-    # dy/dψ and the product are 0, but lean is not.
+    # dy/dψ and the product are 0, but this is not.
     lean: float
     # Status of the link as far as the rail decides it, except whether it stands across the line.
     status: Status
@@ -76,7 +76,7 @@ class Rail(Protocol):
         accelerations: LinkState,
         /,
     ) -> tuple[complex, float]:
-        """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
+        """Return the accelerations of the pin in that frame, and of the frame, in [rad/s²]."""
 
     def unsigned_link_rate(
         self, pin_on_rail: PinOnRail, rise: float, velocities: LinkState, /

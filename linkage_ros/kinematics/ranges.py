@@ -9,8 +9,8 @@
 """
 The ranges of an input: the intervals in which every loop closes.
 
-The limits of a dyad on a crank and the ground follow from its lengths, those of an iterated group
-from its branch. The limits of all other dyads are searched within these ranges: the input is
+The limits of a dyad on a crank and the ground follow from its lengths, the limits of an iterated
+group from its branch. The limits of all other dyads are searched within these ranges: the input is
 sampled, and each limit is narrowed down to neighbouring floats.
 """
 
@@ -55,7 +55,7 @@ _COPIES = 8
 def golden_section(
     function: Callable[[float], float], low: float, high: float
 ) -> tuple[float, float]:
-    """Return the lowest value between two places, and where it is."""
+    """Return the minimum and minimiser of a function on an interval, by golden section."""
     one, other = high - _RATIO * (high - low), low + _RATIO * (high - low)
     at_one, at_other = function(one), function(other)
     for _ in range(80):
@@ -115,7 +115,7 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
 
 
 def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
-    """Yield the ranges of an angle whose poses repeat after so many turns, or never (0)."""
+    """Yield the ranges of an angle whose poses repeat after some turns, or never (0)."""
     limits = closure.linkage.inputs[0].limits
     far = (turns or _COPIES) * pi
     low, high = -far, far
@@ -132,7 +132,7 @@ def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
 def through_the_end(
     parts: list[tuple[float, float]], low: float, high: float, turn: float = tau
 ) -> list[tuple[float, float]]:
-    """Return the parts of whole turns, those at both ends as one that runs through the end."""
+    """Return the parts of whole turns; the parts at both ends are one through the end."""
     if len(parts) < 2 or parts[0][0] != low or parts[-1][1] != high:
         return parts
     (_, end), *others, (begin, _) = parts

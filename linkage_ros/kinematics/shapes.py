@@ -136,7 +136,7 @@ def draw_shapes(
 def carried_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[tuple[str, Shape]]:
-    """Draw a linkage as `shapes` does; return each shape with the link that carries it."""
+    """Draw a linkage as `draw_shapes` does; return each shape with the link that carries it."""
     pose = _DrawnPose(
         closure,
         closure.points(position),
@@ -194,7 +194,7 @@ def draw_skeleton(closure: Closure, position: Position) -> list[Segment]:
 
 
 class LinkFrame(NamedTuple):
-    """Origin of a link's frame in that of the ground, in [m], and its angle, in [rad]."""
+    """Origin of a link's frame in the ground's frame, in [m], and its angle, in [rad]."""
 
     place: complex
     angle: float

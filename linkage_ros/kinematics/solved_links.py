@@ -93,7 +93,7 @@ class SlideLine:
     The line of a point of one link along a slider, in the frame of the link that it slides on.
 
     The point lies at start + sign·(slide of the slider)·direction, a unit vector; ``angle`` is the
-    angle of the moving link minus that of the other link.
+    angle of the moving link minus the angle of the other.
     """
 
     start: complex

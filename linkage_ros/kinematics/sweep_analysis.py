@@ -94,7 +94,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
 
 
 def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
-    """Return a group and those that it starts from, by number."""
+    """Return the numbers of a group and of the groups that it starts from."""
     groups = closure.structure.groups
     owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
     needed: set[int] = set()
@@ -271,7 +271,7 @@ class InputSweep:
 
 
 def starts_at_pose(closure: LoopClosure) -> bool:
-    """Return whether the file's pose is the start: not only that of the links iterated."""
+    """Return whether the file's pose is the start, not only the start of an iteration."""
     linkage = closure.linkage
     several = len(linkage.inputs) > 1
     return linkage.pose is not None and not (
@@ -453,15 +453,15 @@ def conditioning_curves(sweep: InputSweep) -> dict[int, SweptCurve]:
 def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptCurve]:
     """Return the extremes of a method of the steps, applied to their poses, by group."""
     closure = sweep.closure
-    told = {
+    methods = {
         index: getattr(step, name)
         for index, step in enumerate(closure.steps)
         if hasattr(step, name)
     }
-    if not told:
+    if not methods:
         return {}
     # One sweep for all steps: otherwise each of n loops would be closed n times.
-    sampled: dict[int, list[Sampled]] = {number: [] for number in told}
+    sampled: dict[int, list[Sampled]] = {number: [] for number in methods}
     closed = nan
     for interval in sweep.ranges:
         values = sample_inputs(interval, count)
@@ -471,16 +471,18 @@ def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptC
             position = sweep.position_at(value)
             if position.status.has_pose:
                 closed = value
-            for number, method in told.items():
+            for number, method in methods.items():
                 result = method(position.poses[number]) if position.status.has_pose else nan
                 sampled[number][-1].results.append(result)
     if closed != closed:
-        return {closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in told}
+        return {
+            closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in methods
+        }
     return {
         closure.step_groups[number]: _min_max_curve(
             _as_input_function(sweep, number, method, closed), sampled[number]
         )
-        for number, method in told.items()
+        for number, method in methods.items()
     }
 
 

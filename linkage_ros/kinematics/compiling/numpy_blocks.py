@@ -11,7 +11,7 @@ A path as numpy, in the form that is fastest for arrays.
 
 Each operation is a pass over an array. Therefore constants are combined and signs merged, sine and
 cosine of an angle are computed from one tangent, and a condition that the bounds of its numbers
-decide is left out. Results may differ from those of the path in their last digits.
+decide is left out. Results may differ from the path in their last digits.
 """
 
 from __future__ import annotations

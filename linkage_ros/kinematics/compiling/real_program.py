@@ -60,7 +60,7 @@ class _Parts(NamedTuple):
 
 
 class Lowered(NamedTuple):
-    """A path in real numbers, and its fates."""
+    """A path in real numbers, and its fallback statuses."""
 
     path: Path
     fallback_statuses: tuple[Tree, ...]

@@ -11,8 +11,8 @@ Many states of a linkage at once.
 
 They pass, block by block, through the paths of the linkage as numpy: intermediate results stay in
 the cache, and memory grows only with the returned arrays. A state that leaves a path gets its
-status from the fates of the path; only the plain steps can solve toggles and change points, so
-they are called for these.
+status from the fallback statuses of the path; only the interpreted steps can solve toggles and
+change points, so they are called for these.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _CLOSED, _LIMITED = CODES[Status.CLOSED], CODES[Status.LIMITED]
 _TOGGLE = CODES[Status.TOGGLE]
 
 _LOST = (Status.OPEN, Status.INDETERMINATE)
-"""The statuses that the fates of a path decide; the plain steps decide all others."""
+"""The statuses that a path decides as fallbacks; the interpreted steps decide all others."""
 
 
 class _SolveProgram(NamedTuple):
@@ -303,7 +303,7 @@ def _array_program(path: Lowered, kinds: Sequence[Any]) -> _SolveProgram:
 
 
 def _leads_to_status(form: ArrayForm, fallback: Tree, status: Status) -> Number:
-    """Return the condition that a fate leads to a status."""
+    """Return the condition that a fallback leads to a status."""
     if not isinstance(fallback, DecisionBranch):
         return fallback is status
     condition = form.rewrite_number(fallback.condition)
@@ -356,7 +356,7 @@ def _broadcast_values(name: str, values: list[Any], driven: int, count: int | No
 
 
 def _result_arrays(width: int, count: int, derivatives: int, out: Batch | None) -> Batch:
-    """Return the arrays for the results: those of ``out``, and new ones for the others."""
+    """Return the arrays for the results, from ``out`` where it has them, else new ones."""
     arrays: list[Any] = []
     given = out or (None,) * 4
     for k, (name, array) in enumerate(zip(Batch._fields, given, strict=True)):

@@ -179,7 +179,7 @@ class Tape:
 
 
 class Symbol:
-    """A number that is not known yet: the result of an operation on the tape that records it."""
+    """Symbolic number: result of a recorded operation."""
 
     __slots__ = ('operation', 'tape')
 

@@ -146,8 +146,8 @@ def fallback_statuses(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     """
     Return, for each decision of a path, the status of the linkage if the decision differs.
 
-    The status is that of the first step that is not closed. If that step has a pose, as at a
-    toggle, a later step may have a worse status. None if the steps continue on another path, and
+    The first step that is not closed gives the status. If that step has a pose, as at a toggle,
+    a later step may have a worse status. None if the steps continue on another path, and
     only they give the status. The path is traced without limits.
     """
     tape = path.tape

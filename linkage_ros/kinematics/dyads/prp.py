@@ -16,7 +16,7 @@ from û1 to û2::
     E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
 
 The rates solve the same equations for the difference of the links' velocities at the pin, the
-accelerations for that of their accelerations, including Coriolis terms. Seen from one of the
+accelerations for the difference of their accelerations, with Coriolis terms. Seen from one of the
 links, a slide is multiplied by the relative turn only::
 
     ṡ1 = ((Ė2 − Ė1 − ω1 × (E2 − E1)) × û2 − (ω2 − ω1)·s2)/sin δ

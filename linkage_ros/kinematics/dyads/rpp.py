@@ -15,7 +15,7 @@ z component of the cross product::
 
     z = κ + s2·û + s1·v̂        s1 = (z − κ) × û/(v̂ × û)        s2 = (z − κ) × v̂/(û × v̂)
 
-s2 is the slide along the known line, s1 that of the pinned link along the second. The same
+s2 is the slide along the known line, s1 the slide of the pinned link on the second. The same
 equations hold for the rates and the accelerations. There is one solution at every state, and no
 toggle.
 """

@@ -251,8 +251,8 @@ class FoldingRRRDyad(RRRDyad):
         α4 = σ·N·near/2·(−1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)        G = N/w
 
     If far is below 0, so is ρ: σ and near change their signs, and far is taken positive. Without
-    this form 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, where κ is that of
-    lengths which change together, so that the change point remains one.
+    this form 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, where κ is the
+    condition of lengths which change together, so that the change point remains one.
 
     The diagonal is one that `passes_fold`.
     """
@@ -341,7 +341,7 @@ class FoldingRRRDyad(RRRDyad):
 
 class DrivenOffset(NamedTuple):
     """
-    The transformation from the frame of one link to that of a link it is driven against.
+    The transformation from the frame of one link to the frame of a link it is driven against.
 
     A point z becomes origin + e^{i·(angle + sign·x[turn])}·(z − inner) + sign·x[slide]·unit; turn
     or slide is the index of the input, and the other is −1.
@@ -408,7 +408,7 @@ class DrivenRRRPose(NamedTuple):
 
 
 class DrivenRRRRates(NamedTuple):
-    """The rates of the diagonal, and those of both sides."""
+    """The rates of the diagonal and of both sides."""
 
     diagonal_rate: DiagonalRate
     sides: tuple[complex, complex]
