@@ -45,7 +45,7 @@ _NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 't
 
 
 def choose_solver(linkage: Linkage, accuracy: float) -> Closure:
-    """Return the fastest closure of those that are proven to reach an accuracy in [rad] or [m]."""
+    """Return the fastest closure that is proven to reach an accuracy, in [rad] or [m]."""
     closed = Solver(Closure(linkage))
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}

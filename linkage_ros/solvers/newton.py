@@ -16,8 +16,8 @@ two real equations. With × for the z component of the cross product::
 
 until both corrections are below the tolerance, in [rad] or [m]; the remaining error has the size
 of their square. Rates and accelerations solve the same equations for the change of F while p and
-q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is that
-of the assembly. The closed form gives the state instead where the sign differs from that of the
+q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is the
+assembly. The closed form gives the state instead where the sign differs from the sign of the
 closed form nearby (near a toggle or a change point), where the method does not converge, and where
 the loops do not close. Groups that no dyad covers are iterated in any case, here to the tolerance.
 
@@ -270,7 +270,7 @@ class NewtonDyad:
     def append_rates(
         self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
     ) -> None:
-        """Append the rates of p and q, given those of the known coordinates."""
+        """Append the rates of p and q, given the rates of the known coordinates."""
         v += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:
@@ -286,7 +286,7 @@ class NewtonDyad:
         a: list[float],
         pulls: list[complex],
     ) -> None:
-        """Append the accelerations of p and q, given those of the known coordinates."""
+        """Append the accelerations of p and q; the known coordinates have theirs."""
         a += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:

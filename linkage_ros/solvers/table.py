@@ -18,10 +18,10 @@ form's values f and derivatives f' at both ends (G. Birkhoff and A. Priver, J. M
     cubic    |f − p| ≤ h⁴/384·max|f''''|     |f' − p'| ≤ √3·h³/216·max|f''''|
                                              |f'' − p''| ≤ h²/12·max|f''''|
 
-Rates and accelerations are derivatives of the polynomial; the tolerance is that of the positions.
+Rates and accelerations are derivatives of the polynomial; the tolerance bounds positions.
 `table_proof` bounds the derivatives over the whole range; so if a tolerance is given instead of
 knots, it is met everywhere, or the table is refused. Beyond the range of the table, and at its
-ends, the states are those of the closed form.
+ends, the closed form gives the states.
 """
 
 from __future__ import annotations
@@ -210,8 +210,8 @@ class TableClosure(Solver):
         Return the closure error of a closed position, in [m].
 
         A table has joints but no links. The error is therefore the distance of its joints from
-        those of the closed form (an angle at the length of the longest link), plus the error of
-        the closed form.
+        the joints of the closed form (an angle at the length of the longest link), plus the error
+        of the closed form.
         """
         exact = self.exact_position(position)
         joints = zip(position.joints, exact.joints, self.turning, strict=True)
@@ -306,7 +306,7 @@ class TableClosure(Solver):
         if self._degree == 1:
             table[:, :, 1] = step.T
             return table
-        # A toggle at an end has no slope; use that of the chord.
+        # A toggle at an end has no slope; use the slope of the chord.
         begin = np.where(np.isfinite(slopes[:, :-1]), slopes[:, :-1], step)
         end = np.where(np.isfinite(slopes[:, 1:]), slopes[:, 1:], step)
         table[:, :, 1] = begin.T

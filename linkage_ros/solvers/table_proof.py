@@ -56,7 +56,7 @@ _SMALLEST_CELL = 2.0**-18
 
 _MOST_CELLS = 2**14
 _PLENTY = 2**10
-"""Cells: for each so many, twice as many knots cost less than the cells that spare them."""
+"""For each this many cells the knots may double, which costs less than still smaller cells."""
 
 _BLOCK = 4096
 _TIGHT = 1.1
