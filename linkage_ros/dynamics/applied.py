@@ -132,7 +132,7 @@ class AppliedForces:
     def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
-        self.seconds = 0.0  # The time since the first tick, for `acting` without one
+        self.seconds = 0.0  # The time since the first tick, for `acting_loads` without one
         _check_loads(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
         # The loaded points: link, and place in its frame, in [m].
@@ -207,7 +207,7 @@ class AppliedForces:
                 axes, coordinate = (angle.unit, 1j * angle.unit), angle.coordinate
             along: list[JointCoordinate | LoadedPoint]
             along = [LoadedPoint(link, number, place, axis, coordinate) for axis in axes]
-            # The turning of a link is that of a joint between it and the ground.
+            # A link turns as a joint between it and the ground.
             names = ('', link, GROUND)
             along.append(JointCoordinate(0, False, True, *names, angle.coordinate, 0, 1.0))
             for component, at in enumerate(along):
@@ -345,7 +345,7 @@ class AppliedForces:
         virtual: Velocity,
         time: float,
     ) -> float:
-        """Return the work of the loads over a virtual velocity; arguments as of `acting`."""
+        """Return the work of the loads over a virtual velocity; arguments as in `acting_loads`."""
         moved, work = self._point_velocities(position, virtual), 0.0
         for at, force in self.acting_loads(position, velocity, time):
             work += force * at.lever(virtual, position, moved)

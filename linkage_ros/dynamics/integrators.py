@@ -98,8 +98,8 @@ def gauss_legendre(
     """
     Advance by Gauss's collocation with three stages: of order 6, implicit, symmetric in time.
 
-    Because it is symmetric, it keeps the energy of a reversible motion, such as that of an
-    undamped linkage, within a bound for ever, apart from rounding (E. Hairer, C. Lubich, G.
+    Because it is symmetric, it keeps the energy of a reversible motion, such as the motion of
+    an undamped linkage, within a bound for ever, apart from rounding (E. Hairer, C. Lubich, G.
     Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, XI.3). With the accelerations A
     of the stages::
 

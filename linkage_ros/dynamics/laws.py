@@ -164,7 +164,7 @@ class Stribeck:
         return segment * rate if segment else inf
 
     def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
-        """Return the force, as if the direction were that of the segment."""
+        """Return the force in the direction of the segment."""
         return -segment * self.excess * exp(-((rate / self.rate) ** 2))
 
     @property

@@ -101,8 +101,8 @@ def friction_effort(
     """
     Return what the frictions resist at the input, in [N·m] or [N]; None if the linkage jams.
 
-    ``forces`` are as of `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each joint;
-    ``pull`` and ``mobility`` are as of `solve_frictions`.
+    ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each joint;
+    ``pull`` and ``mobility`` are as in `solve_frictions`.
     """
     count, numbers = len(unknowns), iter(forces)
     joints = []

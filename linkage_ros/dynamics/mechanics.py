@@ -86,8 +86,8 @@ class FrictionJoint(NamedTuple):
     A joint with friction.
 
     Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
-    ``joint`` is its index among the joints of the structure. ``law`` is that of the friction that
-    falls with the rate, if it has any.
+    ``joint`` is its index among the joints of the structure. ``law`` is the law of the friction
+    that falls with the rate, if it has any.
     """
 
     joint: int
@@ -281,7 +281,7 @@ class Mechanics:
         return energy if self.applied is None else energy + self.applied.potential_energy(position)
 
     def kinetic_energy(self, position: Position, velocity: Velocity) -> float:
-        """Return the kinetic energy, including that of the drive's inertia, in [J]."""
+        """Return the kinetic energy, with the drive's inertia, in [J]."""
         places = self._follower.places(position)
         velocities = self._follower.velocities(position, velocity, places)
         v = velocity.state.coordinates

@@ -9,20 +9,20 @@
 """
 The motion of a linkage of one freedom under a force: sticking, slipping, and stopped at its ends.
 
-The equation of motion is that of `linkage_ros.dynamics.mechanics`::
+The equation of motion (`linkage_ros.dynamics.mechanics`)::
 
     I(q)·q̈ + ½·I'(q)·q̇² + V'(q) + C(q)·q̇ + (F(q) + B)·sign(q̇) = τ
 
-with a brake B in addition to the friction F of the joints. Within a step the sign is that of the
-rate at its start, so the integrand is smooth. If the rate changes its sign, the integrator finds
-the instant at which it is zero: the mechanism stays there until |τ − V'| exceeds F + B, or
+with a brake B in addition to the friction F of the joints. Within a step the sign of the rate
+at its start is kept, so the integrand is smooth. If the rate changes its sign, the integrator
+finds the instant at which it is zero: the mechanism stays there until |τ − V'| exceeds F + B, or
 reverses at once. For one freedom this is Coulomb's law itself, without a threshold rate below
 which friction is smoothed. Without friction no instant is searched for.
 
 F(q) = Σ T·|ψ'(q)| has a kink where the slip ψ' of a joint reverses, as in the pin of a rocker at
 either end of its swing. A step across it is of order 2, whatever the method. So within a step the
-signs of the slips, too, are those at its start; if one has changed at the end, the integrator
-finds the instant and cuts the step there. Both pieces are smooth, and the order is that of the
+signs of the slips at its start are kept, too; if one has changed at the end, the integrator
+finds the instant and cuts the step there. Both pieces are smooth, and have the order of the
 method (`test/dynamics/test_kinks.py`). Without Coulomb friction no instant is searched for.
 
 A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. Within a step each
@@ -180,7 +180,7 @@ class SingleDofMechanism:
     def acceleration(
         self, motion: Motion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
-        """Return q̈, in [rad/s²] or [m/s²]; the parameters are those of `advance`."""
+        """Return q̈, in [rad/s²] or [m/s²]; the parameters are as in `advance`."""
         if self.laws:
             force += self._applied_force(motion.terms, motion.rate, time)
         sense = self._motion_direction(motion, force, brake, time)
@@ -423,7 +423,7 @@ class SingleDofMechanism:
         return min(held + 2.0 * ulp(now + held), seconds)
 
     def _law_segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
-        """Return the segment of each law, of a motion that begins with those of its direction."""
+        """Return the segment of each law for a motion, or for the direction in which it begins."""
         rate = motion.rate or sense * _BEGINNING
         return tuple(
             law.segment(at.value, at.factor * rate, now)

@@ -13,11 +13,11 @@ The current follows the voltage at once (no inductance). With the torque constan
 R, the ratio N and the rate of the motor ω = N·q̇::
 
     i = V/R − k·ω/R,  i,  or  τ/(k·N·η)       for a command of voltage V, current i or effort τ
-    i within ±iₘ, then within (±U − k·ω)/R    the amplifier's limit, then that of its supply U
+    i within ±iₘ, then within (±U − k·ω)/R    the limits of the amplifier and its supply U
     T = k·i
     Q = N·T·η  if T·ω ≥ 0,  N·T/ηᵦ otherwise  at the input
 
-The efficiencies are those of the gear while power flows to the input, η, and from it, ηᵦ
+The efficiencies of the gear are η while power flows to the input, and ηᵦ while it flows back
 (H. Giberti, S. Cinquemani, G. Legnani, Effects of transmission mechanical characteristics on the
 choice of a motor-reducer, Mechatronics 20, 2010; for the motor itself: A. Hughes, B. Drury,
 Electric Motors and Drives, 4th ed., 2013, ch. 3). At rest the motor holds any load between both
@@ -131,7 +131,7 @@ class Motor:
 
     @staticmethod
     def at_rest(mechanism: Any, _motion: Any) -> tuple[float, float]:
-        """Return the effort at rest, and what the gear holds beyond that of `drive_by`."""
+        """Return the effort at rest, and what the gear holds beyond the friction of `drive_by`."""
         *_, law = getattr(mechanism, 'motor', mechanism).laws
         return law.resting, 0.0
 

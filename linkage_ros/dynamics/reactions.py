@@ -343,8 +343,8 @@ class Reactions:
         """
         Return the effort of each drive; empty where there are no forces.
 
-        It is that of `Mechanics.drive_efforts`, which does not know the friction that grows with
-        the forces in the joints. The parameters are those of `solve`.
+        It is as in `Mechanics.drive_efforts`, plus the friction that grows with the forces in the
+        joints. The parameters are as in `solve`.
         """
         balance = self._solve_balance(position, velocity, acceleration, seconds)
         if balance is None:
@@ -369,7 +369,7 @@ class Reactions:
 
         The result is in [N·m] or [N]; None where the linkage jams, or has no forces. ``value`` and
         ``rate`` of the input are in [rad] or [m] and per second; the rate is not 0. ``seconds`` is
-        the time since the first tick, ``pull`` and ``mobility`` are as of
+        the time since the first tick, ``pull`` and ``mobility`` are as in
         `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
         """
         closure, applied = self._mechanics.closure, self._mechanics.applied
@@ -397,7 +397,7 @@ class Reactions:
     def _force_coefficients(
         self, position: Position, velocity: Velocity
     ) -> Sequence[Sequence[float]]:
-        """Return the coefficients of the forces in pressed joints, and the levers of these."""
+        """Return the coefficients of the forces that cause friction, and the levers of joints."""
         closure, size = self._mechanics.closure, self._matrix.size
         x, places = position.state.coordinates, self._follower.places(position)
         still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
@@ -501,7 +501,7 @@ class Reactions:
         """
         Return the right sides of the system, and the friction in each joint.
 
-        Behind the right sides stand those of a unit of each friction that grows with its force.
+        After them follow the right sides of a unit of each friction that grows with its force.
         """
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)

@@ -74,7 +74,7 @@ class Winding:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.
 
-        Parameters and error are those of `Motor.check_step`.
+        Parameters and error are as in `Motor.check_step`.
         """
         motor = self.motor
         if motor.resistance and self.inductance / motor.resistance < step:
@@ -141,7 +141,7 @@ class WoundMotion(NamedTuple):
 
     @property
     def motor(self) -> Any:
-        """Return the state of the motor: behind play its own, else that of the input."""
+        """Return the state of the motor: behind play its own, else the state of the input."""
         return getattr(self.moved, 'motor', self.moved)
 
 
@@ -167,7 +167,7 @@ class WoundMechanism:
     def acceleration(
         self, motion: WoundMotion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
-        """Return q̈; the parameters are those of `OneFreedom.advance`."""
+        """Return q̈; the parameters are as in `SingleDofMechanism.advance`."""
         under, _, holding = self.winding.motor.drive_by(self.mechanism, motion.current)
         return float(under.acceleration(motion.moved, force, brake + holding, time))
 
@@ -179,7 +179,7 @@ class WoundMechanism:
         brake: float = 0.0,
         time: float = 0.0,
     ) -> WoundMotion:
-        """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
+        """Advance a state by one step; the parameters are as in `SingleDofMechanism.advance`."""
         current_after, half = self.winding.current_after, 0.5 * seconds
         current = current_after(motion.current, motion.motor.rate, self.command, half)
         under, _, holding = self.winding.motor.drive_by(self.mechanism, current)

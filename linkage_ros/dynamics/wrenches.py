@@ -67,5 +67,5 @@ class Component:
         return self.held_wrench.wrench[self.number]
 
     def current_load(self, _value: float) -> tuple[float]:
-        """Return that alone, which may be `called` at a value of the input."""
+        """Return the load alone, which `call` may evaluate at a value of the input."""
         return (self.held_wrench.wrench[self.number],)
