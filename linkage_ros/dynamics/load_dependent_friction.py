@@ -99,7 +99,7 @@ def friction_effort(
     mobility: float,
 ) -> float | None:
     """
-    Return what the frictions resist at the input, in [N·m] or [N]; None if the linkage jams.
+    Return the friction effort at the input, in [N·m] or [N]; None if the linkage jams.
 
     ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each joint;
     ``pull`` and ``mobility`` are as in `solve_frictions`.

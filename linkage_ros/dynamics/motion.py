@@ -62,7 +62,7 @@ State = TypeVar('State')
 
 LARGEST = 1e10
 """
-Values and rates beyond this are no valid motion, in [rad], [m] or either per second.
+Values and rates beyond this are not a valid motion, in [rad], [m] or either per second.
 
 As doubles, angles are 2e-6 rad apart there.
 """

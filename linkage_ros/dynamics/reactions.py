@@ -365,7 +365,7 @@ class Reactions:
         self, value: float, rate: float, seconds: float, pull: float, mobility: float
     ) -> float | None:
         """
-        Return what the friction by the forces in the joints resists at the only input.
+        Return the effort at the only input by the friction that grows with the joint forces.
 
         The result is in [N·m] or [N]; None where the linkage jams, or has no forces. ``value`` and
         ``rate`` of the input are in [rad] or [m] and per second; the rate is not 0. ``seconds`` is

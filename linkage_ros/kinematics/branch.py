@@ -10,7 +10,7 @@
 The solution curve of links that Newton's method solves, followed without jumping to another one.
 
 The n constraints F(u, x) = 0 on n unknowns u and one input x define a curve of points z = (u, x).
-The curve is followed by its length, so a toggle, where it turns back in x, is no special point.
+The curve is followed by its length, so a toggle, where it turns back in x, is not a special point.
 A cell leads from one solution to the next; s is the distance along the tangent at its first node,
 and the cubic c(s) has the places and tangents of both nodes. A cell is accepted only if it is
 proven to hold one piece of curve. Let h be the width of the cell, B the Jacobian at c(h/2) of F

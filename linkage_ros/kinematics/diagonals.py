@@ -380,7 +380,7 @@ class NearlyCrossingDiagonal(CrankDiagonal):
     """
     The diagonal of a dyad whose lengths nearly make a change point.
 
-    Its roots have the sign of the half angle, as those at the change point have. So the dyad stays
+    Its roots have the sign of the half angle, as at a change point. So the dyad stays
     next to the one without deviations, where a side alone would leave it.
 
     ``crosses``: whether the dyad without deviations changes its side where it folds and where it

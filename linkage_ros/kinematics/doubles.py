@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Numbers from a caller as doubles, whatever their type; what is no number is refused.
+Numbers from a caller as doubles, whatever their type; what is not a number is refused.
 
 A number has ``__float__`` or ``__index__``, as for `math`: a text has neither, and so has a date.
 A number beyond the doubles is infinite, as the literal ``1e400`` is in Python.

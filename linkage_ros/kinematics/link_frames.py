@@ -35,8 +35,6 @@ class LinkFrames:
     The frames of the links that move, and of the blocks of sliders that are not links.
 
     Such a block has its frame at the slider's point, with the angle of the link it slides along.
-
-    All links of ``known`` are known.
     """
 
     def __init__(self, linkage: Linkage, structure: Structure, known: SolvedLinks) -> None:

@@ -49,8 +49,7 @@ class PointTracker:
 
     Each method returns a list of every point on the way; the requested points are at `indices`.
 
-    All links of ``known`` are known. Each point is the name of its link and its place in that
-    link's frame, in [m].
+    Each point is the name of its link and its place in that link's frame, in [m].
     """
 
     __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')
