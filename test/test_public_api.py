@@ -176,11 +176,11 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: OPEN.points, ValueError,
         'points: <Position open by 0.0619 m> has none; check its st',
     ),
-    (lambda: FOUR_BAR.velocity(0.7, 1.0), TypeError, 'position: 0.7 is not of <Closure four_bar'),
+    (lambda: FOUR_BAR.velocity(0.7, 1.0), TypeError, 'position: 0.7 is not from <Closure'),
     (lambda: FOUR_BAR.velocity(OPEN, 1.0), TypeError, 'position: <Position open by 0.0619 m> is'),
     (
         lambda: FOUR_BAR.acceleration(POSITION, POSITION.joints, 0.0), TypeError,
-        'velocity: (-0.3460422454115175, 1.001032173019738) is not of <Closure four_bar',
+        'velocity: (-0.3460422454115175, 1.001032173019738) is not from <Closure four_bar',
     ),
     (
         lambda: lr.generate_function('x', *RANGES, points=2), lr.SynthesisError,

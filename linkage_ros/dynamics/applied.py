@@ -125,35 +125,17 @@ class AppliedForces:
     """
     The loads of a linkage on joints and points.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    applied
-        The loads.
-
-    Attributes
-    ----------
-    laws
-        The laws of the loads that are not constant, in the order of `LawTerm` in `one_input`.
-    points
-        The loaded points: link, and place in its frame, in [m].
-    wrenches
-        The wrenches on links, each with its newest message, by the name of the link.
-
-    Raises
-    ------
-    DefinitionError
-        A table, a stop, a direction or a point is wrong; with the key ``loads.KIND.NAME``.
-
+    A wrong table, stop, direction or point raises DefinitionError with the key
+    ``loads.KIND.NAME``.
     """
 
     def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
-        self.seconds = 0.0  # The time since the first tick, for `acting` without one
+        self.seconds = 0.0  # The time since the first tick, for `acting_loads` without one
         _check_loads(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
+        # The loaded points: link, and place in its frame, in [m].
         self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
         for link, wrench in applied.wrenches.items():
             point = linkage.links[link][wrench.point] if wrench.point else (0.0, 0.0)
@@ -225,7 +207,7 @@ class AppliedForces:
                 axes, coordinate = (angle.unit, 1j * angle.unit), angle.coordinate
             along: list[JointCoordinate | LoadedPoint]
             along = [LoadedPoint(link, number, place, axis, coordinate) for axis in axes]
-            # The turning of a link is that of a joint between it and the ground.
+            # A link turns as a joint between it and the ground.
             names = ('', link, GROUND)
             along.append(JointCoordinate(0, False, True, *names, angle.coordinate, 0, 1.0))
             for component, at in enumerate(along):
@@ -239,22 +221,11 @@ class AppliedForces:
         step: float,
     ) -> None:
         """
-        Refuse a spring or a stop that is too stiff for the step of the integration.
+        Refuse a spring or a stop that is too stiff for a step of the integration, in [s].
 
-        Parameters
-        ----------
-        inertia
-            Of the equation of motion, as a function of the only input; 0 where there is none.
-        between
-            Range of the input, in [rad] or [m].
-        method, step
-            The method of integration, by name, and its step, in [s].
-
-        Raises
-        ------
-        DefinitionError
-            With the key of the stiffest load; the remedy is the longest step that carries it.
-
+        ``inertia`` is the inertia of the equation of motion as a function of the only input, 0
+        where there is none; ``between`` is the range of the input, in [rad] or [m]. The error has
+        the key of the stiffest load; its remedy is the longest step that carries it.
         """
         yielding: dict[str, JointSpring | SoftStop] = {
             **{
@@ -310,20 +281,8 @@ class AppliedForces:
         """
         Return what the loads add to the equation of motion of a linkage with one input.
 
-        Parameters
-        ----------
-        position
-            A closed position.
-        velocity
-            The velocity at a rate of 1.
-
-        Returns
-        -------
-        slope, viscous
-            The force on the input is −slope − viscous·q̇, without that of the laws.
-        terms
-            For each law.
-
+        The position is closed, and the velocity has a rate of 1. The result is slope, viscous and
+        a term for each law: without the laws, the force on the input is −slope − viscous·q̇.
         """
         moved = self._point_velocities(position, velocity)
         slope = viscous = 0.0
@@ -363,13 +322,8 @@ class AppliedForces:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
 
-        Parameters
-        ----------
-        position, velocity
-            The motion.
-        time
-            Since the first tick, in [s]; None for ``seconds``, when a compiled program runs.
-
+        ``time`` is the time since the first tick, in [s]; None for ``seconds``, when a compiled
+        program runs.
         """
         now = () if time is None else (time,)
         for joint, spring in self._springs:
@@ -391,7 +345,7 @@ class AppliedForces:
         virtual: Velocity,
         time: float,
     ) -> float:
-        """Return the work of the loads over a virtual velocity; arguments as of `acting`."""
+        """Return the work of the loads over a virtual velocity; arguments as in `acting_loads`."""
         moved, work = self._point_velocities(position, virtual), 0.0
         for at, force in self.acting_loads(position, velocity, time):
             work += force * at.lever(virtual, position, moved)
@@ -443,7 +397,7 @@ def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
                 key, 'lies on the ground, which a force does not move', 'name another point'
             )
         if not any(force.direction):
-            raise DefinitionError(f'{key}.direction', '[0, 0] is no direction', 'write [1, 0]')
+            raise DefinitionError(f'{key}.direction', '[0, 0] is not a direction', 'write [1, 0]')
         if len(linkage.inputs) > 1 and (force.over_position or force.over_rate):
             raise DefinitionError(
                 key,

@@ -30,6 +30,30 @@ Takes a(q, w, t), q, w, the acceleration there, and the step in [s]; returns q a
 Returns None if a stage lies where there is no motion, or does not converge.
 """
 
+_R = sqrt(15.0)
+
+GAUSS_NODES = (0.5 - _R / 10, 0.5, 0.5 + _R / 10)
+GAUSS_WEIGHTS = (5 / 18, 4 / 9, 5 / 18)
+GAUSS_MATRIX = (
+    (5 / 36, 2 / 9 - _R / 15, 5 / 36 - _R / 30),
+    (5 / 36 + _R / 24, 2 / 9, 5 / 36 - _R / 24),
+    (5 / 36 + _R / 30, 2 / 9 + _R / 15, 5 / 36),
+)
+
+_SQUARE = tuple(
+    tuple(fsum(a * of[j] for a, of in zip(row, GAUSS_MATRIX, strict=True)) for j in range(3))
+    for row in GAUSS_MATRIX
+)
+_LEVERS = tuple(b * (1.0 - c) for b, c in zip(GAUSS_WEIGHTS, GAUSS_NODES, strict=True))
+_STAGES = tuple(zip(GAUSS_NODES, _SQUARE, GAUSS_MATRIX, strict=True))
+
+_ITERATIONS = 20
+"""More iterations mean no convergence; a shorter step converges faster."""
+_ROUNDING = 2.0**-54
+"""Smaller changes count as none, relative to the accelerations."""
+_NOISE = 1e-12
+"""Changes that grow again are rounding below this fraction, and divergence above it."""
+
 
 def semi_implicit_euler(
     _field: Field, value: float, rate: float, acceleration: float, length: float
@@ -68,39 +92,14 @@ def rk4(
     return value + length * mean_slope, rate + length * mean_change
 
 
-_R = sqrt(15.0)
-
-GAUSS_NODES = (0.5 - _R / 10, 0.5, 0.5 + _R / 10)
-GAUSS_WEIGHTS = (5 / 18, 4 / 9, 5 / 18)
-GAUSS_MATRIX = (
-    (5 / 36, 2 / 9 - _R / 15, 5 / 36 - _R / 30),
-    (5 / 36 + _R / 24, 2 / 9, 5 / 36 - _R / 24),
-    (5 / 36 + _R / 30, 2 / 9 + _R / 15, 5 / 36),
-)
-
-_SQUARE = tuple(
-    tuple(fsum(a * of[j] for a, of in zip(row, GAUSS_MATRIX, strict=True)) for j in range(3))
-    for row in GAUSS_MATRIX
-)
-_LEVERS = tuple(b * (1.0 - c) for b, c in zip(GAUSS_WEIGHTS, GAUSS_NODES, strict=True))
-_STAGES = tuple(zip(GAUSS_NODES, _SQUARE, GAUSS_MATRIX, strict=True))
-
-_ITERATIONS = 20
-"""More iterations mean no convergence; a shorter step converges faster."""
-_ROUNDING = 2.0**-54
-"""Smaller changes count as none, relative to the accelerations."""
-_NOISE = 1e-12
-"""Changes that grow again are rounding below this fraction, and divergence above it."""
-
-
 def gauss_legendre(
     field: Field, value: float, rate: float, acceleration: float, length: float
 ) -> tuple[float, float] | None:
     """
     Advance by Gauss's collocation with three stages: of order 6, implicit, symmetric in time.
 
-    Because it is symmetric, it keeps the energy of a reversible motion, such as that of an
-    undamped linkage, within a bound for ever, apart from rounding (E. Hairer, C. Lubich, G.
+    Because it is symmetric, it keeps the energy of a reversible motion, such as the motion of
+    an undamped linkage, within a bound for ever, apart from rounding (E. Hairer, C. Lubich, G.
     Wanner, Geometric Numerical Integration, 2nd ed., 2006, II.1.3, XI.3). With the accelerations A
     of the stages::
 

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from math import e, exp, inf, sqrt, tau
 from typing import NamedTuple, Protocol
 
+_LOW, _FREE, _HIGH = -1, 0, 1
+
 
 class Law(Protocol):
     """
@@ -89,9 +91,6 @@ class LawTerm(NamedTuple):
     lever: float  # λ of the load
     value: float  # x of the law, in [rad] or [m]
     factor: float  # ẋ at a rate of the input of 1
-
-
-_LOW, _FREE, _HIGH = -1, 0, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +164,7 @@ class Stribeck:
         return segment * rate if segment else inf
 
     def force(self, segment: int, _value: float, rate: float, _time: float) -> float:
-        """Return the force, as if the direction were that of the segment."""
+        """Return the force in the direction of the segment."""
         return -segment * self.excess * exp(-((rate / self.rate) ** 2))
 
     @property

@@ -36,6 +36,9 @@ _ROUNDS = 50
 _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
+Unknown = tuple[int, bool, float]
+"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
+
 
 class LoadDependentFriction(NamedTuple):
     """A joint with such friction, and the force in it; of a slider, the force is a real number."""
@@ -53,15 +56,8 @@ def solve_frictions(
     """
     Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
 
-    Parameters
-    ----------
-    joints
-        All joints with such friction.
-    pull
-        q̈ without this friction, in [rad/s²] or [m/s²].
-    mobility
-        How much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
-
+    ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how much q̈
+    falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
     """
     found = [0.0] * len(joints)
     places = range(len(joints))
@@ -95,10 +91,6 @@ def solve_frictions(
     return None
 
 
-Unknown = tuple[int, bool, float]
-"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
-
-
 def friction_effort(
     unknowns: Sequence[Unknown],
     forces: Sequence[float],
@@ -107,19 +99,10 @@ def friction_effort(
     mobility: float,
 ) -> float | None:
     """
-    Return what the frictions resist at the input, in [N·m] or [N]; None if the linkage jams.
+    Return the friction effort at the input, in [N·m] or [N]; None if the linkage jams.
 
-    Parameters
-    ----------
-    unknowns
-        The joints.
-    forces
-        As of `forces_in`, for F₀, F₁ and the P_k.
-    levers
-        |ψ'| of each joint.
-    pull, mobility
-        As of `solve_frictions`.
-
+    ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each joint;
+    ``pull`` and ``mobility`` are as in `solve_frictions`.
     """
     count, numbers = len(unknowns), iter(forces)
     joints = []
@@ -136,15 +119,7 @@ def solve_pressed(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> 
     """
     Return the solution of a linear system with such friction, and the friction in each joint.
 
-    Parameters
-    ----------
-    unknowns
-        The joints.
-    matrix
-        The matrix.
-    *sides
-        The right sides: first without this friction, then of a unit of each.
-
+    ``sides`` are the right sides: first without this friction, then of a unit of each.
     """
     solutions = _solve_sides(matrix, sides)
     if solutions is None:

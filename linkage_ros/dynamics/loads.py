@@ -21,6 +21,11 @@ from linkage_ros.description import choice, each_part, number, number_rows, poin
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage
 
+GREATEST_LOAD, STIFFEST = 1e9, 1e12
+"""Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
+
+_EFFORT = 'N·m or N'
+
 
 @dataclass(frozen=True, slots=True)
 class Spring:
@@ -49,12 +54,6 @@ class Spring:
     def tension(self, length: float, growth: float) -> float:
         """Return the pulling force, in [N], for a length, in [m], and its rate, in [m/s]."""
         return self.stiffness * (length - self.free_length) + self.damping * growth
-
-
-GREATEST_LOAD, STIFFEST = 1e9, 1e12
-"""Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
-
-_EFFORT = 'N·m or N'
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,15 +257,9 @@ class Friction:
 
 def check_masses(linkage: Linkage, loads: Loads) -> None:
     """
-    Refuse a linkage in which a link that moves has no mass.
+    Refuse a linkage in which a link that moves has no mass; the error has the key ``masses``.
 
     Loads other than gravity act on a linkage without any masses, too.
-
-    Raises
-    ------
-    DefinitionError
-        With the key ``masses`` of the linkage file.
-
     """
     if not linkage.masses and loads.without_masses:
         return
@@ -284,12 +277,8 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     """
     Refuse loads and friction on parts that the linkage does not have.
 
-    Raises
-    ------
-    DefinitionError
-        With the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no name)
-        or ``effects.friction.joints.NAME``.
-
+    The error has the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no
+    name) or ``effects.friction.joints.NAME``.
     """
     for count, spring in enumerate(loads.springs, 1):
         key = f'loads.springs.{spring.name or count}'
@@ -316,7 +305,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
                 key,
-                f'{quote(name)} is no pin or slider',
+                f'{quote(name)} is not a pin or slider',
                 _one_of({*pins, *linkage.sliders}),
             )
         if name in pins and name in linkage.sliders:
@@ -333,7 +322,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
             )
             raise DefinitionError(
                 f'{key}.{given}',
-                f'the force in a pin rubs by both, and there is no {missing}',
+                f'friction by the force in a pin needs both, and {missing} is missing',
                 f'write {missing} too',
             )
     if friction and friction.holds and friction.load_dependent_joint:

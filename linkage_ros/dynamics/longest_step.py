@@ -51,28 +51,12 @@ def check_step(
     limits: Mapping[str, float] = STABLE,
 ) -> None:
     """
-    Refuse what is too stiff for the step of the integration.
+    Refuse what is too stiff for the step of the integration; the remedy is the longest step.
 
-    Parameters
-    ----------
-    where
-        Key of what is stiff.
-    fastest
-        The greatest |s| of the motion e^{s·t} that it causes, in [1/s].
-    method, step
-        The method of integration, by name, and its step, in [s].
-    fault
-        What is wrong with it, as 'it is too stiff'.
-    otherwise
-        The remedy if no step is short enough.
-    limits
-        `STABLE` or `EXACT`.
-
-    Raises
-    ------
-    DefinitionError
-        The step is too long; the remedy is the longest one.
-
+    ``where`` is the key of what is stiff, and ``fastest`` the greatest |s| of the motion e^{s·t}
+    that it causes, in [1/s]. The step of the method is in [s]. ``fault`` says what is wrong, as
+    'it is too stiff', ``otherwise`` is the remedy if no step is short enough, and ``limits`` is
+    `STABLE` or `EXACT`.
     """
     carried = limits[method] / fastest if fastest else inf
     if step > carried:

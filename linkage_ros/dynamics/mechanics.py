@@ -86,8 +86,8 @@ class FrictionJoint(NamedTuple):
     A joint with friction.
 
     Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
-    ``joint`` is its index among the joints of the structure. ``law`` is that of the friction that
-    falls with the rate, if it has any.
+    ``joint`` is its index among the joints of the structure. ``law`` is the law of the friction
+    that falls with the rate, if it has any.
     """
 
     joint: int
@@ -106,20 +106,8 @@ class Mechanics:
     """
     A linkage with masses, and the forces that act on it.
 
-    Parameters
-    ----------
-    closure
-        The linkage with its solution.
-    loads
-        The loads; none by default.
-    friction
-        Friction in pins and sliders; none by default.
-
-    Raises
-    ------
-    DefinitionError
-        If a link that moves has no mass, or a load names a part that does not exist.
-
+    Without loads and friction there are none. A link that moves without a mass, and a load on a
+    part that does not exist, raise DefinitionError.
     """
 
     def __init__(
@@ -293,7 +281,7 @@ class Mechanics:
         return energy if self.applied is None else energy + self.applied.potential_energy(position)
 
     def kinetic_energy(self, position: Position, velocity: Velocity) -> float:
-        """Return the kinetic energy, including that of the drive's inertia, in [J]."""
+        """Return the kinetic energy, with the drive's inertia, in [J]."""
         places = self._follower.places(position)
         velocities = self._follower.velocities(position, velocity, places)
         v = velocity.state.coordinates
@@ -310,13 +298,7 @@ class Mechanics:
         """
         Return the sum of kinetic and potential energy, in [J].
 
-        Parameters
-        ----------
-        position
-            A closed position, not a toggle.
-        *rates
-            Rates of the driven joints, in [rad/s] or [m/s].
-
+        The position is closed and not a toggle; the rates are in [rad/s] or [m/s].
         """
         velocity = self.closure.velocity(position, *rates)
         return self.kinetic_energy(position, velocity) + self.potential_energy(position)
@@ -331,21 +313,9 @@ class Mechanics:
         """
         Return the effort of each drive for a motion, against inertia, loads and friction.
 
-        Parameters
-        ----------
-        position
-            A closed position, not a toggle.
-        velocity, acceleration
-            Results of the closure, including those of the inputs.
-        seconds
-            Time since the first tick, for loads that change with it.
-
-        Returns
-        -------
-        efforts
-            For each input a moment in [N·m], or a force in [N] if it slides, positive if it drives
-            the input forward. Coulomb friction is 0 in a joint at rest.
-
+        Each is a moment in [N·m], or a force in [N] if the input slides, positive if it drives the
+        input forward; Coulomb friction is 0 in a joint at rest. The position is closed and not a
+        toggle. ``seconds`` is the time since the first tick, for loads that change with it.
         """
         follower, count = self._follower, len(self._units)
         places = follower.places(position)
@@ -390,20 +360,10 @@ class Mechanics:
 
     def check_curves(self, places: Sequence[Terms], method: str, step: float) -> None:
         """
-        Refuse friction that falls with the rate faster than a step follows.
+        Refuse friction that falls with the rate faster than a step follows, in [s].
 
-        Parameters
-        ----------
-        places
-            The equation of motion at places of the range.
-        method, step
-            The method of integration, by name, and its step, in [s].
-
-        Raises
-        ------
-        DefinitionError
-            With the key of the steepest curve; the remedy is the longest step that follows it.
-
+        ``places`` are the equation of motion at places of the range. The error has the key of the
+        steepest curve; its remedy is the longest step that follows it.
         """
         worst, blamed = 0.0, None
         for terms in places:

@@ -9,20 +9,20 @@
 """
 The motion of a linkage of one freedom under a force: sticking, slipping, and stopped at its ends.
 
-The equation of motion is that of `linkage_ros.dynamics.mechanics`::
+The equation of motion (`linkage_ros.dynamics.mechanics`)::
 
     I(q)·q̈ + ½·I'(q)·q̇² + V'(q) + C(q)·q̇ + (F(q) + B)·sign(q̇) = τ
 
-with a brake B in addition to the friction F of the joints. Within a step the sign is that of the
-rate at its start, so the integrand is smooth. If the rate changes its sign, the integrator finds
-the instant at which it is zero: the mechanism stays there until |τ − V'| exceeds F + B, or
+with a brake B in addition to the friction F of the joints. Within a step the sign of the rate
+at its start is kept, so the integrand is smooth. If the rate changes its sign, the integrator
+finds the instant at which it is zero: the mechanism stays there until |τ − V'| exceeds F + B, or
 reverses at once. For one freedom this is Coulomb's law itself, without a threshold rate below
 which friction is smoothed. Without friction no instant is searched for.
 
 F(q) = Σ T·|ψ'(q)| has a kink where the slip ψ' of a joint reverses, as in the pin of a rocker at
 either end of its swing. A step across it is of order 2, whatever the method. So within a step the
-signs of the slips, too, are those at its start; if one has changed at the end, the integrator
-finds the instant and cuts the step there. Both pieces are smooth, and the order is that of the
+signs of the slips at its start are kept, too; if one has changed at the end, the integrator
+finds the instant and cuts the step there. Both pieces are smooth, and have the order of the
 method (`test/dynamics/test_kinks.py`). Without Coulomb friction no instant is searched for.
 
 A law of an applied force (`linkage_ros.dynamics.laws`) is smooth in segments. Within a step each
@@ -60,6 +60,32 @@ NARROW = 1e-14
 
 State = TypeVar('State')
 
+LARGEST = 1e10
+"""
+Values and rates beyond this are not a valid motion, in [rad], [m] or either per second.
+
+As doubles, angles are 2e-6 rad apart there.
+"""
+
+_LEAST = 1e-100
+"""Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
+
+_PIECES = 20
+"""
+Most pieces of a step: at stops, where it sticks, and where it is too long.
+
+After these the mechanism rests: with so many bounces in one step it comes to rest anyway.
+"""
+
+_KINKS = 20
+"""Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
+
+_BEGINNING = 1e-200
+"""A rate that has a direction and no size."""
+
+_SHORTEST = 0.5**30
+"""Smallest fraction of a step that is integrated."""
+
 
 def last_before(
     reach: Callable[[float], State | None],
@@ -76,19 +102,9 @@ def last_before(
     computing the root of an equation, BIT 11, 1971), and bisection if it lacks two values: if the
     margin is 0 at the start too, or there is no state at the end.
 
-    Parameters
-    ----------
-    reach
-        Returns the state after some seconds; None if there is none.
-    margin
-        Returns the margin of a state, 0 or more before the instant.
-    start
-        The state at 0.
-    end
-        A time beyond the instant, in [s].
-    beyond
-        The state at that time; its margin is below 0.
-
+    ``reach`` returns the state after some seconds, None if there is none. ``margin`` is 0 or more
+    before the instant. ``end`` is a time beyond it, in [s], and ``beyond`` the state then, with a
+    margin below 0.
     """
     before, last, after, known = 0.0, start, end, True
     low, high = margin(start), margin(beyond)
@@ -115,33 +131,6 @@ def last_before(
             if now == 0.0:
                 return at, state, True
     return after, last, known
-
-
-LARGEST = 1e10
-"""
-Values and rates beyond this are no valid motion, in [rad], [m] or either per second.
-
-As doubles, angles are 2e-6 rad apart there.
-"""
-
-_LEAST = 1e-100
-"""Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
-
-_PIECES = 20
-"""
-Most pieces of a step: at stops, where it sticks, and where it is too long.
-
-After these the mechanism rests: with so many bounces in one step it comes to rest anyway.
-"""
-
-_KINKS = 20
-"""Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
-
-_BEGINNING = 1e-200
-"""A rate that has a direction and no size."""
-
-_SHORTEST = 0.5**30
-"""Smallest fraction of a step that is integrated."""
 
 
 class Motion(NamedTuple):
@@ -191,7 +180,7 @@ class SingleDofMechanism:
     def acceleration(
         self, motion: Motion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
-        """Return q̈, in [rad/s²] or [m/s²]; the parameters are those of `advance`."""
+        """Return q̈, in [rad/s²] or [m/s²]; the parameters are as in `advance`."""
         if self.laws:
             force += self._applied_force(motion.terms, motion.rate, time)
         sense = self._motion_direction(motion, force, brake, time)
@@ -217,19 +206,9 @@ class SingleDofMechanism:
         succeeds, or it falls into too many pieces, the mechanism is held as by a stop. So the work
         is bounded, whatever the force.
 
-        Parameters
-        ----------
-        motion
-            The state.
-        seconds
-            Length of the step, in [s].
-        force
-            τ on the input, in [N·m] or [N].
-        brake
-            B, the holding force of a brake on the input, in [N·m] or [N].
-        time
-            Time of the state since the first tick, in [s].
-
+        ``seconds`` is the length of the step, ``force`` is τ on the input and ``brake`` is B, the
+        holding force of a brake on it, both in [N·m] or [N]. ``time`` is the time of the state
+        since the first tick, in [s].
         """
         left = seconds
         pieces = kinks = 0
@@ -444,7 +423,7 @@ class SingleDofMechanism:
         return min(held + 2.0 * ulp(now + held), seconds)
 
     def _law_segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
-        """Return the segment of each law, of a motion that begins with those of its direction."""
+        """Return the segment of each law for a motion, or for the direction in which it begins."""
         rate = motion.rate or sense * _BEGINNING
         return tuple(
             law.segment(at.value, at.factor * rate, now)

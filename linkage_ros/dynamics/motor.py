@@ -13,11 +13,11 @@ The current follows the voltage at once (no inductance). With the torque constan
 R, the ratio N and the rate of the motor ω = N·q̇::
 
     i = V/R − k·ω/R,  i,  or  τ/(k·N·η)       for a command of voltage V, current i or effort τ
-    i within ±iₘ, then within (±U − k·ω)/R    the amplifier's limit, then that of its supply U
+    i within ±iₘ, then within (±U − k·ω)/R    the limits of the amplifier and its supply U
     T = k·i
     Q = N·T·η  if T·ω ≥ 0,  N·T/ηᵦ otherwise  at the input
 
-The efficiencies are those of the gear while power flows to the input, η, and from it, ηᵦ
+The efficiencies of the gear are η while power flows to the input, and ηᵦ while it flows back
 (H. Giberti, S. Cinquemani, G. Legnani, Effects of transmission mechanical characteristics on the
 choice of a motor-reducer, Mechatronics 20, 2010; for the motor itself: A. Hughes, B. Drury,
 Electric Motors and Drives, 4th ed., 2013, ch. 3). At rest the motor holds any load between both
@@ -113,24 +113,10 @@ class Motor:
 
     def drive_by(self, mechanism: Driven, command: float) -> tuple[Driven, float, float]:
         """
-        Return a mechanism with this motor under a command.
+        Return a mechanism with this motor under a command, in the unit of ``command``.
 
-        Parameters
-        ----------
-        mechanism
-            The mechanism on which the motor is mounted.
-        command
-            The command, in the unit of ``command``.
-
-        Returns
-        -------
-        mechanism
-            The mechanism under this command.
-        force
-            Further force on the input: 0, since the motor is a law.
-        holding
-            Friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
-
+        The second result is a further force on the input: 0, since the motor is a law. The third
+        is the friction of the gear that acts at rest too, as a brake, in [N·m] or [N].
         """
         law = self.effort_law(command)
         under = mechanism.driven_by(lambda moved: replace(moved, laws=(*moved.laws[:-1], law)))
@@ -145,26 +131,16 @@ class Motor:
 
     @staticmethod
     def at_rest(mechanism: Any, _motion: Any) -> tuple[float, float]:
-        """Return the effort at rest, and what the gear holds beyond that of `drive_by`."""
+        """Return the effort at rest, and what the gear holds beyond the friction of `drive_by`."""
         *_, law = getattr(mechanism, 'motor', mechanism).laws
         return law.resting, 0.0
 
     def check_step(self, inertia: float, method: str, step: float) -> None:
         """
-        Refuse a motor whose rate follows the voltage faster than the integration can.
+        Refuse a motor whose rate follows the voltage faster than a step in [s] can follow.
 
-        Parameters
-        ----------
-        inertia
-            The least inertia of the equation of motion, in [kg·m²] or [kg].
-        method, step
-            The method of integration, by name, and its step, in [s].
-
-        Raises
-        ------
-        DefinitionError
-            The remedy is the longest step that carries it.
-
+        ``inertia`` is the least inertia of the equation of motion, in [kg·m²] or [kg]. The remedy
+        is the longest step that carries it.
         """
         if self.command == 'voltage' or self._supply_limits():
             damping = -self._current_slope() * self.constant * self.ratio / self.backward

@@ -65,6 +65,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_SOLVED = (Status.CLOSED, Status.LIMITED)
+
 
 class PinSide(NamedTuple):
     """A link of a joint: its first row, the index of its centre among the places, its sign."""
@@ -102,39 +104,23 @@ class JointMatrix:
     The transposed matrix gives what small displacements of the links open in each joint, since a
     joint's force does no work: a row is the displacement between the points of the two links.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    centers
-        For each link that moves the index, among the places given to `matrix_at`, of the reference
-        point of its moments.
-    places
-        For each joint of the structure the index of its place; of a slider, of its point.
-
-    Attributes
-    ----------
-    size
-        Number of rows.
-    rows
-        For each link that moves its first row.
-    sides
-        For each joint its links that move, ``joint.link`` with the sign +1 first.
-    lines
-        For each slider, by the number of its joint, its line.
-
+    ``centers`` has, for each link that moves, the index of the reference point of its moments
+    among the places given to `matrix_at`; ``places`` has the index of the place of each joint of
+    the structure; of a slider, of its point.
     """
 
     def __init__(
         self, closure: Closure, centers: Mapping[str, int], places: Sequence[int]
     ) -> None:
         linkage, joints = closure.linkage, closure.structure.joints
+        # For each link that moves its first row.
         self.rows = {link: 3 * i for i, link in enumerate(centers)}
         self.size = 3 * len(centers)
         self._scale = closure.scale
         self._centers = centers
+        # For each joint its links that move, ``joint.link`` with the sign +1 first.
         self.sides = tuple(self._joint_sides(joint.link, joint.to) for joint in joints)
-        self.lines: dict[int, ForceLine] = {}
+        self.lines: dict[int, ForceLine] = {}  # For each slider, by the number of its joint
         self._matrix = np.zeros((self.size, self.size))
         where: list[int] = []
         self._pins = self._plan_pins(joints, places, where)
@@ -160,17 +146,7 @@ class JointMatrix:
         self._fill = partial(_fill_matrix, self._matrix, np.array(where, dtype=np.intp))
 
     def matrix_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
-        """
-        Return the matrix at a position.
-
-        Parameters
-        ----------
-        coordinates
-            Coordinates of the closure.
-        places
-            In the frame of the ground, in [m].
-
-        """
+        """Return the matrix at coordinates and places, in the ground frame in [m]."""
         values: list[float] = []
         for place, center, factor in self._pins:
             lever = places[place] - places[center]
@@ -234,9 +210,6 @@ def _fill_matrix(constant: Array, where: NDArray[np.intp], *values: float) -> Ar
     return matrix
 
 
-_SOLVED = (Status.CLOSED, Status.LIMITED)
-
-
 class Reaction(NamedTuple):
     """
     The force and moment of ``joint.to`` on ``joint.link``; the opposite acts on ``joint.to``.
@@ -257,25 +230,7 @@ class Reactions:
     """
     The forces in the joints of a linkage.
 
-    Parameters
-    ----------
-    mechanics
-        The linkage with its masses, loads and friction.
-
-    Attributes
-    ----------
-    joints
-        ``closure.structure.joints``, in the same order.
-    names
-        Name of each joint: its pin or slider. If a pin has several joints, ``pin/link`` with the
-        joint's ``link``; if a slider has the name of a pin, ``slider/link`` with the link that it
-        slides along.
-
-    Raises
-    ------
-    DefinitionError
-        If joints follow others by ratios.
-
+    Joints that follow others by ratios raise DefinitionError.
     """
 
     def __init__(self, mechanics: Mechanics) -> None:
@@ -292,6 +247,8 @@ class Reactions:
         self._mechanics = mechanics
         self._scale = closure.scale
         self.joints = structure.joints
+        # If a pin has several joints, ``pin/link`` with the joint's ``link``; if a slider has the
+        # name of a pin, ``slider/link`` with the link that it slides along.
         self.names = _joint_names(self.joints)
 
         moving = [link for link in structure.links if link != GROUND]
@@ -356,15 +313,8 @@ class Reactions:
         """
         Return the reaction in each joint, in the order of `names`.
 
-        Return None at a toggle and where the linkage does not close.
-
-        Parameters
-        ----------
-        position, velocity, acceleration
-            Results of the closure.
-        seconds
-            Time since the first tick, for loads that change with it.
-
+        Return None at a toggle and where the linkage does not close. ``seconds`` is the time since
+        the first tick, for loads that change with it.
         """
         balance = self._solve_balance(position, velocity, acceleration, seconds)
         if balance is None:
@@ -393,8 +343,8 @@ class Reactions:
         """
         Return the effort of each drive; empty where there are no forces.
 
-        It is that of `Mechanics.drive_efforts`, which does not know the friction that grows with
-        the forces in the joints. The parameters are those of `solve`.
+        It is as in `Mechanics.drive_efforts`, plus the friction that grows with the forces in the
+        joints. The parameters are as in `solve`.
         """
         balance = self._solve_balance(position, velocity, acceleration, seconds)
         if balance is None:
@@ -415,22 +365,12 @@ class Reactions:
         self, value: float, rate: float, seconds: float, pull: float, mobility: float
     ) -> float | None:
         """
-        Return what the friction by the forces in the joints resists at the only input.
+        Return the effort at the only input by the friction that grows with the joint forces.
 
-        Parameters
-        ----------
-        value, rate
-            Of the input, in [rad] or [m] and per second; the rate is not 0.
-        seconds
-            Time since the first tick.
-        pull, mobility
-            As of `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
-
-        Returns
-        -------
-        resisting
-            In [N·m] or [N]; None where the linkage jams, or has no forces.
-
+        The result is in [N·m] or [N]; None where the linkage jams, or has no forces. ``value`` and
+        ``rate`` of the input are in [rad] or [m] and per second; the rate is not 0. ``seconds`` is
+        the time since the first tick, ``pull`` and ``mobility`` are as in
+        `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
         """
         closure, applied = self._mechanics.closure, self._mechanics.applied
         if applied is not None:
@@ -457,7 +397,7 @@ class Reactions:
     def _force_coefficients(
         self, position: Position, velocity: Velocity
     ) -> Sequence[Sequence[float]]:
-        """Return the coefficients of the forces in pressed joints, and the levers of these."""
+        """Return the coefficients of the forces that cause friction, and the levers of joints."""
         closure, size = self._mechanics.closure, self._matrix.size
         x, places = position.state.coordinates, self._follower.places(position)
         still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
@@ -478,31 +418,20 @@ class Reactions:
         self, position: Position, offsets: Sequence[complex]
     ) -> tuple[float, ...] | None:
         """
-        Return how far offsets in the joints move the published joints.
+        Return the changes of the published joints, in [rad] or [m], by offsets in the joints.
 
         This is first order in the offsets: the error falls with their square. Return None at a
-        toggle and where the linkage does not close.
+        toggle and where the linkage does not close. The inputs of the position, which has no
+        offsets, are held.
 
-        Parameters
-        ----------
-        position
-            The linkage without offsets. Its inputs are held.
-        offsets
-            For each joint, in the order of `names`, the place of its point on ``joint.link`` minus
-            that of its point on ``joint.to``, in the frame of the ground, in [m]. Of a slider only
-            the component across its line counts.
+        An offset belongs to each joint, in the order of `names`: the place of its point on
+        ``joint.link`` minus the place of its point on ``joint.to``, in the frame of the ground, in
+        [m]. Of a slider only the component across its line counts.
 
-            Play: a link that is pushed with the force f moves away from the link that pushes it,
-            so the offset is −e·f/|f| with the radial play e and the force f of `Reaction`,
-            whichever link has the hole. Stretch: if a pin of a link is displaced by the vector u
-            from its nominal place, the offset is −u in a joint whose ``link`` it is and +u in one
-            whose ``to`` it is.
-
-        Returns
-        -------
-        shift
-            Change of each published joint, in [rad] or [m].
-
+        Play: a link that is pushed with the force f moves away from the link that pushes it, so
+        the offset is −e·f/|f| with the radial play e and the force f of `Reaction`, whichever link
+        has the hole. Stretch: if a pin of a link is displaced by the vector u from its nominal
+        place, the offset is −u in a joint whose ``link`` it is and +u in one whose ``to`` it is.
         """
         if position.status not in _SOLVED:
             return None
@@ -572,7 +501,7 @@ class Reactions:
         """
         Return the right sides of the system, and the friction in each joint.
 
-        Behind the right sides stand those of a unit of each friction that grows with its force.
+        After them follow the right sides of a unit of each friction that grows with its force.
         """
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)

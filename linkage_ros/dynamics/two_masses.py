@@ -130,7 +130,7 @@ class TwoMasses:
     def acceleration(
         self, motion: PlayMotion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
-        """Return q̈ of the crank; the parameters are those of `OneFreedom.advance`."""
+        """Return q̈ of the crank; the parameters are as in `SingleDofMechanism.advance`."""
         if not motion.side:
             return self.crank.acceleration(motion.crank, 0.0, 0.0, time)
         return self.joined.acceleration(self._as_one(motion.crank), force, brake, time)
@@ -143,7 +143,7 @@ class TwoMasses:
         brake: float = 0.0,
         time: float = 0.0,
     ) -> PlayMotion:
-        """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
+        """Advance a state by one step; the parameters are as in `SingleDofMechanism.advance`."""
         left, bounces = seconds, 0
         motion = motion._replace(trials=min(motion.trials + TRIALS, SAVED))
         while True:

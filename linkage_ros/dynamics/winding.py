@@ -74,7 +74,7 @@ class Winding:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.
 
-        Parameters and error are those of `Motor.check_step`.
+        Parameters and error are as in `Motor.check_step`.
         """
         motor = self.motor
         if motor.resistance and self.inductance / motor.resistance < step:
@@ -100,19 +100,10 @@ class Winding:
         self, begin: float, rate: float, command: float | None, seconds: float
     ) -> float:
         """
-        Return the current after some time at a constant rate.
+        Return the current, in [A], after some seconds at a constant rate of the input.
 
-        Parameters
-        ----------
-        begin
-            The current before, in [A].
-        rate
-            The rate of the input, in [rad/s] or [m/s].
-        command
-            In [A] or [V]; None for no current.
-        seconds
-            The time, in [s].
-
+        ``begin`` is the current before, in [A]; the rate is in [rad/s] or [m/s], the command in
+        [A] or [V], None for no current.
         """
         if command is None:
             return 0.0
@@ -150,7 +141,7 @@ class WoundMotion(NamedTuple):
 
     @property
     def motor(self) -> Any:
-        """Return the state of the motor: behind play its own, else that of the input."""
+        """Return the state of the motor: behind play its own, else the state of the input."""
         return getattr(self.moved, 'motor', self.moved)
 
 
@@ -176,7 +167,7 @@ class WoundMechanism:
     def acceleration(
         self, motion: WoundMotion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
-        """Return q̈; the parameters are those of `OneFreedom.advance`."""
+        """Return q̈; the parameters are as in `SingleDofMechanism.advance`."""
         under, _, holding = self.winding.motor.drive_by(self.mechanism, motion.current)
         return float(under.acceleration(motion.moved, force, brake + holding, time))
 
@@ -188,7 +179,7 @@ class WoundMechanism:
         brake: float = 0.0,
         time: float = 0.0,
     ) -> WoundMotion:
-        """Advance a state by one step; the parameters are those of `OneFreedom.advance`."""
+        """Advance a state by one step; the parameters are as in `SingleDofMechanism.advance`."""
         current_after, half = self.winding.current_after, 0.5 * seconds
         current = current_after(motion.current, motion.motor.rate, self.command, half)
         under, _, holding = self.winding.motor.drive_by(self.mechanism, current)

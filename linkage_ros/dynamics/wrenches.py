@@ -28,31 +28,13 @@ _NONE = PlanarWrench(0.0, 0.0, 0.0)
 
 
 class HeldWrench:
-    """
-    The wrench on a link.
-
-    Parameters
-    ----------
-    max_age
-        Validity of a message, in [s].
-
-    Attributes
-    ----------
-    wrench
-        What acts now.
-    until
-        The time at which it ends, in [ns]; `NEVER` if none acts.
-    stamp
-        Time at which the newest message was taken, in [ns]; 0 before the first.
-    max_age
-        Validity of a message, in [ns].
-
-    """
+    """The wrench on a link; a message is valid for ``max_age``, in [s]."""
 
     __slots__ = ('max_age', 'stamp', 'until', 'wrench')
 
     def __init__(self, max_age: float) -> None:
         self.max_age = round(max_age * NANOSECONDS)
+        # What acts now, the time at which it ends, and the time of the newest message, in [ns].
         self.wrench, self.until, self.stamp = _NONE, NEVER, 0
 
     def set_wrench(self, wrench: PlanarWrench, now: int) -> None:
@@ -85,5 +67,5 @@ class Component:
         return self.held_wrench.wrench[self.number]
 
     def current_load(self, _value: float) -> tuple[float]:
-        """Return that alone, which may be `called` at a value of the input."""
+        """Return the load alone, which `call` may evaluate at a value of the input."""
         return (self.held_wrench.wrench[self.number],)

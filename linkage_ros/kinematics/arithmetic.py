@@ -24,6 +24,14 @@ from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.status import Status
 
+UNIT_ROUNDOFF = 2.0**-53
+
+SMALLEST = 2.0**-1020
+"""Smaller numbers count as zero: their inverse would overflow."""
+
+ROUNDING = 16.0 * UNIT_ROUNDOFF
+"""Bound of the error of a reach, relative to the size of its terms."""
+
 
 def sin(angle: float) -> float:
     """Return the sine of an angle, in [rad]."""
@@ -162,15 +170,6 @@ def resolve_along(vector: complex, unit: complex) -> tuple[float, float]:
 def acute_angle(angle: float) -> float:
     """Return the acute angle between two lines, given any angle between them, in [rad]."""
     return abs(math_remainder(angle, pi))
-
-
-UNIT_ROUNDOFF = 2.0**-53
-
-SMALLEST = 2.0**-1020
-"""Smaller numbers count as zero: their inverse would overflow."""
-
-ROUNDING = 16.0 * UNIT_ROUNDOFF
-"""Bound of the error of a reach, relative to the size of its terms."""
 
 
 def exact_sum(*lengths: float) -> float:

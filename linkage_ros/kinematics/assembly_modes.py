@@ -46,7 +46,7 @@ class Assembly(NamedTuple):
 
 def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
     """
-    Return the assemblies of an iterated group at the inputs of the pose, except that of the pose.
+    Return the other assemblies of an iterated group at the inputs of the pose.
 
     The groups before it keep their places.
     """
@@ -71,7 +71,7 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
 
 
 def _search_solutions(step: Iteration) -> list[Array]:
-    """Return the solutions at the pose's inputs, that of the pose first."""
+    """Return the solutions at the pose's inputs, first the pose itself."""
     first = step.solution()
     if first is None:
         return []

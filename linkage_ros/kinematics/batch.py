@@ -25,7 +25,7 @@ CODES: Final = {status: code for code, status in enumerate(Status)}
 """
 The code of each status in an array: closed is 0, and a greater code is worse.
 
-Codes below that of the toggle have rates; codes up to it have a pose.
+Codes below the toggle's have rates; codes up to it have a pose.
 """
 
 

@@ -10,7 +10,7 @@
 The solution curve of links that Newton's method solves, followed without jumping to another one.
 
 The n constraints F(u, x) = 0 on n unknowns u and one input x define a curve of points z = (u, x).
-The curve is followed by its length, so a toggle, where it turns back in x, is no special point.
+The curve is followed by its length, so a toggle, where it turns back in x, is not a special point.
 A cell leads from one solution to the next; s is the distance along the tangent at its first node,
 and the cubic c(s) has the places and tangents of both nodes. A cell is accepted only if it is
 proven to hold one piece of curve. Let h be the width of the cell, B the Jacobian at c(h/2) of F
@@ -77,6 +77,19 @@ KnownAt = Callable[[float], LinkState | None]
 
 RatesAt = Callable[[float], tuple[LinkState, LinkState] | None]
 """State of the links solved before and its derivatives by the input; None if there are none."""
+
+_MOST_TURNS = 64
+_MOST_LAPS = 32
+"""Laps of a slide: each is twice as long as the one before."""
+
+_SAME = 1e-9
+"""Largest difference of known places and angles that count as equal."""
+
+_LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
+"""Relative to the input, or to 1: how near its end a toggle and its neighbours look alike."""
+
+_NEXT_TO_END = 2.0**-10
+"""In [rad] or lengths: how far links may move while the links before are next to a toggle."""
 
 
 class BranchNode(NamedTuple):
@@ -388,19 +401,6 @@ def _spectral_bound(matrix: Array) -> float:
 # is shorter than a turn has one pose for each crank direction: as with dyads, whole turns of the
 # input change nothing there.
 
-_MOST_TURNS = 64
-_MOST_LAPS = 32
-"""Laps of a slide: each is twice as long as the one before."""
-
-_SAME = 1e-9
-"""Largest difference of known places and angles that count as equal."""
-
-_LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
-"""Relative to the input, or to 1: how near its end a toggle and its neighbours look alike."""
-
-_NEXT_TO_END = 2.0**-10
-"""In [rad] or lengths: how far links may move while the links before are next to a toggle."""
-
 
 class Interval(NamedTuple):
     """The range of a branch, in the coordinate of its input."""
@@ -429,9 +429,9 @@ class Start(NamedTuple):
 
 class _BranchSide:
     """
-    One side of the pose, followed as far as was needed.
+    Branch continuation in one direction from the pose, extended on demand.
 
-    ``inputs`` are the inputs at the ends of the ``follow_cells``, times the sign; ``end`` is the
+    ``inputs`` are the inputs at the ends of the ``cells``, times the sign; ``end`` is the
     input at which the branch ends, or None until it is known.
     """
 

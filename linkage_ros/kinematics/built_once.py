@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 else:
 
     class BuiltProperty(cached_property):
-        """A cached property under the one lock; that of `functools` has none, or its own."""
+        """A cached property under the one lock; in `functools` it has no lock, or its own."""
 
         def __get__(self, instance, owner=None):
             if instance is None:

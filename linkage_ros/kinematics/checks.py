@@ -32,15 +32,7 @@ _LEAST_RATIO = 1e-30
 
 
 def check_linkage(linkage: Linkage) -> None:
-    """
-    Refuse a linkage whose parts do not match.
-
-    Raises
-    ------
-    DefinitionError
-        With the key of the part and the remedy.
-
-    """
+    """Refuse a linkage whose parts do not match; the error names the key of the part."""
     if GROUND not in linkage.links:
         raise DefinitionError(
             'links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}'
@@ -195,7 +187,7 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
     if given.of not in (*names, *linkage.joints):
         choices = {*names, *linkage.joints} - {name}
         raise DefinitionError(
-            f'{key}.of', f'{quote(given.of)} is no joint of this linkage', _one_of(choices)
+            f'{key}.of', f'{quote(given.of)} is not a joint of this linkage', _one_of(choices)
         )
     chain = [name]
     while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:

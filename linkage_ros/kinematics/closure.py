@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
     if not status.has_rates:
-        return ValueError(f'{what}: a linkage that is {status.value} has none; ask its status')
+        return ValueError(f'{what}: a linkage that is {status.value} has none; check its status')
     return ValueError(f'{what}: {list(given)} is not finite')
 
 
@@ -324,13 +324,8 @@ class Closure:
         """
         Return the linkage compiled; for the same numbers it is compiled once.
 
-        Parameters
-        ----------
-        derivatives
-            Positions (0), velocities too (1), and accelerations (2).
-        wanted
-            Which numbers of these; all published joints if not given.
-
+        ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
+        selects the numbers; without it they are all published joints.
         """
         from linkage_ros.kinematics.compiling import (
             linkage,  # local import: they trace
@@ -468,18 +463,8 @@ class Closure:
         """
         Return the branches of a joint over the single input: on each it moves one way.
 
-        Parameters
-        ----------
-        joint
-            As in `driven_by`.
-        limited
-            Whether the limits of joints cut the branches.
-
-        Raises
-        ------
-        DefinitionError
-            As `driven_by`.
-
+        The joint is as in `driven_by`, and so are the errors. If ``limited``, limits of joints cut
+        the branches.
         """
         from linkage_ros.kinematics.crank_branches import (
             inverse_of,  # local import: only few ask for it
@@ -539,11 +524,7 @@ class Closure:
         """
         Return a tracker of certain points of links, which computes no others.
 
-        Parameters
-        ----------
-        points
-            Each with the name of its link, and where it lies in that link's frame, in [m].
-
+        Each point is the name of its link and its place in that link's frame, in [m].
         """
         from linkage_ros.kinematics.point_tracker import (
             PointTracker,  # local import: only forces need it
@@ -635,8 +616,8 @@ class Closure:
         """
         Ranges in which a single input closes every loop, without limits; empty for several.
 
-        A cylinder has those of positive length, unless it starts in the others or is limited to
-        them.
+        A cylinder has only the ranges of positive length, unless it starts in the others or is
+        limited to them.
         """
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
@@ -698,7 +679,7 @@ class Closure:
         closure = getattr(found, 'closure', None)
         linkage = getattr(closure, 'linkage', None)
         if linkage is not self.linkage and linkage != self.linkage:
-            message = f'{what}: {quote(found)} is not of {self!r}; give what that returned'
+            message = f'{what}: {quote(found)} is not from {self!r}; give one that it returned'
             raise TypeError(message)
 
     def _joint_rates(self, values: list[float]) -> tuple[float, ...]:

@@ -63,11 +63,11 @@ _BESIDE_TOGGLE = 1e-12
 """Distance from a toggle, of a branch's width, within which the crank is extrapolated."""
 
 _NEAR, _NEARER = 1e-6, 1e-8
-"""Where the slope is taken near an end of a branch, of its width: it tells the kind of the end."""
+"""Fractions of the width near an end of a branch where slopes show the kind of the end."""
 
 
 class Output(NamedTuple):
-    """What a branch is of: a published joint, or a coordinate of a traced point."""
+    """The output of a branch: a published joint, or a coordinate of a traced point."""
 
     name: str
     turning: bool
@@ -119,28 +119,7 @@ def output_named(closure: LoopClosure, name: str) -> Output:
 
 
 class CrankBranch:
-    """
-    A piece of the crank's range on which an output moves one way.
-
-    Attributes
-    ----------
-    number
-        Its number, from 1.
-    low, high
-        The lowest and the highest value of the output, in [rad] or [m].
-    first, last
-        The cranks there, in [rad] or [m].
-    turns_back
-        For both whether the output turns back there; else the range of the crank ends there.
-    least, most
-        The ends of the crank, in [rad] or [m].
-    by
-        For low and high the joint whose limits end the branch there; '' if none does.
-    period, rise
-        Of an output that turns on with the crank: the turns of both after which the poses repeat,
-        in [rad]; else 0.
-
-    """
+    """A piece of the crank's range on which an output moves one way; its number counts from 1."""
 
     def __init__(
         self,
@@ -154,9 +133,11 @@ class CrankBranch:
         self.turning, self.crank_turns = evaluate.turning, evaluate.crank_turns
         self._evaluate = evaluate
         self.rises = piece[-1][1] > piece[0][1]
+        # For low and high the joint whose limits end the branch there; '' if none does.
         self.by = by if self.rises else by[::-1]
         if not self.rises:
             piece = piece[::-1]
+        # The extreme values of the output and their cranks; then the ends of the crank.
         (self.first, self.low), (self.last, self.high) = piece[0], piece[-1]
         self.least, self.most = sorted((self.first, self.last))
         width = self.most - self.least
@@ -164,11 +145,13 @@ class CrankBranch:
         rounding = UNIT_ROUNDOFF * (max(map(abs, (self.low, self.high))) + evaluate.size)
         self.slack = 8.0 * rounding
         """A value beyond an end by no more is at the end."""
+        # The turns of crank and output after which the poses repeat, in [rad]; else 0.
         self.period, self.rise = (period, self.high - self.low) if period else (0.0, 0.0)
         near = [
             [abs(evaluate(end + share * (other - end))[1]) for share in (_NEAR, _NEARER)]
             for end, other in ((self.first, self.last), (self.last, self.first))
         ]
+        # For both whether the output turns back there; else the range of the crank ends there.
         self.turns_back = tuple(10.0 * nearer < far for far, nearer in near)
         self.steep = tuple(nearer > 3.0 * far for far, nearer in near)
         """For both ends whether the output ends with an infinite slope: at a toggle."""
@@ -377,20 +360,7 @@ def crank_branches(
     """
     Return the branches of an output over a single input, by the crank at which they begin.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    output
-        The output.
-    limited
-        Whether the limits of its joints cut them.
-
-    Raises
-    ------
-    DefinitionError
-        If the output does not move.
-
+    If ``limited``, limits of joints cut them. An output that does not move raises DefinitionError.
     """
     evaluate = OutputFunction(closure, output)
     ranges = InputSweep(closure).ranges if limited else closure.closing_ranges
@@ -512,7 +482,7 @@ def _real_turns(
 
 
 def _unwrap_piece(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return a piece with angles that go on through whole turns, its middle in (−π, π]."""
+    """Return a piece with unwrapped angles, its middle in (−π, π]."""
     (first, value), *others = piece
     found = [(first, value)]
     for crank, angle in others:
@@ -555,17 +525,17 @@ class Inverse(NamedTuple):
             if branch.number == number or (number is None and len(branches) == 1):
                 return branch
         unit = 'rad' if branches[0].crank_turns else 'm'
-        told = list_names(
+        choices = list_names(
             f'{one.number} ({one.least:.6g} to {one.most:.6g} {unit})' for one in branches
         )
         if number is not None:
             raise DefinitionError(
-                f'branch {number}', f'{name} has none of this number', f'use {told}'
+                f'branch {number}', f'{name} has no branch of this number', f'use {choices}'
             )
         raise DefinitionError(
             name,
             f'several cranks reach a value: {len(branches)} branches',
-            f'name a branch, or a crank near it; branches and their cranks: {told}',
+            f'name a branch, or a crank near it; branches and their cranks: {choices}',
         )
 
 
@@ -580,11 +550,7 @@ def inverse_of(closure: LoopClosure, name: str, limited: bool = True) -> Inverse
     """
     Return an output with its branches; limits of joints cut them.
 
-    Raises
-    ------
-    DefinitionError
-        If there are several inputs, or the output is unknown or does not move.
-
+    Several inputs, and an output that is unknown or does not move, raise DefinitionError.
     """
     if len(closure.input_names) > 1:
         raise DefinitionError(

@@ -59,37 +59,36 @@ class Diagonal(NamedTuple):
 
 class DiagonalRate(NamedTuple):
     """
-    The rates of a diagonal: ṡ/s = swing·growth; the rate of its direction is base + swing·turn.
+    The rates of a diagonal: ṡ/s = w·g, and its direction changes at the rate b + w·h.
 
-    Growth and turn may be huge where A is next to D. A dyad multiplies them by factors that are
-    as small there, and forms that product first. ``growth_over_height`` is growth/(fold·stretch):
-    at a change point growth, fold and stretch are 0, but lean is not.
+    g and h may be huge where A is next to D. A dyad multiplies them by factors that are as small
+    there, and forms that product first.
     """
 
-    log_length_rate: float
-    direction_rate: float
-    relative_rate: float
-    base_rate: float
-    growth_over_height: float
+    log_length_rate: float  # g
+    direction_rate: float  # h
+    relative_rate: float  # w
+    base_rate: float  # b
+    growth_over_height: float  # g/(fold·stretch); at a change point all three are 0, this is not
 
 
 class DiagonalAcceleration(NamedTuple):
     """
-    The derivative of a `DiagonalRate`, with ṡ²/s² added to that of ṡ/s.
+    The derivative of a `DiagonalRate`, with ṡ²/s² added to the derivative of ṡ/s.
 
-    s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is next to
-    D; the second derivative of the direction is base + change·turn + swing²·swirl.
+    With its symbols, s̈/s = ẇ·g + w²·k, which avoids a difference of large numbers where A is next
+    to D; the second derivative of the direction is ḃ + ẇ·h + w²·m.
 
-    ``curvature_over_height`` is the pull minus a term of the dyad (e in its derivation is ġ + g²
-    minus that term), divided by fold·stretch. Near a change point it would be a difference of
-    large numbers, so a `CrankDiagonal` gives it in closed form; for all others it is None and the
-    dyad computes it.
+    ``curvature_over_height`` is k minus a term of the dyad (e in its derivation is ġ + g² minus
+    that term), divided by fold·stretch. Near a change point it would be a difference of large
+    numbers, so a `CrankDiagonal` gives it in closed form; for all others it is None and the dyad
+    computes it.
     """
 
-    length_curvature: float
-    direction_curvature: float
-    relative_acceleration: float
-    base_acceleration: float
+    length_curvature: float  # k
+    direction_curvature: float  # m
+    relative_acceleration: float  # ẇ
+    base_acceleration: float  # ḃ
     curvature_over_height: float | None
 
 
@@ -144,26 +143,12 @@ class CrankDiagonal:
     u·span·(F + terms of F)/(F·S), and alike from S. Chosen by their values alone, a needle lost
     8 u·κ where the transmission angle was near 90°.
 
-    Parameters
-    ----------
-    a, d
-        Lengths of OA and OD, in one unit; at best near 1.
-    fold, stretch
-        The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
-        the dyad has no upper limit.
-    limits
-        lower and upper, and the span, which their difference would cancel; upper and span may be
-        infinite.
-    arms
-        Indices, among the coordinates, of the directions of OA and OD.
-    offset
-        φ minus the difference of those two coordinates, in (−π, π] rad.
-
-    Attributes
-    ----------
-    along, quad, root
-        a·(d − a), 4ad and 2·√(ad), correctly rounded.
-
+    a and d are in one unit; at best near 1. ``fold`` and ``stretch`` are the margins |d − a| −
+    lower and upper − a − d, correctly rounded; stretch is infinite where the dyad has no upper
+    limit. ``limits`` are lower, upper and span; upper and span may be infinite. ``arms`` are the
+    indices, among the coordinates, of the directions of OA and OD. ``offset`` is φ minus their
+    difference, in (−π, π] rad. The attributes along, quad and root are a·(d − a), 4ad and 2·√(ad),
+    correctly rounded.
     """
 
     __slots__ = (
@@ -267,15 +252,15 @@ class CrankDiagonal:
 
     def rates(self, diagonal: Diagonal, _solved: LinkState, velocities: LinkState) -> DiagonalRate:
         """
-        Return the growth q and the turn −p for φ̇, and the rate of OD as base.
+        Return g = q and h = −p for w = φ̇, and the rate of OD as b.
 
         With n̂ the diagonal's direction turned left::
 
             p = OA·AD/s² = −d(direction)/dφ = (a·(d − a) − near²/2)/s²
             q = OA·n̂/s   = (ds/dφ)/s        = near·far/(2s²)
 
-        lean is q/(fold·stretch); at a change point fold equals near, or stretch equals far, and
-        their ratio is 1.
+        ``growth_over_height`` is q/(fold·stretch); at a change point fold equals near, or stretch
+        equals far, and their ratio is 1.
         """
         first, second = self.arms
         square, near, far = diagonal.square, diagonal.near_root, diagonal.far_root
@@ -306,7 +291,7 @@ class CrankDiagonal:
         Return the derivative of `rates`.
 
         The derivatives by φ are p' = −q·(1 + 2p) with 1 + 2p = (d² − a²)/s², and q' = p + p² − q².
-        The bend is::
+        ``curvature_over_height`` is::
 
             ((d − a)² − lower²)·far²/(s² − lower²)/(4s²)
               − (upper² − (a + d)²)·near²/(upper² − s²)/(4s²)
@@ -326,7 +311,7 @@ class CrankDiagonal:
         )
 
     def curvature_over_height(self, diagonal: Diagonal) -> float:
-        """Return the bend, as `accelerations` defines it."""
+        """Return ``curvature_over_height``, as `accelerations` defines it."""
         near, far, fold, stretch = (
             diagonal.near_root,
             diagonal.far_root,
@@ -395,16 +380,11 @@ class NearlyCrossingDiagonal(CrankDiagonal):
     """
     The diagonal of a dyad whose lengths nearly make a change point.
 
-    Its roots have the sign of the half angle, as those at the change point have. So the dyad stays
+    Its roots have the sign of the half angle, as at a change point. So the dyad stays
     next to the one without deviations, where a side alone would leave it.
 
-    Parameters
-    ----------
-    a, d, fold, stretch, limits, arms, offset
-        As in `CrankDiagonal`.
-    crosses
-        Whether the dyad without deviations changes its side where it folds and where it stretches.
-
+    ``crosses``: whether the dyad without deviations changes its side where it folds and where it
+    stretches.
     """
 
     __slots__ = ('_crosses',)
@@ -448,19 +428,10 @@ def crank_diagonal_of(
     """
     Return the diagonal between two pinned links, by the change points that it passes.
 
-    Parameters
-    ----------
-    a, d, limits
-        As in `CrankDiagonal`.
-    margins
-        Its margins fold and stretch.
-    hinge
-        Its arms and its offset.
-    turns_matter
-        Whether a whole turn may lead to another pose, and the whole turns are unknown.
-    crosses
-        The change points of the linkage without deviations; None for those of these lengths.
-
+    ``margins`` are its fold and stretch, ``hinge`` its arms and its offset, as in `CrankDiagonal`.
+    ``turns_matter``: whether a whole turn may lead to another pose, and the whole turns are
+    unknown. ``crosses`` are the change points of the linkage without deviations; None for the
+    change points of these lengths.
     """
     fold, stretch = margins
     if turns_matter:
@@ -474,13 +445,8 @@ class FreeDiagonal:
     """
     The diagonal between two pins, from their coordinates.
 
-    Parameters
-    ----------
-    ends
-        Indices of A and D among the pins.
-    limits
-        lower and upper of s, and upper² − lower², as in `CrankDiagonal`.
-
+    ``ends`` are the indices of A and D among the pins. ``limits`` are lower and upper of s, and
+    upper² − lower², as in `CrankDiagonal`.
     """
 
     __slots__ = ('_ends', '_limits')
@@ -559,7 +525,7 @@ def free_diagonal_rate(diagonal: Diagonal, vector: complex, velocity: complex) -
 def free_diagonal_acceleration(
     rate: DiagonalRate, vector: complex, acceleration: complex
 ) -> DiagonalAcceleration:
-    """Return the derivative of `free_diagonal_rate`; ``pull`` is the vector's acceleration."""
+    """Return the derivative of `free_diagonal_rate`, given the acceleration of the vector."""
     square = acceleration / vector
     square += rate.direction_rate * (rate.direction_rate - 2j * rate.log_length_rate)
     return DiagonalAcceleration(square.real, square.imag, 0.0, 0.0, None)

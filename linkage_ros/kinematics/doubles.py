@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Numbers from a caller as doubles, whatever their type; what is no number is refused.
+Numbers from a caller as doubles, whatever their type; what is not a number is refused.
 
 A number has ``__float__`` or ``__index__``, as for `math`: a text has neither, and so has a date.
 A number beyond the doubles is infinite, as the literal ``1e400`` is in Python.
@@ -27,8 +27,8 @@ HUGE = 2.0**400
 """
 Rates from here on are scaled by `SHRINK`, lest a square or a product overflow.
 
-So are accelerations from its square on. Accelerations are scaled by the square of `SHRINK`: those
-of the joints are linear in those of the inputs, and quadratic in their rates.
+So are accelerations from its square on. They are scaled by the square of `SHRINK`: accelerations
+of joints are linear in the accelerations of the inputs, and quadratic in the rates.
 """
 
 SHRINK = 2.0**-700
@@ -39,13 +39,8 @@ def to_double(what: str, value: Any, remedy: str = '') -> float:
     """
     Return a number as a double.
 
-    Raises
-    ------
-    TypeError
-        If it is not a number; the line begins with ``what`` and ends with the remedy.
-    ValueError
-        If it is masked.
-
+    What is not a number raises TypeError, and a masked number ValueError; the line begins with
+    ``what`` and ends with the remedy.
     """
     try:
         if hasattr(value, 'dtype'):

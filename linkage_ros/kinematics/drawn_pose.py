@@ -13,7 +13,7 @@ At the inputs of the pose every dyad is closed on both of its sides, one dyad af
 the assemblies that close, the one nearest to the drawing is meant. It must be clearly nearer than
 any other, as far as the two differ in what the pose names.
 
-`drawn_pose` is the way back: the pose that tells an assembly.
+`read_drawn_pose` is the inverse: it returns a pose that determines the assembly.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _MOST_EXPLORED = 8
 """With more dyads, only those whose side is not written are closed on both sides."""
 
 _MOST_KEPT = 256
-"""Most assemblies that are followed; what the pose has not told by then, it tells too late."""
+"""Most assemblies that are followed; a pose that fits more of them equally well is refused."""
 
 _MOST_LISTED = 4
 
@@ -113,22 +113,10 @@ def drawn_signs(
     linkage: Linkage, plan: SolvedLinks, ways: Sequence[TwoWays]
 ) -> list[tuple[TwoWays, int]]:
     """
-    Return the signs with which dyads close as drawn; none if the pose says nothing of them.
+    Return the signs with which dyads close as drawn; none if the pose does not determine them.
 
-    Parameters
-    ----------
-    linkage
-        The linkage, with a pose.
-    plan
-        Its links and steps up to these dyads; those before are in their assembly.
-    ways
-        The dyads that close in two ways.
-
-    Raises
-    ------
-    DefinitionError
-        If the pose contradicts a side, does not tell two assemblies apart, or does not close.
-
+    ``plan`` has the links and steps up to these dyads, those before in their assembly. A pose that
+    contradicts a side, fits two assemblies or does not close raises DefinitionError.
     """
     pose = linkage.pose
     assert pose is not None, 'the caller has one'
@@ -145,7 +133,7 @@ def drawn_signs(
     if not found:
         raise DefinitionError(
             'pose.inputs',
-            'close the loops in no assembly',
+            'do not close the loops in any assembly',
             'give inputs that the linkage can have',
         )
     drawn = [target.drawn for target in targets]
@@ -215,7 +203,7 @@ def _closing_assemblies(
             if found[_MOST_KEPT].square <= _CLEARLY * _CLEARLY * found[0].square:
                 names = list_names(repr(one.assembly_key) for one in ways[:number])
                 raise DefinitionError(
-                    'pose', f'does not tell the sides of {names}', 'name a point of each'
+                    'pose', f'does not determine the sides of {names}', 'name a point of each'
                 )
             del found[_MOST_KEPT:]
         found = [
@@ -276,12 +264,14 @@ def _ambiguity_error(
         other = next(one for one in alike if one.signs[i] != first.signs[i])
         telling.append(_telling_text(plan, ways[i].dyad, (first.state, other.state)))
     return DefinitionError(
-        'pose', f'does not tell {list_names(sides, " from ")}', f'name {list_names(telling, "; ")}'
+        'pose',
+        f'does not distinguish {list_names(sides, " from ")}',
+        f'name {list_names(telling, "; ")}',
     )
 
 
 def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) -> str:
-    """Return what tells the side of a dyad, with its value in two states."""
+    """Return what determines the side of a dyad, with its value in two states."""
     link, point = telling_part(plan.points, dyad)
     if point:
         places = [_point_sight(plan, link, point).place_at(state) for state in states]
@@ -294,7 +284,7 @@ def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) ->
 
 def read_drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
     """
-    Return the pose that tells the assembly of a position.
+    Return the pose that determines the assembly of a position.
 
     It names a point or an angle for each dyad that closes in two ways, and of links that are
     iterated what the file's pose names of them.

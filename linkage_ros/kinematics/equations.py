@@ -167,15 +167,8 @@ def bound_jacobian_change(
     """
     Return a bound of the change of the derivatives by the unknowns, entry by entry.
 
-    Parameters
-    ----------
-    constraints, unknowns, solved
-        As in `evaluate_constraints`.
-    moved
-        Largest change of each unknown, in either direction.
-    known_moved
-        Largest change of each known coordinate and pin.
-
+    ``moved`` is the largest change of each unknown, in either direction; ``known_moved`` the
+    largest change of each known coordinate and pin.
     """
     n = len(unknowns)
     rows = []
@@ -403,19 +396,8 @@ class Constraints:
     """
     The joints of a group of links, as constraints.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    joints
-        The joints of the group.
-    links
-        The links of the group.
-    planner
-        Gives and places the links solved before the group.
-    ratios
-        The joints whose ratios are solved with the group.
-
+    ``planner`` gives and places the links solved before the group. ``ratios`` names the joints
+    whose ratios are solved with the group.
     """
 
     def __init__(

@@ -39,13 +39,9 @@ def exchange_inputs(
     """
     Return the linkage with these published joints as its inputs, and its inputs as joints.
 
-    The assembly is that of the pose at which the linkage is shown; ``rebuild`` makes a closure.
+    The pose at which the linkage is shown gives the assembly; ``rebuild`` makes a closure.
 
-    Raises
-    ------
-    DefinitionError
-        If there are more or fewer joints than inputs, or one is unknown or named twice.
-
+    More or fewer joints than inputs, an unknown joint and a repeated one raise DefinitionError.
     """
     linkage = closure.linkage
     count = len(linkage.inputs)

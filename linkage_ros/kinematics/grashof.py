@@ -22,27 +22,6 @@ from linkage_ros.kinematics.topology import Dyad, links_of, Structure
 NEARLY = 2e-3
 """Largest relative difference of two lengths that were meant to be equal: a rounded digit."""
 
-
-class Paired(NamedTuple):
-    """A four-bar whose lengths are equal in pairs, or nearly."""
-
-    name: str  # parallelogram, kite or rhombus
-    deviation: float  # Largest difference within a pair, in the unit of the lengths
-    crosses: tuple[bool, bool]  # Whether its dyad changes its side where it folds and stretches
-
-
-class FourBarType(NamedTuple):
-    """The type of a four-bar, after Grashof and Barker."""
-
-    # Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
-    # output. RRR1 to RRR4 are triple rockers, by the longest link.
-    code: str
-    name: str  # The name in words
-    # Sum of the other two links minus the sum of the shortest and the longest, in the unit of the
-    # lengths; 0 at a change point.
-    margin: float
-
-
 # In the order of the shortest link, or of the longest: input, coupler, output, frame.
 GRASHOF = (
     ('GCRR', 'crank-rocker'),
@@ -64,6 +43,26 @@ CHANGE_POINTS = (
 )
 
 
+class Paired(NamedTuple):
+    """A four-bar whose lengths are equal in pairs, or nearly."""
+
+    name: str  # parallelogram, kite or rhombus
+    deviation: float  # Largest difference within a pair, in the unit of the lengths
+    crosses: tuple[bool, bool]  # Whether its dyad changes its side where it folds and stretches
+
+
+class FourBarType(NamedTuple):
+    """The type of a four-bar, after Grashof and Barker."""
+
+    # Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
+    # output. RRR1 to RRR4 are triple rockers, by the longest link.
+    code: str
+    name: str  # The name in words
+    # Sum of the other two links minus the sum of the shortest and the longest, in the unit of the
+    # lengths; 0 at a change point.
+    margin: float
+
+
 def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     """
     Return the type of a four-bar.
@@ -77,16 +76,8 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     Two shortest or two longest links cause no doubt: they make one of the inequalities impossible;
     at a change point they come in pairs.
 
-    Parameters
-    ----------
-    a, b, c, d
-        Lengths of input, coupler, output and frame, above 0.
-
-    Returns
-    -------
-    type : FourBarType
-        Without a code if one link is longer than the others together: there is no loop.
-
+    a, b, c and d are the lengths of input, coupler, output and frame, above 0. The type has no
+    code if one link is longer than the others together: there is no loop.
     """
     sides = (a, b, c, d)
     shortest, p, q, longest = sorted(sides)
@@ -116,7 +107,7 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
 
 
 def nearly_equal(one: float, other: float) -> bool:
-    """Return whether two lengths were meant to be equal, as far as a rounded digit tells."""
+    """Return whether two lengths are equal up to a rounded digit."""
     return abs(one - other) <= NEARLY * max(one, other)
 
 

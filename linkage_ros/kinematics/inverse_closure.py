@@ -243,7 +243,7 @@ class InverseClosure(Closure):
 
     @BuiltProperty
     def zero_length(self) -> float | None:
-        """Return none: the range is that of a branch."""
+        """Return None: the branch limits the range."""
         return None
 
     def singularity_margin(self, position: Position) -> SingularityMargin:

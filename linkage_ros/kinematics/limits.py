@@ -181,10 +181,10 @@ def without_mirrored(
     linkage: Linkage, structure: Structure, index: int, ranges: tuple[InputRange, ...]
 ) -> tuple[InputRange, ...]:
     """
-    Return the ranges of an input; for a cylinder only those of positive length.
+    Return the ranges of an input; for a cylinder only the ranges of positive length.
 
-    Those of negative length are returned if its pose or its limits lie there, or if there are no
-    others.
+    The ranges of negative length are returned if its pose or its limits lie there, or if there
+    are no others.
     """
     zero = zero_length(linkage, structure, index)
     if zero is None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Block(NamedTuple):
-    """The block of a slider: its name, the link along which it slides, its point and whose."""
+    """The block of a slider: the link along which it slides, and a point of the link with it."""
 
     name: str
     along: str
@@ -35,14 +35,6 @@ class LinkFrames:
     The frames of the links that move, and of the blocks of sliders that are not links.
 
     Such a block has its frame at the slider's point, with the angle of the link it slides along.
-
-    Parameters
-    ----------
-    linkage, structure
-        The linkage, and its groups.
-    known
-        Its links, all of them known.
-
     """
 
     def __init__(self, linkage: Linkage, structure: Structure, known: SolvedLinks) -> None:

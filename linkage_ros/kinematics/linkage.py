@@ -47,7 +47,7 @@ class Slider:
         Name of the link that slides without turning against the line; '' if the link that carries
         the point may turn about it (a pin in a slot, a rod in a swivel).
     angle
-        Angle of the block minus that of ``along``, in [rad].
+        Angle of the block minus the angle of ``along``, in [rad].
 
     """
 
@@ -104,8 +104,8 @@ class Input:
     """
     A driven joint, named ``joint``, with the limits of the machine's joint.
 
-    Its value is the angle of ``child`` minus that of ``parent``, which share a pin, in [rad]; or,
-    if ``slider`` is named, the slide of that slider, in [m].
+    Its value is the angle of ``child`` minus the angle of ``parent``, which share a pin, in [rad];
+    or, if ``slider`` is named, the slide of that slider, in [m].
     """
 
     joint: str
@@ -135,7 +135,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class RevoluteJoint:
-    """A published angle, of ``child`` minus that of ``parent``, in [rad], as in a URDF."""
+    """A published angle, ``child`` minus ``parent``, in [rad], as in a URDF."""
 
     unit: ClassVar = 'rad'
 
@@ -177,23 +177,13 @@ class Ratio:
 
 @dataclass(frozen=True, slots=True)
 class AssemblyPose:
-    """
-    The linkage as drawn, at some inputs; what it names tells the assembly.
+    """The linkage as drawn, at some inputs; what it names determines the assembly."""
 
-    Attributes
-    ----------
-    inputs
-        One value for each input, in [rad] or [m]; the linkage starts there.
-    points
-        Approximate places of points, in the frame of the ground, in [m]. Those of links that no
-        dyad covers are the initial guess of their iteration.
-    angles
-        Approximate angles of links to the ground, in [rad].
-
-    """
-
-    inputs: tuple[float, ...]
+    inputs: tuple[float, ...]  # Of each input, in [rad] or [m]; the linkage starts there
+    # Approximate places of points, in the frame of the ground, in [m]; points of links that no
+    # dyad covers are the initial guess of their iteration.
     points: Mapping[str, Point]
+    # Approximate angles of links to the ground, in [rad].
     angles: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -243,14 +233,14 @@ class Linkage:
     traced
         Names of points whose curves are recorded or drawn.
     pose
-        The linkage as drawn at its start; it tells the assembly, if `assembly` does not.
+        The linkage as drawn at its start; it determines the assembly, if `assembly` does not.
     masses
         Masses by link name; given only for forces, and then for every link that moves.
     ratios
         By the name of a published joint, how it follows another joint.
     nominal
-        The linkage without deviations, if this one has some: the assembly, and the change points
-        that it passes, are those of the nominal one.
+        The linkage without deviations, if this one has some; it determines the assembly and the
+        change points that are passed.
 
     """
 

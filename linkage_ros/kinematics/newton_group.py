@@ -84,23 +84,11 @@ class Iteration:
     """
     A group of links that Newton's method solves.
 
-    Parameters
-    ----------
-    constraints
-        As many equations as there are unknowns.
-    slides
-        The sliders whose slides are appended to the coordinates.
-    inputs
-        The inputs of the pose, as coordinates.
-    start
-        Approximate angle and place of each body at the pose, one after the other.
-    before
-        The steps before this one.
-    sliding
-        For each input whether it is a slide.
-    far
-        No slide needs to be longer than this to stretch a link.
-
+    There are as many constraints as unknowns. The values of ``slides`` are appended to the
+    coordinates. ``inputs`` are the inputs of the pose, as coordinates, and ``sliding`` says for
+    each whether it is a slide. ``start`` has the approximate angle and place of each body at the
+    pose, one after the other. ``before`` are the steps before this one. No slide needs to be
+    longer than ``far`` to stretch a link.
     """
 
     __slots__ = ('_before', '_constraints', '_far', '_slides', '_sliding', '_start', '_straight',
@@ -165,13 +153,7 @@ class Iteration:
         """
         Return a closed solution: unknowns, angles with their turns, and the Jacobian.
 
-        Parameters
-        ----------
-        count
-            Number of coordinates at the head of ``numbers``.
-        *numbers
-            The known coordinates, then the known pins.
-
+        The numbers are ``count`` known coordinates, then the known pins.
         """
         solved = LinkState(list(numbers[:count]), list(numbers[count:]))
         inputs = self._inputs_of(solved)
@@ -460,15 +442,8 @@ class _CompiledSystem:
 
     Most derivatives are constants, such as 0 and 1; only the others are evaluated.
 
-    Parameters
-    ----------
-    constraints
-        The constraints.
-    numbers
-        Coordinates, pins and unknowns, in this order, at which they can be evaluated.
-    coordinates, unknowns
-        Number of each.
-
+    ``numbers`` are coordinates, pins and unknowns, in this order, at which the constraints can be
+    evaluated; ``coordinates`` and ``unknowns`` say how many there are.
     """
 
     def __init__(

@@ -119,7 +119,7 @@ class SolutionPlan(SolvedLinks):
         return self.steps[one.step]
 
     def _choose_sides(self) -> None:
-        """Bring the new dyads into the assembly that the file tells, or refuse it."""
+        """Bring the new dyads into the assembly of the file, or refuse it."""
         settled, self._settled = self._settled, len(self.two_ways)
         new = self.two_ways[settled:]
         if self._nominal:
@@ -302,7 +302,7 @@ class SolutionPlan(SolvedLinks):
         if abs((direction * outer.direction.conjugate()).imag) <= ROUNDING:
             raise DefinitionError(
                 f'sliders.{dyad.inner.name}.direction',
-                f'is parallel to that of {second.name!r}',
+                f'is parallel to the direction of {second.name!r}',
                 'give the two sliders different directions',
             )
         constant = (inner.start - point) * turn
@@ -410,10 +410,10 @@ class SolutionPlan(SolvedLinks):
         self, dyad: Dyad, lengths: tuple[float, float, float, float] | None = None
     ) -> tuple[bool, bool] | None:
         """
-        Return the change points of a dyad on a crank; None for those of its own lengths.
+        Return the change points of a dyad on a crank; None if its own lengths determine them.
 
-        They are those of the nominal linkage; or those of the parallelogram, kite or rhombus that
-        a four-bar of such lengths nearly is.
+        Else the nominal linkage determines them, or the parallelogram, kite or rhombus that a
+        four-bar of such lengths nearly is.
         """
         if self._nominal:
             nominal: Any = self._nominal[closing_name(dyad)]
@@ -475,7 +475,7 @@ class SolutionPlan(SolvedLinks):
         """
         Add the step of a dyad that closes in two ways, on the side that the file writes.
 
-        ``part`` is its diagonal or rail, ``upright_sign`` its sign there on the side +1.
+        ``part`` is its diagonal or rail, ``upright`` its sign there on the side +1.
         """
         name, sides = closing_name(dyad), SIDES[dyad.kind]
         crosses = any(getattr(part, 'crosses', ()))
@@ -491,7 +491,7 @@ class SolutionPlan(SolvedLinks):
             self._missing[name] = f'{name}: {choices} ({meaning})'
         elif side not in sides:
             raise DefinitionError(
-                f'assembly.{name}', f'{quote(side)} is no side', f'write {choices} ({meaning})'
+                f'assembly.{name}', f'{quote(side)} is not a side', f'write {choices} ({meaning})'
             )
         written = sides[side] if side else 0
         sign = self._nominal[name].sign if self._nominal else (written or 1) * upright

@@ -30,6 +30,9 @@ from linkage_ros.kinematics.step import LinkState
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
+_Place = tuple[str, int]
+"""A point: the list of `_Walk` that holds it, and its index there."""
+
 
 class _TrackerNode(NamedTuple):
     """A point: index of its base, index of its angle, vector from the base, slide or −1."""
@@ -46,13 +49,7 @@ class PointTracker:
 
     Each method returns a list of every point on the way; the requested points are at `indices`.
 
-    Parameters
-    ----------
-    known
-        The links of a closure, all of them known.
-    points
-        Each with the name of its link and its place in the frame of that link, in [m].
-
+    Each point is the name of its link and its place in that link's frame, in [m].
     """
 
     __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')
@@ -124,10 +121,6 @@ class PointTracker:
         for index in self._pins:
             started.append(pins[index] * self._scale)
         return started
-
-
-_Place = tuple[str, int]
-"""A point: the list of `_Walk` that holds it, and its index there."""
 
 
 class _Walk:

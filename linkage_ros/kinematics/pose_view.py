@@ -46,7 +46,7 @@ def prepare_view(
     """
     Prepare a picture of a pose, with others in the background.
 
-    By default those are some over the whole range. A LinkageError says that a pose does not close.
+    By default these cover the whole range. A LinkageError says that a pose does not close.
     """
     position = _close_loops(closure, inputs)
     input_sweep = InputSweep(closure, inputs)

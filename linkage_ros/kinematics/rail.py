@@ -50,7 +50,7 @@ class PinOnRail(NamedTuple):
     base: float  # Coordinate of the link that carries the rail, in [rad]
     arm: complex  # From O to A in the frame of a `CrankRail`, otherwise 0
     # dy/dψ/(below·above) of a `CrankRail` with a change point, otherwise 0: at the change point
-    # dy/dψ and the product are 0, but lean is not.
+    # dy/dψ and the product are 0, but this is not.
     lean: float
     # Status of the link as far as the rail decides it, except whether it stands across the line.
     status: Status
@@ -76,7 +76,7 @@ class Rail(Protocol):
         accelerations: LinkState,
         /,
     ) -> tuple[complex, float]:
-        """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
+        """Return the accelerations of the pin in that frame, and of the frame, in [rad/s²]."""
 
     def unsigned_link_rate(
         self, pin_on_rail: PinOnRail, rise: float, velocities: LinkState, /
@@ -108,17 +108,9 @@ class CrankRail:
     The brackets are constants of the linkage. If one is zero, the root has the sign of its sine or
     cosine, and passes the change point with it; so does dy/dψ = a·cos ψ = 2a·sin η·cos η.
 
-    Parameters
-    ----------
-    arm
-        OA in the frame of the rail, if the difference of the two coordinates is 0.
-    pivot
-        O in the frame of the rail.
-    link
-        b; infinite if there is no link.
-    arms
-        Indices, among the coordinates, of the angles of the link of A and of the rail's link.
-
+    ``arm`` is OA in the frame of the rail, if the difference of the two coordinates is 0;
+    ``pivot`` is O in that frame. ``link`` is b, infinite if A has no link to the line. ``arms``
+    are the indices, among the coordinates, of the angles of the link of A and of the rail's link.
     """
 
     __slots__ = (
@@ -308,13 +300,8 @@ class NearlyCrossingRail(CrankRail):
     """
     A `CrankRail` whose lengths nearly make a change point; see `NearlyCrossingDiagonal`.
 
-    Parameters
-    ----------
-    arm, pivot, link, arms
-        As in `CrankRail`.
-    crosses
-        Whether the link without deviations changes its side across the line, on either side.
-
+    ``crosses``: whether the link without deviations changes its side across the line, on either
+    side.
     """
 
     __slots__ = ('_crosses',)
@@ -353,17 +340,10 @@ class FreeRail:
     """
     A rail and a pin, computed from their coordinates.
 
-    Parameters
-    ----------
-    ends
-        Indices of E and A among the pins.
-    link
-        b, length of a link from A to the line; infinite if there is none.
-    arm
-        Index, among the coordinates, of the angle of the link that carries the rail.
-    unit
-        Direction of the line at a coordinate of 0.
-
+    ``ends`` are the indices of E and A among the pins. ``link`` is b, the length of a link from A
+    to the line, infinite if there is none. ``arm`` is the index, among the coordinates, of the
+    angle of the link that carries the rail, and ``unit`` the direction of the line at a coordinate
+    of 0.
     """
 
     __slots__ = ('_arm', '_back', '_ends', '_link')

@@ -9,8 +9,8 @@
 """
 The ranges of an input: the intervals in which every loop closes.
 
-The limits of a dyad on a crank and the ground follow from its lengths, those of an iterated group
-from its branch. The limits of all other dyads are searched within these ranges: the input is
+The limits of a dyad on a crank and the ground follow from its lengths, the limits of an iterated
+group from its branch. The limits of all other dyads are searched within these ranges: the input is
 sampled, and each limit is narrowed down to neighbouring floats.
 """
 
@@ -35,11 +35,27 @@ if TYPE_CHECKING:
 
 _RATIO = (sqrt(5.0) - 1.0) / 2.0
 
+_SAMPLES = 720
+
+_POINT = 1e-9
+"""Fraction of an interval: a narrower open part is a single place without a pose, and no gap."""
+
+_ROUNDED = 1e-9
+"""A margin farther from zero than this has a certain sign."""
+
+_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
+
+_SAME = 1e-9
+"""Largest difference of joints that count as equal, in [rad] or relative to the scale."""
+
+_COPIES = 8
+"""Largest number of turns of a range that are listed for an input with wide limits."""
+
 
 def golden_section(
     function: Callable[[float], float], low: float, high: float
 ) -> tuple[float, float]:
-    """Return the lowest value between two places, and where it is."""
+    """Return the minimum and minimiser of a function on an interval, by golden section."""
     one, other = high - _RATIO * (high - low), low + _RATIO * (high - low)
     at_one, at_other = function(one), function(other)
     for _ in range(80):
@@ -54,17 +70,6 @@ def golden_section(
             other = low + _RATIO * (high - low)
             at_other = function(other)
     return min((at_one, one), (at_other, other))
-
-
-_SAMPLES = 720
-
-_POINT = 1e-9
-"""Fraction of an interval: a narrower open part is a single place without a pose, and no gap."""
-
-_ROUNDED = 1e-9
-"""A margin farther from zero than this has a certain sign."""
-
-_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 
 def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
@@ -110,7 +115,7 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
 
 
 def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
-    """Yield the ranges of an angle whose poses repeat after so many turns, or never (0)."""
+    """Yield the ranges of an angle whose poses repeat after some turns, or never (0)."""
     limits = closure.linkage.inputs[0].limits
     far = (turns or _COPIES) * pi
     low, high = -far, far
@@ -127,7 +132,7 @@ def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
 def through_the_end(
     parts: list[tuple[float, float]], low: float, high: float, turn: float = tau
 ) -> list[tuple[float, float]]:
-    """Return the parts of whole turns, those at both ends as one that runs through the end."""
+    """Return the parts of whole turns; the parts at both ends are one through the end."""
     if len(parts) < 2 or parts[0][0] != low or parts[-1][1] != high:
         return parts
     (_, end), *others, (begin, _) = parts
@@ -238,18 +243,8 @@ def find_intervals(
     """
     Yield the parts of an interval in which a condition holds, such as that loops close.
 
-    Parameters
-    ----------
-    closes
-        Whether it holds at a value.
-    low, high
-        The interval.
-    samples
-        Number of samples.
-    margin
-        Margin by which it holds at a value, negative if it does not. Its valleys and summits
-        between samples are tested too; without it, parts narrower than a sample are missed.
-
+    ``margin`` is the margin by which it holds at a value, negative if it does not. Its valleys and
+    summits between samples are tested too; without it, parts narrower than a sample are missed.
     """
     values = [low + (high - low) * i / samples for i in range(samples)] + [high]
     known: dict[float, bool] = {}
@@ -336,12 +331,6 @@ def last_inside(closes: Callable[[float], bool], inside: float, outside: float) 
 # The limits of the input itself cut exactly. Those of published joints are searched: their margin
 # is sampled over each range, its valleys and summits between samples are narrowed down, and each
 # change of its sign is narrowed down to neighbouring floats.
-
-_SAME = 1e-9
-"""Largest difference of joints that count as equal, in [rad] or relative to the scale."""
-
-_COPIES = 8
-"""Largest number of turns of a range that are listed for an input with wide limits."""
 
 
 def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:

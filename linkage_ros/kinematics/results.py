@@ -41,7 +41,7 @@ class InputRange(NamedTuple):
         search, and so may an angle that is limited on one side.
     turns
         Number of whole turns of the input after which the poses repeat: 1 if all links are solved
-        by dyads, several if iterated links come back after so many, 0 if they never do.
+        by dyads, several if iterated links come back only then, 0 if they never do.
     by
         For each end the joint that is at its limit there; '' at a toggle.
 
@@ -292,7 +292,7 @@ class Position(_JointValues):
 @dataclass(slots=True, repr=False)
 class Velocity(_JointValues):
     """
-    The rates of a linkage; ``velocity['rocker_joint']`` is that of a joint.
+    The rates of a linkage; ``velocity['rocker_joint']`` is one rate.
 
     Attributes
     ----------
@@ -315,7 +315,7 @@ class Velocity(_JointValues):
 @dataclass(slots=True, repr=False)
 class Acceleration(_JointValues):
     """
-    The accelerations of a linkage; ``acceleration['rocker_joint']`` is that of a joint.
+    The accelerations of a linkage; ``acceleration['rocker_joint']`` is one.
 
     Attributes
     ----------

@@ -125,17 +125,10 @@ def draw_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[Shape]:
     """
-    Draw a linkage.
+    Return the shapes of a linkage at a position that closes.
 
-    Parameters
-    ----------
-    closure, position
-        The linkage, and a position that closes.
-    size
-        Half the width of a bar, in [m]; all symbols scale with it.
-    travels
-        Range of the slides, for the length of rails.
-
+    ``size`` is half the width of a bar, in [m]; all symbols scale with it. ``travels`` are the
+    ranges of the slides, for the length of rails.
     """
     return [shape for _, shape in carried_shapes(closure, position, size, travels)]
 
@@ -143,7 +136,7 @@ def draw_shapes(
 def carried_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[tuple[str, Shape]]:
-    """Draw a linkage as `shapes` does; return each shape with the link that carries it."""
+    """Draw a linkage as `draw_shapes` does; return each shape with the link that carries it."""
     pose = _DrawnPose(
         closure,
         closure.points(position),
@@ -201,7 +194,7 @@ def draw_skeleton(closure: Closure, position: Position) -> list[Segment]:
 
 
 class LinkFrame(NamedTuple):
-    """Origin of a link's frame in that of the ground, in [m], and its angle, in [rad]."""
+    """Origin of a link's frame in the ground's frame, in [m], and its angle, in [rad]."""
 
     place: complex
     angle: float

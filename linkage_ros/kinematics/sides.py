@@ -60,9 +60,9 @@ def closing_name(dyad: Dyad) -> str:
 
 def telling_part(links: Mapping[str, Mapping[str, Any]], dyad: Dyad) -> tuple[str, str]:
     """
-    Return the link and the point of it that tell the side of a dyad.
+    Return the link and its point that determine the side of a dyad.
 
-    Of a rail without another point than its pin the angle tells it: the point is ''.
+    If a rail has no other point than its pin, its angle determines the side: the point is ''.
     """
     if dyad.kind != 'RPR':
         return dyad.inner.link, dyad.inner.name
@@ -90,7 +90,7 @@ def written_sides(closure: LoopClosure) -> dict[str, str]:
 
 
 def without_drawn_pose(linkage: Linkage, structure: Structure) -> Linkage:
-    """Return a linkage whose pose says nothing of the links of dyads, so that sides tell all."""
+    """Return a linkage whose pose places no link of a dyad, so that the sides decide."""
     pose = linkage.pose
     if pose is None or not pose.is_drawn:
         return linkage

@@ -82,7 +82,7 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     Toggles end the ranges of the input. If the links of a dyad's two outer pins turn with the
     input, its constants give the angles at which its links are collinear, or its lines parallel.
     For all other dyads the zeros of the transmission angle are searched over the ranges; for a
-    straight rod in a swivel, whose angle is never 0, those of the distance of its two pins.
+    straight rod in a swivel, whose angle is never 0, the zeros of the distance of its two pins.
     """
     from linkage_ros.kinematics.sweep_analysis import (
         find_zeros,  # local import: it needs the closure

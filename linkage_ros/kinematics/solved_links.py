@@ -93,7 +93,7 @@ class SlideLine:
     The line of a point of one link along a slider, in the frame of the link that it slides on.
 
     The point lies at start + sign·(slide of the slider)·direction, a unit vector; ``angle`` is the
-    angle of the moving link minus that of the other link.
+    angle of the moving link minus the angle of the other.
     """
 
     start: complex
@@ -103,17 +103,7 @@ class SlideLine:
 
 
 class SolvedLinks:
-    """
-    The known links of a linkage; at first the ground.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    structure
-        Its links and sliders.
-
-    """
+    """The known links of a linkage; at first the ground."""
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         self._linkage = linkage

@@ -35,7 +35,7 @@ class Status(Enum):
     """
     All links of a loop are collinear, and its two assemblies meet.
 
-    Position and rates are valid: those of the motion that passes through.
+    Position and rates are valid; they belong to the motion that passes through.
     """
 
     LIMITED = 'limited'

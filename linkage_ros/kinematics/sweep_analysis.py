@@ -38,22 +38,36 @@ from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
+_SAMPLES = 720
+_GRID = 24
+_SAME = 1e-9
+"""Largest difference of values that count as equal, in [rad] or relative to a length."""
+
+_NOISE = 1e-13
+"""Largest difference of values that is rounding, in [rad]."""
+
+_DEEPER = 10.0
+"""Depth that a valley may have below its sample, relative to the height of those beside it."""
+
+_APART = 1e-4
+"""Places nearer to each other than this count as one, in [rad] or [m]."""
+
+_MANY = 12
+"""An extreme met at more places than this lists none of them; also the lines of a grid."""
+
+_NEAR_ZERO, _ZERO = 0.25, 1e-7
+"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
+
+_EASY = 0.25
+"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
+
 
 def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., StepPose]:
     """
     Return a function that gives the pose of a step at inputs, in [rad] and [m].
 
-    Of a hundred independent loops on a crank it closes one.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    number
-        Number of the step.
-    *inputs
-        Inputs at which the linkage closes: they show where each step appends its results.
-
+    If a crank drives a hundred independent loops, it closes only one. ``inputs`` are inputs at
+    which the linkage closes: they show where each step appends its results.
     """
     needed = _needed_groups(closure, closure.step_groups[number])
     walked = closure.initial_state(*inputs)
@@ -80,7 +94,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
 
 
 def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
-    """Return a group and those that it starts from, by number."""
+    """Return the numbers of a group and of the groups that it starts from."""
     groups = closure.structure.groups
     owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
     needed: set[int] = set()
@@ -98,30 +112,6 @@ def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
                 return set(range(number + 1))
             asked += [owner[link] for link in starts if link != GROUND]
     return needed
-
-
-_SAMPLES = 720
-_GRID = 24
-_SAME = 1e-9
-"""Largest difference of values that count as equal, in [rad] or relative to a length."""
-
-_NOISE = 1e-13
-"""Largest difference of values that is rounding, in [rad]."""
-
-_DEEPER = 10.0
-"""Depth that a valley may have below its sample, relative to the height of those beside it."""
-
-_APART = 1e-4
-"""Places nearer to each other than this count as one, in [rad] or [m]."""
-
-_MANY = 12
-"""An extreme met at more places than this lists none of them; also the lines of a grid."""
-
-_NEAR_ZERO, _ZERO = 0.25, 1e-7
-"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
-
-_EASY = 0.25
-"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
 
 
 class Extreme(NamedTuple):
@@ -155,15 +145,8 @@ class InputSweep:
     """
     A linkage as a function of one of its inputs; the others are held.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    held
-        Values of all inputs, in [rad] or [m]; not needed for a single input.
-    index
-        Number of the input that moves.
-
+    ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input;
+    ``index`` is the number of the input that moves.
     """
 
     def __init__(
@@ -288,7 +271,7 @@ class InputSweep:
 
 
 def starts_at_pose(closure: LoopClosure) -> bool:
-    """Return whether the file's pose is the start: not only that of the links iterated."""
+    """Return whether the file's pose is the start, not only the start of an iteration."""
     linkage = closure.linkage
     several = len(linkage.inputs) > 1
     return linkage.pose is not None and not (
@@ -470,15 +453,15 @@ def conditioning_curves(sweep: InputSweep) -> dict[int, SweptCurve]:
 def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptCurve]:
     """Return the extremes of a method of the steps, applied to their poses, by group."""
     closure = sweep.closure
-    told = {
+    methods = {
         index: getattr(step, name)
         for index, step in enumerate(closure.steps)
         if hasattr(step, name)
     }
-    if not told:
+    if not methods:
         return {}
     # One sweep for all steps: otherwise each of n loops would be closed n times.
-    sampled: dict[int, list[Sampled]] = {number: [] for number in told}
+    sampled: dict[int, list[Sampled]] = {number: [] for number in methods}
     closed = nan
     for interval in sweep.ranges:
         values = sample_inputs(interval, count)
@@ -488,16 +471,18 @@ def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptC
             position = sweep.position_at(value)
             if position.status.has_pose:
                 closed = value
-            for number, method in told.items():
+            for number, method in methods.items():
                 result = method(position.poses[number]) if position.status.has_pose else nan
                 sampled[number][-1].results.append(result)
     if closed != closed:
-        return {closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in told}
+        return {
+            closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in methods
+        }
     return {
         closure.step_groups[number]: _min_max_curve(
             _as_input_function(sweep, number, method, closed), sampled[number]
         )
-        for number, method in told.items()
+        for number, method in methods.items()
     }
 
 
@@ -518,15 +503,8 @@ def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int]
     """
     Return the worst residual over the range, or over a grid of several inputs.
 
-    Returns
-    -------
-    residual : float
-        In [m].
-    inputs : tuple[float, ...]
-        The inputs at which it occurs, in [rad] or [m].
-    count : int
-        Number of poses that were tried. None in place of all three if no loop closed.
-
+    The result is the residual in [m], its inputs in [rad] or [m], and the number of poses that
+    were tried; None if no loop closed.
     """
     if len(closure.linkage.inputs) > 1:
         tried = grid_positions(closure)
@@ -591,8 +569,8 @@ def check_turns(closure: LoopClosure) -> None:
                 raise DefinitionError(
                     f'ratios.{step.joint}.of',
                     f'{quote(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
-                    'known, and the ratio is no whole number',
-                    f'write limits for {quote(of)}, whose middle is that of its swing',
+                    'known, and the ratio is not a whole number',
+                    f'write limits for {quote(of)}, with the middle of its swing as their middle',
                 )
 
 

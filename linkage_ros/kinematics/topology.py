@@ -31,6 +31,12 @@ from linkage_ros.kinematics.linkage import (
     RevoluteJoint,
 )
 
+_BLOCK = 'block of '
+"""Prefix of the name of a slider: the block of a pin in a slot."""
+
+_LARGEST_GROUP = 8
+"""Most bodies of a group that is searched for by trial; a larger group is solved as a whole."""
+
 
 @dataclass(frozen=True, slots=True)
 class Joint:
@@ -134,13 +140,6 @@ def links_of(group: Group) -> tuple[str, ...]:
     if isinstance(group, Dyad):
         return tuple(link for body in group.bodies for link in body)
     return group.links
-
-
-_BLOCK = 'block of '
-"""Prefix of the name of a slider: the block of a pin in a slot."""
-
-_LARGEST_GROUP = 8
-"""Most bodies of a group that is searched for by trial; a larger group is solved as a whole."""
 
 
 def assur_groups(linkage: Linkage) -> Structure:

@@ -45,7 +45,7 @@ _NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 't
 
 
 def choose_solver(linkage: Linkage, accuracy: float) -> Closure:
-    """Return the fastest closure of those that are proven to reach an accuracy in [rad] or [m]."""
+    """Return the fastest closure that is proven to reach an accuracy, in [rad] or [m]."""
     closed = Solver(Closure(linkage))
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}
@@ -102,7 +102,7 @@ def _build_newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
         lengths.append(abs(complex(*points[dyad.inner.name]) - complex(*points[outer.name])))
     ratio = max(lengths) / min(lengths)
     if 2.0 * (1.0 + ratio) * accuracy > LEAST_SINE:
-        raise DefinitionError('accuracy', 'not proven for so little of it', '')
+        raise DefinitionError('accuracy', 'not proven for such a low accuracy', '')
     return newton
 
 

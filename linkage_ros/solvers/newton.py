@@ -16,8 +16,8 @@ two real equations. With × for the z component of the cross product::
 
 until both corrections are below the tolerance, in [rad] or [m]; the remaining error has the size
 of their square. Rates and accelerations solve the same equations for the change of F while p and
-q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is that
-of the assembly. The closed form gives the state instead where the sign differs from that of the
+q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is the
+assembly. The closed form gives the state instead where the sign differs from the sign of the
 closed form nearby (near a toggle or a change point), where the method does not converge, and where
 the loops do not close. Groups that no dyad covers are iterated in any case, here to the tolerance.
 
@@ -67,6 +67,19 @@ _PER_TURN = 256
 _MOST = 2**16
 """Number of knots that are kept; beyond it they are computed again."""
 
+_STEPS = 12
+"""Largest number of Newton steps; a cold start takes up to ten."""
+
+LEAST_SINE = 0.05
+"""Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
+
+_ROUNDING = 16.0 * UNIT_ROUNDOFF
+
+PLACING = (FixedPoint, PointOnLink, PointOnRail)
+"""Steps that place a pin and add no coordinate."""
+
+_CLOSED = Status.CLOSED
+
 
 class Knot(NamedTuple):
     """
@@ -85,15 +98,8 @@ class Knots:
     """
     Knots of a linkage.
 
-    Parameters
-    ----------
-    closed
-        The linkage in closed form.
-    orientations
-        Returns the orientation (a sign) of each dyad at the coordinates of a closed position.
-    repeats
-        Whether everything repeats after two turns of an input.
-
+    ``orientations`` returns the orientation (a sign) of each dyad at the coordinates of a closed
+    position. ``repeats``: whether all poses repeat after two turns of an input.
     """
 
     def __init__(
@@ -169,28 +175,12 @@ class Knots:
         ]
 
 
-_STEPS = 12
-"""Largest number of Newton steps; a cold start takes up to ten."""
-
-LEAST_SINE = 0.05
-"""Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
-
-_ROUNDING = 16.0 * UNIT_ROUNDOFF
-
-
 class NewtonDyad:
     """
-    Newton's method on one dyad.
+    Newton's method on one dyad with its loop.
 
-    Parameters
-    ----------
-    loops
-        Its loop.
-    tolerance
-        Bound of the last correction of an angle, in [rad].
-    slide_tolerance
-        Bound of the last correction of a slide, in the unit of the lengths.
-
+    The tolerances bound the last correction: of an angle in [rad], of a slide in the unit of the
+    lengths.
     """
 
     __slots__ = ('_arms', '_constant', '_first', '_known', '_new', '_tolerances', '_two_arms')
@@ -222,15 +212,8 @@ class NewtonDyad:
         """
         Append p and q to the coordinates, or return False if there is no solution.
 
-        Parameters
-        ----------
-        x, pins
-            Known coordinates, and the pins that iterations have placed.
-        p, q
-            The start.
-        sign
-            Required sign of F_p × F_q.
-
+        x are the known coordinates, and ``pins`` the pins that iterations have placed. p and q are
+        the start; ``sign`` is the required sign of F_p × F_q.
         """
         known = self._constant
         for factor, arm in self._arms:
@@ -287,7 +270,7 @@ class NewtonDyad:
     def append_rates(
         self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
     ) -> None:
-        """Append the rates of p and q, given those of the known coordinates."""
+        """Append the rates of p and q, given the rates of the known coordinates."""
         v += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:
@@ -303,7 +286,7 @@ class NewtonDyad:
         a: list[float],
         pulls: list[complex],
     ) -> None:
-        """Append the accelerations of p and q, given those of the known coordinates."""
+        """Append the accelerations of p and q; the known coordinates have theirs."""
         a += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:
@@ -372,10 +355,6 @@ def _vector_acceleration(
     return complex(a[slide] - turn * turn * s, change * s + 2.0 * turn * way) * unit
 
 
-PLACING = (FixedPoint, PointOnLink, PointOnRail)
-"""Steps that place a pin and add no coordinate."""
-
-
 @dataclass(frozen=True, slots=True)
 class NewtonParameters:
     """Newton's method on the loops of each dyad."""
@@ -393,9 +372,6 @@ def build(parameters: NewtonParameters, linkage: Linkage) -> NewtonClosure:
     return NewtonClosure(linkage, parameters.tolerance)
 
 
-_CLOSED = Status.CLOSED
-
-
 class _NewtonRoot(list[Any]):
     """Poses of a state that Newton's method solved, one for each step that is not a dyad."""
 
@@ -407,16 +383,9 @@ class NewtonClosure(Solver):
     """
     A linkage whose dyads Newton's method closes.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    tolerance
-        Bound of the last corrections, in [rad] or [m].
-    warm
-        True: start from the last state. False: start from the pose of the file each time. None:
-        start from the nearest knot, so that a state depends on its inputs alone.
-
+    The tolerance bounds the last corrections, in [rad] or [m]. If ``warm`` is true, each state
+    starts from the last one, if false from the pose of the file; if None from the nearest knot, so
+    that a state depends on its inputs alone.
     """
 
     by_steps = False

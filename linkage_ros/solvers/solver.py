@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class SolverChoice(NamedTuple):
-    """The solver chosen for a scene with an accuracy, as it could have named it, and why."""
+    """The solver chosen for the accuracy of a scene, its parameters, and the reason."""
 
     solver: str
     parameters: Mapping[str, float]
@@ -50,7 +50,7 @@ class Solver(Closure):
     """
     A closure that subclasses solve differently; itself, it uses the closed form.
 
-    Its methods are those of `Closure`. ``choice`` is the reason for this solver, if the scene
+    It has the methods of `Closure`. ``choice`` is the reason for this solver, if the scene
     named none.
     """
 
@@ -154,7 +154,7 @@ def refuse_ratios(linkage: Linkage, solver: str) -> None:
     if linkage.ratios:
         raise DefinitionError(
             f'solver.{solver}',
-            f'does not know ratios, such as that of {next(iter(linkage.ratios))!r}',
+            f'does not support ratios, such as the ratio of {next(iter(linkage.ratios))!r}',
             'write solver: closed_form',
         )
 

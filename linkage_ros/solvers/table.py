@@ -18,10 +18,10 @@ form's values f and derivatives f' at both ends (G. Birkhoff and A. Priver, J. M
     cubic    |f − p| ≤ h⁴/384·max|f''''|     |f' − p'| ≤ √3·h³/216·max|f''''|
                                              |f'' − p''| ≤ h²/12·max|f''''|
 
-Rates and accelerations are derivatives of the polynomial; the tolerance is that of the positions.
+Rates and accelerations are derivatives of the polynomial; the tolerance bounds positions.
 `table_proof` bounds the derivatives over the whole range; so if a tolerance is given instead of
 knots, it is met everywhere, or the table is refused. Beyond the range of the table, and at its
-ends, the states are those of the closed form.
+ends, the closed form gives the states.
 """
 
 from __future__ import annotations
@@ -107,38 +107,12 @@ class _TablePart(NamedTuple):
 
 class TableClosure(Solver):
     """
-    A linkage whose joints are interpolated in a table.
+    A linkage of one input whose joints are interpolated in a table.
 
-    Parameters
-    ----------
-    linkage
-        A linkage of one input.
-    tolerance
-        Bound of the error of positions, in [rad] or [m]; the number of knots follows from it.
-    knots
-        Alternatively the number of cells in each range of the input.
-    order
-        The interpolation between the knots.
-    span
-        The range that the table covers, in [rad] or [m]; by default all that the input can reach.
-
-    Attributes
-    ----------
-    knots
-        Number of cells in each range.
-    memory
-        Size of the table, in [bytes].
-    build_time
-        Time to build it, including the proof, in [s].
-    proven, proven_rate
-        Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input;
-        infinite if knots were given.
-
-    Raises
-    ------
-    DefinitionError
-        If there are several inputs, or the tolerance cannot be proven.
-
+    The number of knots follows from the tolerance, a bound of the error of positions in [rad] or
+    [m], unless ``knots`` gives the number of cells in each range. ``span`` is the range that the
+    table covers, in [rad] or [m]; by default all that the input can reach. Several inputs, and a
+    tolerance that cannot be proven, raise DefinitionError.
     """
 
     by_steps = False
@@ -163,6 +137,7 @@ class TableClosure(Solver):
                 'write solver: closed_form',
             )
         self._period, intervals = self._covered_ranges(span)
+        # Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input.
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
@@ -235,8 +210,8 @@ class TableClosure(Solver):
         Return the closure error of a closed position, in [m].
 
         A table has joints but no links. The error is therefore the distance of its joints from
-        those of the closed form (an angle at the length of the longest link), plus the error of
-        the closed form.
+        the joints of the closed form (an angle at the length of the longest link), plus the error
+        of the closed form.
         """
         exact = self.exact_position(position)
         joints = zip(position.joints, exact.joints, self.turning, strict=True)
@@ -331,7 +306,7 @@ class TableClosure(Solver):
         if self._degree == 1:
             table[:, :, 1] = step.T
             return table
-        # A toggle at an end has no slope; use that of the chord.
+        # A toggle at an end has no slope; use the slope of the chord.
         begin = np.where(np.isfinite(slopes[:, :-1]), slopes[:, :-1], step)
         end = np.where(np.isfinite(slopes[:, 1:]), slopes[:, 1:], step)
         table[:, :, 1] = begin.T

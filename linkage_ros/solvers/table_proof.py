@@ -48,6 +48,25 @@ _NEAR = 0.01
 
 _NARROWER = 'write solver: closed_form, or a span: [low, high] that keeps away from it'
 
+MOST_KNOTS = 2**20
+_FEWEST_KNOTS = 4
+_FIRST_CELLS = 16
+_SMALLEST_CELL = 2.0**-18
+"""Fraction of the range: if this is too large to prove anything, a toggle is there or near."""
+
+_MOST_CELLS = 2**14
+_PLENTY = 2**10
+"""For each this many cells the knots may double, which costs less than still smaller cells."""
+
+_BLOCK = 4096
+_TIGHT = 1.1
+"""A bound within this factor of the value at the middle needs no smaller cells."""
+
+_ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
+"""For each order the Taylor coefficient that determines the error, and its factor."""
+
+_ROUNDING = 2.0**-49
+
 
 class TableRequest(NamedTuple):
     """The table to be proven."""
@@ -90,26 +109,6 @@ def unproven_error(request: TableRequest, reason: str, remedy: str = _NARROWER) 
     return DefinitionError(
         'solver.table', f'tolerance {request.tolerance:g} [{unit}] {reason}', remedy
     )
-
-
-MOST_KNOTS = 2**20
-_FEWEST_KNOTS = 4
-_FIRST_CELLS = 16
-_SMALLEST_CELL = 2.0**-18
-"""Fraction of the range: if this is too large to prove anything, a toggle is there or near."""
-
-_MOST_CELLS = 2**14
-_PLENTY = 2**10
-"""Cells: for each so many, twice as many knots cost less than the cells that spare them."""
-
-_BLOCK = 4096
-_TIGHT = 1.1
-"""A bound within this factor of the value at the middle needs no smaller cells."""
-
-_ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
-"""For each order the Taylor coefficient that determines the error, and its factor."""
-
-_ROUNDING = 2.0**-49
 
 
 class _ErrorBounds(NamedTuple):
@@ -360,31 +359,23 @@ def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> P
     """
     Return the number of cells that each range of the input needs, and the proven errors.
 
-    Parameters
-    ----------
-    request
-        The table to be proven.
-    ranges
-        Ranges of the input, in [rad] or [m].
-
-    Raises
-    ------
-    DefinitionError
-        If a range holds a toggle or a change point, or the proof takes more than `MOST_KNOTS`.
-
+    A range, in [rad] or [m], that holds a toggle or a change point, and a proof that takes more
+    than `MOST_KNOTS`, raise DefinitionError.
     """
     refuse_trouble(request, ranges)
     proofs = [RangeProof(request, low, high) for low, high in ranges]
     knots = max(one.required_knots() for one in proofs)
     while True:
         if knots > MOST_KNOTS:
-            raise unproven_error(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
+            raise unproven_error(
+                request, f'takes more than {MOST_KNOTS} knots', 'write a larger tolerance'
+            )
         position, rate = map(max, zip(*(one.error_bounds(knots) for one in proofs), strict=True))
         if position <= request.tolerance:
             return Proven(knots, position, rate)
         if position > 2.0 * request.tolerance:
             least = f'{position:.1g}'
             raise unproven_error(
-                request, f'is finer than rounding allows here, {least}', 'ask for less'
+                request, f'is finer than rounding allows here, {least}', 'write a larger tolerance'
             )
         knots *= 2

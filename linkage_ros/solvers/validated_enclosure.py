@@ -43,6 +43,15 @@ _LEAST = 2.0**-1020
 _UP = 1.0 + 2.0**-48
 """Factor that covers the rounding of a radius."""
 
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_LEAST_BOX = 2.0**-44
+"""Relative to the size of an unknown, or to 1: a narrower box would be lost in its rounding."""
+
+_UP_MATRIX = 1.0 + 2.0**-40
+"""Factor that covers the rounding of bounds that are computed by matrices."""
+
 
 class Disc(NamedTuple):
     """Numbers within a radius of a centre."""
@@ -103,16 +112,6 @@ def jet_product(one: Jet, other: Jet) -> Jet:
         sum_discs([multiply_discs(one[j], other[k - j]) for j in range(k + 1)])
         for k in range(len(one))
     ]
-
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-_LEAST_BOX = 2.0**-44
-"""Relative to the size of an unknown, or to 1: a narrower box would be lost in its rounding."""
-
-_UP_MATRIX = 1.0 + 2.0**-40
-"""Factor that covers the rounding of bounds that are computed by matrices."""
 
 
 class Cells(NamedTuple):

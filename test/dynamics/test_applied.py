@@ -274,7 +274,7 @@ REFUSED = {
     'efforts: {elbow: {constant: 1}}': "elbow: there is no joint 'elbow'",
     'forces: {hand.end: {direction: [1, 0], constant: 1}}': "there is no point 'hand.end'",
     'forces: {ground.O: {direction: [1, 0], constant: 1}}': 'lies on the ground',
-    'forces: {crank.end: {direction: [0, 0], constant: 1}}': '[0, 0] is no direction',
+    'forces: {crank.end: {direction: [0, 0], constant: 1}}': '[0, 0] is not a direction',
     'forces: {crank.end: {direction: [1, 0]}}': 'is a load of 0',
     'efforts: {crank_joint: {over_time: [[0, 1]]}}': 'has one row',
     'efforts: {crank_joint: {over_time: [[1, 1], [0, 2]]}}': 'row 2 begins with 0 s, not after',

@@ -49,23 +49,23 @@ REFUSED = {
     ),
     'friction in a point of one link': (
         'four_bar', Loads(), {'P': RUBBING},
-        "effects.friction.joints.P: 'P' is no pin or slider; name one of A, B, O2, O4",
+        "effects.friction.joints.P: 'P' is not a pin or slider; name one of A, B, O2, O4",
     ),
     'friction in a slider that is not there': (
         'slider_crank', Loads(), {'bore': RUBBING},
-        "effects.friction.joints.bore: 'bore' is no pin or slider; name one of A, B, O2, cylinder",
+        "effects.friction.joints.bore: 'bore' is not a pin or slider; name one of A, B, O2, cyl",
     ),
     'the point of a block that is a link, and no pin': (
         'scotch_yoke', Loads(), {'Y': RUBBING},
-        "effects.friction.joints.Y: 'Y' is no pin or slider; name one of A, O2, guide, slot",
+        "effects.friction.joints.Y: 'Y' is not a pin or slider; name one of A, O2, guide, slot",
     ),
     'a pin with a coefficient alone': (
         'four_bar', Loads(), {'A': JointFriction(coefficient=0.1)},
-        'effects.friction.joints.A.coefficient: the force in a pin rubs by both, and there is no ',
+        'effects.friction.joints.A.coefficient: friction by the force in a pin needs both, and r',
     ),
     'a pin with a radius alone': (
         'four_bar', Loads(), {'A': JointFriction(radius=0.1)},
-        'effects.friction.joints.A.radius: the force in a pin rubs by both, and there is no coef',
+        'effects.friction.joints.A.radius: friction by the force in a pin needs both, and coef',
     ),
     'a slider with a radius': (
         'slider_crank', Loads(), {'cylinder': JointFriction(coefficient=0.1, radius=0.01)},

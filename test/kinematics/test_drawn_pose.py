@@ -228,7 +228,7 @@ def test_a_pose_that_does_not_tell_lists_the_assemblies_and_what_tells():
     with pytest.raises(DefinitionError) as error:
         Closure(replace(linkage, pose=meant))
     assert error.value.where == 'pose'
-    assert error.value.reason.startswith('does not tell {B: ')
+    assert error.value.reason.startswith('does not distinguish {B: ')
     for side in ('left', 'right'):
         assert f'{{B: {side}}}' in error.value.reason
         closure = Closure(replace(linkage, assembly={'B': side}))
@@ -292,7 +292,7 @@ def test_a_scissor_lift_stands_as_drawn_and_says_what_a_pose_leaves_open(tmp_pat
         assert abs(points['arm_a', 'T1'] - complex(slide, sqrt(1.0 - slide**2))) < 1e-12
         assert abs(points['platform', 'load'] - complex(0.4, 0.1 + sqrt(1.0 - slide**2))) < 1e-12
     with pytest.raises(
-        FileError, match=r'pose: does not tell \{top: ahead\} from \{top: behind\}'
+        FileError, match=r'pose: does not distinguish \{top: ahead\} from \{top: behind\}'
     ):
         loaded(tmp_path, LIFT + 'pose: {inputs: [0.866], points: {M: [0.4, 0.2]}}')
 

@@ -308,7 +308,7 @@ def test_inverse_is_pickled_with_its_branch():
         ('four_bar', ('rockr_joint',), "did you mean 'rocker_joint'?"),
         ('four_bar', ('crank_joint',), 'crank_joint: is an input'),
         ('four_bar', ('rocker_joint',), '2 branches; name a branch, or a crank near it'),
-        ('four_bar', ('rocker_joint', 3), 'branch 3: rocker_joint has none of this number'),
+        ('four_bar', ('rocker_joint', 3), 'branch 3: rocker_joint has no branch of this number'),
         ('five_bar', ('left_elbow',), 'left_elbow: 1 for 2 inputs; name 2 different joints'),
         ('peaucellier', ('P.x',), 'P.x: does not move with the input'),
     ],

@@ -552,7 +552,7 @@ def test_nothing_makes_numpy_warn(name):
         ('four_bar', 1, {'rates': [1.0, 2.0]}, 'rates: shapes (2,) do not broadcast to (5,)'),
         ('four_bar', 1, {'accelerations': np.ones(4)},
          'accelerations: shapes (4,) do not broadcast to (5,)'),
-        ('four_bar', 1, {'derivatives': 3}, 'derivatives: 3 is none of 0, 1, 2'),
+        ('four_bar', 1, {'derivatives': 3}, 'derivatives: 3 is not one of 0, 1, 2'),
         ('four_bar', 1, {'out': Batch(np.empty(5), np.empty((2, 5)))},
          'out.status: is float64 (5,), not uint8 (5,)'),
         ('four_bar', 1, {'out': Batch(np.empty(5, np.uint8), np.empty((5, 2)))},

@@ -100,7 +100,7 @@ def test_a_position_without_rates_has_none():
     for value, status in ((end, 'toggle'), (end + 0.1, 'open'), (nan, 'indeterminate')):
         position = closure.position(value)
         assert position.status.value == status
-        text = f'rates: a linkage that is {status} has none; ask its status'
+        text = f'rates: a linkage that is {status} has none; check its status'
         with pytest.raises(ValueError, match=f'^{text}$'):
             closure.velocity(position, 1.0)
 

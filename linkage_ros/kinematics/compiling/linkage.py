@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure
 
 _MOST_PATHS = 8
-"""Most paths of a linkage; where none is valid, the plain steps answer."""
+"""Most paths of a linkage; where none is valid, the interpreted steps answer."""
 
 _TRIED = 64
 """Number of states at which paths are searched for."""
@@ -47,7 +47,7 @@ _TRIED_ITERATED = 2
 
 class CompiledAnswer(NamedTuple):
     """
-    The result of a compiled linkage at a state; status and gap are those of `Position`.
+    The result of a compiled linkage at a state; status and gap are as in `Position`.
 
     The requested numbers are in groups; a group without a result is empty.
     """
@@ -61,21 +61,12 @@ class Compiled:
     """
     A linkage compiled for certain numbers.
 
-    Its results equal those of the plain steps to the last bit: it is their arithmetic as
-    straight-line code. Where that is not valid, at toggles, change points and where a loop is
-    open, the plain steps answer.
+    It has the arithmetic of the interpreted steps as straight-line code, and gives the same bits.
+    Where that is not valid, at toggles, change points and where a loop is open, the interpreted
+    steps answer.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    derivatives
-        0: positions; 1: velocities too; 2: accelerations too.
-    wanted
-        Selects the numbers; by default all published joints.
-    within_limits
-        Whether a state with a joint beyond its limits has the status limited.
-
+    ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. If
+    ``within_limits``, a state with a joint beyond its limits has the status limited.
     """
 
     def __init__(
@@ -101,7 +92,7 @@ class Compiled:
             # This starts an additional search, which takes longer.
             self._add_path(usual_inputs(closure))
         # Takes the inputs, their rates and their accelerations, in this order; returns the values,
-        # or None if the plain steps must answer.
+        # or None if the interpreted steps must answer.
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _add_path(self, inputs: tuple[float, ...]) -> None:
@@ -124,11 +115,7 @@ class Compiled:
         """
         Return the first path as lines of Python, which are written once.
 
-        Parameters
-        ----------
-        bail_out
-            The statement that leaves the lines if the path is not valid.
-
+        ``bail_out`` is the statement that leaves the lines if the path is not valid.
         """
         if bail_out not in self._bodies:
             self._bodies[bail_out] = python_body(self.paths[0], bail_out)
@@ -136,18 +123,9 @@ class Compiled:
 
     def __call__(self, *numbers: float) -> CompiledAnswer:
         """
-        Return the answer at a state.
+        Return the answer at a state: inputs in [rad] or [m], then their rates, then accelerations.
 
-        Parameters
-        ----------
-        *numbers
-            The inputs, in [rad] or [m], then their rates and their accelerations.
-
-        Raises
-        ------
-        ValueError
-            If a rate or an acceleration is not finite.
-
+        A rate or an acceleration that is not finite raises ValueError.
         """
         values = self.fast(*numbers)
         if values is not None:
@@ -155,7 +133,7 @@ class Compiled:
         return self.run_interpreted(*numbers)
 
     def run_interpreted(self, *numbers: float) -> CompiledAnswer:
-        """Return the result of the plain steps."""
+        """Return the result of the interpreted steps."""
         given = list(zip(*[iter(numbers)] * self.driven, strict=True))
         motion = motion_at(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
@@ -182,7 +160,7 @@ def _first_of(
 
 
 def _trial_states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
-    """Yield inputs at which a linkage may be closed: those of its pose, and some in its ranges."""
+    """Yield inputs at which a linkage may be closed: at its pose, then in its ranges."""
     linkage = closure.linkage
     if linkage.pose is not None:
         yield linkage.pose.inputs

@@ -11,7 +11,7 @@ A path as numpy, in the form that is fastest for arrays.
 
 Each operation is a pass over an array. Therefore constants are combined and signs merged, sine and
 cosine of an angle are computed from one tangent, and a condition that the bounds of its numbers
-decide is left out. Results may differ from those of the path in their last digits.
+decide is left out. Results may differ from the path in their last digits.
 """
 
 from __future__ import annotations
@@ -31,16 +31,6 @@ import numpy as np
 Number = Any
 """An operation, or a constant: a number or a truth value."""
 
-
-class BlockBounds(NamedTuple):
-    """The range of a number, up to its rounding."""
-
-    low: float = -inf
-    high: float = inf
-
-
-_ANY = BlockBounds()
-
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '<': operator.lt,
     '<=': operator.le,
@@ -54,6 +44,42 @@ _TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
 
 _CLEAR: Final = 1e-9
 """Numbers with this relative distance are different however they are rounded."""
+
+_FUNCTIONS: Final[dict[str, Any]] = {
+    '+': np.add,
+    '-': np.subtract,
+    '*': np.multiply,
+    '/': np.divide,
+    'abs': np.abs,
+    'sin': np.sin,
+    'cos': np.cos,
+    'tan': np.tan,
+    'sqrt': np.sqrt,
+    'atan2': np.arctan2,
+    'copysign': np.copysign,
+    'maximum': np.maximum,
+    'minimum': np.minimum,
+    '<': np.less,
+    '<=': np.less_equal,
+    '>': np.greater,
+    '>=': np.greater_equal,
+    '==': np.equal,
+    '!=': np.not_equal,
+    'and': np.logical_and,
+    'or': np.logical_or,
+    'not': np.logical_not,
+    'where': np.where,
+}
+
+
+class BlockBounds(NamedTuple):
+    """The range of a number, up to its rounding."""
+
+    low: float = -inf
+    high: float = inf
+
+
+_ANY = BlockBounds()
 
 
 def _tangent_is_close() -> bool:
@@ -73,15 +99,7 @@ _BY_TANGENT = _tangent_is_close()
 
 
 class ArrayForm:
-    """
-    Rewrites the operations of a path.
-
-    Parameters
-    ----------
-    given
-        Rates and accelerations, by name, that are 0 or 1.
-
-    """
+    """Rewrites the operations of a path; ``given`` has the rates and accelerations of 0 or 1."""
 
     def __init__(self, given: Mapping[str, int]) -> None:
         self._given = given
@@ -361,48 +379,12 @@ def _is_clearly_less(less: float, more: float) -> bool:
     return more - less > _CLEAR * max(abs(less), abs(more)) and less < inf and more > -inf
 
 
-_FUNCTIONS: Final[dict[str, Any]] = {
-    '+': np.add,
-    '-': np.subtract,
-    '*': np.multiply,
-    '/': np.divide,
-    'abs': np.abs,
-    'sin': np.sin,
-    'cos': np.cos,
-    'tan': np.tan,
-    'sqrt': np.sqrt,
-    'atan2': np.arctan2,
-    'copysign': np.copysign,
-    'maximum': np.maximum,
-    'minimum': np.minimum,
-    '<': np.less,
-    '<=': np.less_equal,
-    '>': np.greater,
-    '>=': np.greater_equal,
-    '==': np.equal,
-    '!=': np.not_equal,
-    'and': np.logical_and,
-    'or': np.logical_or,
-    'not': np.logical_not,
-    'where': np.where,
-}
-
-
 class BlockFunction:
     """
     Numbers of a path for many states at once, computed in blocks through reused buffers.
 
-    Parameters
-    ----------
-    inputs
-        Names of the path's inputs.
-    arrays
-        Those that are arrays; the others are numbers.
-    roots
-        The numbers to compute.
-    condition
-        Where the numbers are valid.
-
+    ``inputs`` are the names of the path's inputs; of these ``arrays`` are arrays, and the others
+    numbers. ``roots`` are the numbers to compute, valid where ``condition`` holds.
     """
 
     def __init__(
@@ -433,23 +415,11 @@ class BlockFunction:
         self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask
     ) -> Mask | None:
         """
-        Compute the numbers of a block.
+        Compute the numbers of a block; return where the condition holds, None if it always does.
 
-        Parameters
-        ----------
-        given
-            The inputs.
-        out
-            An array for each root; its values are undefined where the condition does not hold.
-            Nothing is written if the condition holds for less than half of the states.
-        rows, masks
-            Scratch arrays, as long as the block.
-
-        Returns
-        -------
-        Mask | None
-            Where the condition holds, as a scratch array; None if it always does.
-
+        ``out`` has an array for each root; its values are undefined where the condition does not
+        hold, and nothing is written if it holds for less than half of the states. ``rows`` and
+        ``masks`` are scratch arrays, as long as the block; the result is one of the masks.
         """
         holds: Mask | None = self._run(given, out, rows, masks)
         return holds

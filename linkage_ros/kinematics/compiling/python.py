@@ -156,19 +156,14 @@ def compile_function(
     """
     Return a function as straight-line code, which gives the same bits.
 
-    Parameters
-    ----------
-    function
-        Takes numbers and returns numbers, and makes no decision by them.
-    values
-        Arguments for which it works, each real or complex as in all later calls.
-
+    The function takes numbers and returns numbers, and its decisions do not depend on them.
+    ``values`` are arguments for which it works, each real or complex as in all later calls.
     """
     tape = Tape()
     given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
     results = [number_of(number) for number in function(*given)]
     if tape.decisions:
-        raise ValueError('the function decides by its arguments, and has no straight line')
+        raise ValueError('the function decides by its arguments, and cannot be compiled')
     places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
     inputs = tuple(one.operation for one in given)
     line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))

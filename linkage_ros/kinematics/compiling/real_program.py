@@ -46,6 +46,11 @@ from linkage_ros.kinematics.status import Status
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure
 
+_MAKES_PARTS = frozenset(('facing', 'vector'))
+
+_MOST_SOLVED = 32
+"""Largest number of leaves with numbers: change points of several dyads multiply."""
+
 
 class _Parts(NamedTuple):
     """The components of a complex number along x and y."""
@@ -55,7 +60,7 @@ class _Parts(NamedTuple):
 
 
 class Lowered(NamedTuple):
-    """A path in real numbers, and its fates."""
+    """A path in real numbers, and its fallback statuses."""
 
     path: Path
     fallback_statuses: tuple[Tree, ...]
@@ -67,16 +72,9 @@ def lower_path(
     """
     Return a path in real numbers only; paths with iterated links have no such form.
 
-    Parameters
-    ----------
-    path
-        The path.
-    fallback_statuses
-        The status of the linkage where each decision differs.
-    by_squares
-        Whether lengths and quotients are computed by squares, which is fastest for arrays: the
-        last digits differ, lengths below 1e-154 are lost, and so is the sign of a zero.
-
+    ``fallback_statuses`` has the status of the linkage where each decision differs. ``by_squares``
+    computes lengths and quotients by squares, which is fastest for arrays: the last digits differ,
+    lengths below 1e-154 are lost, and so is the sign of a zero.
     """
     lower = Lowering(by_squares)
     inputs = tuple(lower.lower_operation(given) for given in path.inputs)
@@ -137,9 +135,6 @@ class Lowering:
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
         return self._formulas[name](self, *given)
-
-
-_MAKES_PARTS = frozenset(('facing', 'vector'))
 
 
 def _short_product(one: Any, other: Any) -> Any:
@@ -263,9 +258,6 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
 # to take one of the other paths: these end in None, and code generated from the tree gives no
 # numbers there.
 
-_MOST_SOLVED = 32
-"""Largest number of leaves with numbers: change points of several dyads multiply."""
-
 
 class Program(NamedTuple):
     """A linkage as a tree in real numbers."""
@@ -286,7 +278,7 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     if is_iterated(closure):
         raise DefinitionError(
             'links',
-            'some are only solved by iteration, which is no straight line',
+            'some are only solved by iteration, which cannot be compiled',
             'compile a linkage of dyads',
         )
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths

@@ -11,8 +11,8 @@ Many states of a linkage at once.
 
 They pass, block by block, through the paths of the linkage as numpy: intermediate results stay in
 the cache, and memory grows only with the returned arrays. A state that leaves a path gets its
-status from the fates of the path; only the plain steps can solve toggles and change points, so
-they are called for these.
+status from the fallback statuses of the path; only the interpreted steps can solve toggles and
+change points, so they are called for these.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _CLOSED, _LIMITED = CODES[Status.CLOSED], CODES[Status.LIMITED]
 _TOGGLE = CODES[Status.TOGGLE]
 
 _LOST = (Status.OPEN, Status.INDETERMINATE)
-"""The statuses that the fates of a path decide; the plain steps decide all others."""
+"""The statuses that a path decides as fallbacks; the interpreted steps decide all others."""
 
 
 class _SolveProgram(NamedTuple):
@@ -74,16 +74,9 @@ class SolverOutline:
     """
     Solves a linkage for certain numbers at many states.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    width
-        Number of values of a position, and of each derivative.
-    wanted
-        Selects the values; by default all published joints, and then the status also says that a
-        joint is beyond its limits.
-
+    ``width`` is the number of values of a position, and of each derivative. ``wanted`` selects the
+    values; if it selects the published joints, the status also says that a joint is beyond its
+    limits.
     """
 
     def __init__(
@@ -107,7 +100,7 @@ class SolverOutline:
     ) -> Batch:
         """Solve all states, as `Closure.solve` specifies."""
         if derivatives not in (0, 1, 2):
-            raise ValueError(f'derivatives: {derivatives!r} is none of 0, 1, 2')
+            raise ValueError(f'derivatives: {derivatives!r} is not one of 0, 1, 2')
         driven = self._driven
         if rates is None and derivatives and len(inputs) == driven:
             if driven > 1:
@@ -197,7 +190,7 @@ class SolverOutline:
         return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
     def _array_programs(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_SolveProgram]:
-        """Return the paths over arrays; none if links are iterated, which is no straight line."""
+        """Return the paths over arrays; none if links are iterated."""
         if is_iterated(self._closure):
             return []
         return [
@@ -310,7 +303,7 @@ def _array_program(path: Lowered, kinds: Sequence[Any]) -> _SolveProgram:
 
 
 def _leads_to_status(form: ArrayForm, fallback: Tree, status: Status) -> Number:
-    """Return the condition that a fate leads to a status."""
+    """Return the condition that a fallback leads to a status."""
     if not isinstance(fallback, DecisionBranch):
         return fallback is status
     condition = form.rewrite_number(fallback.condition)
@@ -363,7 +356,7 @@ def _broadcast_values(name: str, values: list[Any], driven: int, count: int | No
 
 
 def _result_arrays(width: int, count: int, derivatives: int, out: Batch | None) -> Batch:
-    """Return the arrays for the results: those of ``out``, and new ones for the others."""
+    """Return the arrays for the results, from ``out`` where it has them, else new ones."""
     arrays: list[Any] = []
     given = out or (None,) * 4
     for k, (name, array) in enumerate(zip(Batch._fields, given, strict=True)):

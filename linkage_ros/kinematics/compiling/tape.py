@@ -25,6 +25,45 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 Kind: TypeAlias = Literal['real', 'complex', 'truth', 'other']
 
+_VALUES: Final[dict[str, Callable[..., Any]]] = {
+    '+': operator.add,
+    '-': operator.sub,
+    '*': operator.mul,
+    '/': operator.truediv,
+    '**': operator.pow,
+    'negative': operator.neg,
+    'abs': abs,
+    'sin': math.sin,
+    'cos': math.cos,
+    'sqrt': math.sqrt,
+    'atan2': math.atan2,
+    'copysign': math.copysign,
+    'hypot': math.hypot,
+    'remainder': math.remainder,
+    'round': round,
+    'facing': lambda angle: cmath.rect(1.0, angle),
+    'phase': cmath.phase,
+    'vector': complex,
+    'real': lambda vector: vector.real,
+    'imag': lambda vector: vector.imag,
+    'conjugate': lambda vector: vector.conjugate(),
+    'where': lambda condition, one, other: one if condition else other,
+    'item': operator.getitem,
+    '<': operator.lt,
+    '<=': operator.le,
+    '>': operator.gt,
+    '>=': operator.ge,
+    '==': operator.eq,
+    '!=': operator.ne,
+    'finite': lambda *numbers: all(map(math.isfinite, numbers)),
+    'found': lambda found: found is not None,
+}
+
+_TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
+_COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
+_OF_EITHER = frozenset(('+', '-', '*', '/', '**', 'negative', 'where'))
+_REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Operation:
@@ -69,46 +108,6 @@ class Decision(NamedTuple):
 
     condition: Operation
     held: bool
-
-
-_VALUES: Final[dict[str, Callable[..., Any]]] = {
-    '+': operator.add,
-    '-': operator.sub,
-    '*': operator.mul,
-    '/': operator.truediv,
-    '**': operator.pow,
-    'negative': operator.neg,
-    'abs': abs,
-    'sin': math.sin,
-    'cos': math.cos,
-    'sqrt': math.sqrt,
-    'atan2': math.atan2,
-    'copysign': math.copysign,
-    'hypot': math.hypot,
-    'remainder': math.remainder,
-    'round': round,
-    'facing': lambda angle: cmath.rect(1.0, angle),
-    'phase': cmath.phase,
-    'vector': complex,
-    'real': lambda vector: vector.real,
-    'imag': lambda vector: vector.imag,
-    'conjugate': lambda vector: vector.conjugate(),
-    'where': lambda condition, one, other: one if condition else other,
-    'item': operator.getitem,
-    '<': operator.lt,
-    '<=': operator.le,
-    '>': operator.gt,
-    '>=': operator.ge,
-    '==': operator.eq,
-    '!=': operator.ne,
-    'finite': lambda *numbers: all(map(math.isfinite, numbers)),
-    'found': lambda found: found is not None,
-}
-
-_TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
-_COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
-_OF_EITHER = frozenset(('+', '-', '*', '/', '**', 'negative', 'where'))
-_REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
@@ -180,7 +179,7 @@ class Tape:
 
 
 class Symbol:
-    """A number that is not known yet: the result of an operation on the tape that records it."""
+    """Symbolic number: result of a recorded operation."""
 
     __slots__ = ('operation', 'tape')
 

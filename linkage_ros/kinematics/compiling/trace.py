@@ -64,24 +64,9 @@ def trace_path(
     """
     Return the path that the steps take at one state.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    at
-        Values of its inputs, in [rad] or [m], at which it is closed.
-    derivatives
-        0: positions; 1: velocities too; 2: accelerations too.
-    wanted
-        Selects the numbers that the path returns.
-    within_limits
-        Whether the path ends if a joint is beyond its limits.
-
-    Raises
-    ------
-    ValueError
-        If the linkage is not closed at that state.
-
+    ``at`` has values of the inputs, in [rad] or [m], at which the linkage is closed; else
+    ValueError is raised. ``derivatives``: 0 for positions, 1 for velocities too, 2 for
+    accelerations too. If ``within_limits``, the path ends where a joint is beyond its limits.
     """
     tape = Tape()
     given = [
@@ -141,17 +126,9 @@ def tree_below(
     tape: Tape, decided: tuple[bool, ...], leaf: Callable[[tuple[bool, ...]], Tree]
 ) -> Tree:
     """
-    Return the tree below some first decisions.
+    Return the tree below the first decisions of the steps that run on a tape.
 
-    Parameters
-    ----------
-    tape
-        The tape on which the steps run.
-    decided
-        The first decisions.
-    leaf
-        Runs the steps with given first decisions, and returns what they come to.
-
+    ``leaf`` runs the steps with given first decisions, and returns their result.
     """
     tree = leaf(decided)
     made = tape.decisions[:]
@@ -169,8 +146,8 @@ def fallback_statuses(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
     """
     Return, for each decision of a path, the status of the linkage if the decision differs.
 
-    The status is that of the first step that is not closed. If that step has a pose, as at a
-    toggle, a later step may have a worse status. None if the steps continue on another path, and
+    The first step that is not closed gives the status. If that step has a pose, as at a toggle,
+    a later step may have a worse status. None if the steps continue on another path, and
     only they give the status. The path is traced without limits.
     """
     tape = path.tape

@@ -22,6 +22,8 @@ _DEEPEST = 12
 _PRECEDENCE = {'+': 4, '-': 4, '*': 5, '/': 5, 'negative': 6, '**': 7}
 _COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
 
+_ATOM = 9
+
 
 def count_uses(roots: Iterable[Any]) -> dict[Operation, int]:
     """Return how often each operation is used, by others that the roots need or as a root."""
@@ -66,28 +68,15 @@ class WrittenText(NamedTuple):
         return self.text if self.precedence >= precedence else f'({self.text})'
 
 
-_ATOM = 9
-
-
 class TextWriter:
     """
     Writes operations as lines of a language with the operators of C.
 
     An operation that is used once is written inline; one that is used more often gets a name.
 
-    Parameters
-    ----------
-    roots
-        All results that the program needs: its conditions and its outputs.
-    constant
-        Writes a constant.
-    call
-        Writes the call of a function, given its name and its arguments.
-    choice
-        Writes a choice between two expressions, given a condition.
-    assign
-        Writes a line that gives a name to an expression of an operation.
-
+    ``roots`` are all results that the program needs: its conditions and its outputs. ``call``
+    takes an operation and its arguments, ``choice`` a condition and two expressions, ``assign`` a
+    name, an expression and its operation.
     """
 
     def __init__(

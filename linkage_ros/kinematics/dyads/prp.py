@@ -16,7 +16,7 @@ from û1 to û2::
     E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
 
 The rates solve the same equations for the difference of the links' velocities at the pin, the
-accelerations for that of their accelerations, including Coriolis terms. Seen from one of the
+accelerations for the difference of their accelerations, with Coriolis terms. Seen from one of the
 links, a slide is multiplied by the relative turn only::
 
     ṡ1 = ((Ė2 − Ė1 − ω1 × (E2 − E1)) × û2 − (ω2 − ω1)·s2)/sin δ
@@ -77,15 +77,9 @@ class PRPDyad(_CrossingLines):
     """
     A pin on two lines.
 
-    Parameters
-    ----------
-    starts
-        Indices of E1 and E2 among the pins.
-    arms
-        Indices, among the coordinates, of the angles of the links that carry the lines.
-    units
-        Directions of the lines at coordinates of 0.
-
+    ``starts`` are the indices of E1 and E2 among the pins, and ``arms`` the indices, among the
+    coordinates, of the angles of the links that carry the lines. ``units`` are the directions of
+    the lines at coordinates of 0.
     """
 
     __slots__ = ('_starts', '_units')
@@ -182,18 +176,10 @@ class CrankPRPDyad(_CrossingLines):
     frame of the ground, which may be far from the intersection: it lost 8,000 u·κ where the points
     were 1,000 times as far, and 23 u·κ in random linkages.
 
-    Parameters
-    ----------
-    offsets
-        h1 and h2, in the unit of the lengths.
-    size
-        Size of the coordinates from which the offsets were computed: it bounds, in units of u, the
-        distance of parallel lines that rounding causes.
-    arms
-        Indices, among the coordinates, of the angles of the links that carry the lines.
-    across
-        e^{iδ} if those coordinates are equal.
-
+    ``offsets`` are h1 and h2, in the unit of the lengths. ``size`` is the size of the coordinates
+    from which they were computed: it bounds, in units of u, the distance of parallel lines that
+    rounding causes. ``arms`` are the indices, among the coordinates, of the angles of the links
+    that carry the lines. ``across`` is e^{iδ} if those coordinates are equal.
     """
 
     __slots__ = ('_offsets', '_size')

@@ -15,7 +15,7 @@ z component of the cross product::
 
     z = κ + s2·û + s1·v̂        s1 = (z − κ) × û/(v̂ × û)        s2 = (z − κ) × v̂/(û × v̂)
 
-s2 is the slide along the known line, s1 that of the pinned link along the second. The same
+s2 is the slide along the known line, s1 the slide of the pinned link on the second. The same
 equations hold for the rates and the accelerations. There is one solution at every state, and no
 toggle.
 """
@@ -49,16 +49,10 @@ class RPPDyad:
     """
     A link pinned at A on a link that slides on a line.
 
-    Parameters
-    ----------
-    rail
-        The start of the known line, along the x axis of the link that carries it.
-    inner, outer
-        v̂ and û, not parallel.
-    offsets
-        κ × û and κ × v̂, in the unit of the lengths: subtracting κ from z first would lose
-        accuracy where κ is long along a line.
-
+    ``rail`` is the start of the known line, along the x axis of the link that carries it.
+    ``inner`` and ``outer`` are v̂ and û, not parallel. ``offsets`` are κ × û and κ × v̂, in the
+    unit of the lengths: subtracting κ from z first would lose accuracy where κ is long along a
+    line.
     """
 
     __slots__ = ('_across', '_inner', '_offsets', '_outer', 'rail')

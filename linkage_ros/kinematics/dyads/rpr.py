@@ -60,16 +60,10 @@ class RPRDyad(TwoSided):
     """
     A rail pinned at A, a block on it pinned at D.
 
-    Parameters
-    ----------
-    diagonal
-        From A to D, with the limits |h| and ∞.
-    offset
-        h, from A to the line, positive if the line lies left of A, in the unit of the lengths.
-    sign
-        The assembly: +1 if D lies ahead of A along the rail, −1 if it lies behind. If the diagonal
-        passes a change point, this holds for 0 < φ < 2π.
-
+    The diagonal goes from A to D, with the limits |h| and ∞. ``offset`` is h, from A to the line,
+    positive if the line lies left of A, in the unit of the lengths. The sign is +1 if D lies ahead
+    of A along the rail, −1 if it lies behind; if the diagonal passes a change point, this holds
+    for 0 < φ < 2π.
     """
 
     __slots__ = ('diagonal', 'offset')

@@ -55,14 +55,8 @@ class RRPDyad(TwoSided):
     """
     A link pinned at A, and a pin of it on a line.
 
-    Parameters
-    ----------
-    rail
-        The rail, for a link of length b.
-    sign
-        The assembly: +1 if B lies ahead of A, −1 if it lies behind. If the rail passes a change
-        point, this holds for −π/2 < ψ < π/2.
-
+    The rail is for a link of length b. The sign is +1 if B lies ahead of A, −1 if it lies behind;
+    if the rail passes a change point, this holds for −π/2 < ψ < π/2.
     """
 
     __slots__ = ('rail',)

@@ -89,16 +89,9 @@ class RRRDyad(TwoSided):
     """
     Two links pinned together.
 
-    Parameters
-    ----------
-    diagonal
-        From A to D, with the limits |b − c| and b + c.
-    b, c
-        Lengths of the first and the second link, in one unit; at best near 1.
-    sign
-        The assembly: +1 if B lies left of A→D, −1 if it lies right. If the diagonal passes a
-        change point, this holds for 0 < φ < π.
-
+    The diagonal goes from A to D, with the limits |b − c| and b + c. b and c are the lengths of
+    the first and the second link, in one unit; at best near 1. The sign is +1 if B lies left of
+    A→D, −1 if it lies right; if the diagonal passes a change point, this holds for 0 < φ < π.
     """
 
     __slots__ = ('_difference', '_sums', 'diagonal')
@@ -258,16 +251,10 @@ class FoldingRRRDyad(RRRDyad):
         α4 = σ·N·near/2·(−1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)        G = N/w
 
     If far is below 0, so is ρ: σ and near change their signs, and far is taken positive. Without
-    this form 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, where κ is that of
-    lengths which change together, so that the change point remains one.
+    this form 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, where κ is the
+    condition of lengths which change together, so that the change point remains one.
 
-    Parameters
-    ----------
-    diagonal
-        From A to D; one that `passes_fold`.
-    b, c, sign
-        As in `RRRDyad`.
-
+    The diagonal is one that `passes_fold`.
     """
 
     __slots__ = ('_constants',)
@@ -354,7 +341,7 @@ class FoldingRRRDyad(RRRDyad):
 
 class DrivenOffset(NamedTuple):
     """
-    The transformation from the frame of one link to that of a link it is driven against.
+    The transformation from the frame of one link to the frame of a link it is driven against.
 
     A point z becomes origin + e^{i·(angle + sign·x[turn])}·(z − inner) + sign·x[slide]·unit; turn
     or slide is the index of the input, and the other is −1.
@@ -371,21 +358,11 @@ class DrivenOffset(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DyadSide:
-    """
-    A vector from one point of a group of links to another, in the frame of the link of the first.
+    """A vector between two points of a group of links, in the frame of the first one's link."""
 
-    Attributes
-    ----------
-    start, end
-        The points, each in the frame of its own link.
-    transforms
-        The transformations from the link of the end to the link of the start, in this order.
-
-    """
-
-    start: complex
+    start: complex  # In the frame of its own link; so is the end
     end: complex
-    transforms: tuple[DrivenOffset, ...]
+    transforms: tuple[DrivenOffset, ...]  # From the link of the end to the link of the start
 
     def vector_at(self, x: list[float]) -> complex:
         """Return the vector."""
@@ -431,7 +408,7 @@ class DrivenRRRPose(NamedTuple):
 
 
 class DrivenRRRRates(NamedTuple):
-    """The rates of the diagonal, and those of both sides."""
+    """The rates of the diagonal and of both sides."""
 
     diagonal_rate: DiagonalRate
     sides: tuple[complex, complex]
@@ -447,15 +424,8 @@ class DrivenRRRDyad(TwoSided):
     to the velocity of its outer pin; this gives the velocity equation of a dyad of constant sides.
     Likewise (z̈ + 2i·θ̇·ż)·e^{iθ} for the accelerations.
 
-    Parameters
-    ----------
-    ends
-        Indices of the outer pins A and D among the pins.
-    sides
-        From A to B, and from D to B.
-    sign
-        The assembly: +1 if B lies left of A→D, −1 if it lies right.
-
+    ``ends`` are the indices of the outer pins A and D among the pins. The sides go from A to B,
+    and from D to B. The sign is +1 if B lies left of A→D, −1 if it lies right.
     """
 
     __slots__ = ('_ends', '_sides')

@@ -15,15 +15,7 @@ from typing import Any
 
 
 class TwoSided:
-    """
-    A dyad that closes in two ways.
-
-    Parameters
-    ----------
-    sign
-        The assembly, +1 or −1, as its dyad defines it.
-
-    """
+    """A dyad that closes in two ways; its sign, +1 or −1, is its assembly."""
 
     __slots__ = ('_sign',)
 
