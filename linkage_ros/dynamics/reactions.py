@@ -289,13 +289,15 @@ class Reactions:
         self._solve_system: Callable[..., list[float] | None] = _solve_linear
         if self._load_dependent:
             from linkage_ros.dynamics import (
-                load_dependent_friction as pressed_joints,  # local import: only with it
+                load_dependent_friction,  # local import: only with it
             )
 
             unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
-            self._solve_system = partial(pressed_joints.solve_pressed, unknowns)
-            self._forces_in = partial(pressed_joints.forces_in, unknowns)
-            self._solve_friction_effort = partial(pressed_joints.friction_effort, unknowns)
+            self._solve_system = partial(load_dependent_friction.solve_pressed, unknowns)
+            self._forces_in = partial(load_dependent_friction.forces_in, unknowns)
+            self._solve_friction_effort = partial(
+                load_dependent_friction.friction_effort, unknowns
+            )
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)

@@ -216,7 +216,9 @@ def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
     impossible = [messages[2]._replace(log_time=-1), messages[3]._replace(publish_time=2**63)]
     for message in [*messages[:2], *impossible, *messages[4:6]]:
         memory.offer(*message)
-    assert list(memory.take_content().messages()) == [tuple(m) for m in (*messages[:2], *messages[4:6])]
+    assert list(memory.take_content().messages()) == [
+        tuple(m) for m in (*messages[:2], *messages[4:6])
+    ]
     assert [(c.received, c.kept, c.dropped) for c in memory.stop()] == [(3, 2, 1), (3, 2, 1)]
 
 

@@ -374,7 +374,9 @@ def find_solutions(
 
 def needs_of(typed: argparse.Namespace) -> Needs:
     """Return the requirements; if there are any, a solution must also be free of defects."""
-    needs = Needs(typed.need, typed.angles.to_radians(typed.min_transmission), typed.max_link_ratio)
+    needs = Needs(
+        typed.need, typed.angles.to_radians(typed.min_transmission), typed.max_link_ratio
+    )
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())
 
