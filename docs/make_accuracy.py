@@ -211,8 +211,8 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
     """Yield a table of each effect alone, on a scene without any."""
     files = {SCENE_FILE: EVERY_EFFECT.encode(), LINKAGE_FILE: FOUR_BAR.read_bytes()}
     scene = parse_scene('effects', 'effects', files)
-    (member,) = scene.linkages
-    names = [*member.effects]
+    (scene_linkage,) = scene.linkages
+    names = [*scene_linkage.effects]
     # Friction acts on nothing without a force effect.
     beside = {'friction': ('effort',)}
     alone = [_only(scene, name, *beside.get(name, ())) for name in names]
@@ -240,8 +240,8 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
 
 def _only(scene: Scene, *names: str) -> Scene:
     """Return the scene with these of its effects only."""
-    (member,) = scene.linkages
-    return leave_out(scene, frozenset(member.effects).difference(names))
+    (scene_linkage,) = scene.linkages
+    return leave_out(scene, frozenset(scene_linkage.effects).difference(names))
 
 
 if __name__ == '__main__':

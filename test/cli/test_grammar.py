@@ -271,10 +271,10 @@ def scene(tmp_path: Path) -> Path:
 
 def test_keys_are_set_and_the_rest_stays(scene: Path, tmp_path: Path) -> None:
     loaded = load_scene(scene, ['rate=500', 'drive.sine.amplitude=0.3', 'effects.markers={}'])
-    (member,) = loaded.linkages
-    name, sine = member.drive
+    (scene_linkage,) = loaded.linkages
+    name, sine = scene_linkage.drive
     assert (loaded.rate, name, sine.amplitude, sine.frequency) == (500.0, 'sine', 0.3, 1.0)
-    assert list(member.effects) == ['velocity', 'noise', 'markers']
+    assert list(scene_linkage.effects) == ['velocity', 'noise', 'markers']
     assert loaded.record is not None
     assert loaded.record.directory == '1e-3'
     assert load_scene(scene).rate == 100.0

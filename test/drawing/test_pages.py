@@ -128,15 +128,15 @@ def test_the_equations_of_a_module_stand_in_its_section(name, equation):
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
 def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
     scene = scene_of(section.scene)
-    (member,) = scene.linkages
+    (scene_linkage,) = scene.linkages
     if section.name == 'Faults':
         assert {fault.kind for fault in scene.faults.values()} == set(FAULTS)
     elif section.name == 'loads':
-        assert member.loads.applied
+        assert scene_linkage.loads.applied
     elif section.name in PARTS_OF_TORQUE:
-        assert getattr(member.drive[1], section.name.lower()) is not None
+        assert getattr(scene_linkage.drive[1], section.name.lower()) is not None
     else:
-        assert section.name in (member.drive[0], *member.effects)
+        assert section.name in (scene_linkage.drive[0], *scene_linkage.effects)
 
 
 def test_the_page_says_what_each_is_held_against_and_where():

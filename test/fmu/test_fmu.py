@@ -176,8 +176,12 @@ def test_every_output_has_the_bits_of_the_message(name, settings, bench):
     pipeline = Pipeline(scene)
     instance = bench(scene)
     names = [name for name, v in instance.variables.items() if v.causality == 'input']
-    sampled = [member for member in scene.linkages if member.drive[0] in ('topic', 'torque')]
-    driven = [joint for member in sampled for joint in member.input_names]
+    sampled = [
+        scene_linkage
+        for scene_linkage in scene.linkages
+        if scene_linkage.drive[0] in ('topic', 'torque')
+    ]
+    driven = [joint for scene_linkage in sampled for joint in scene_linkage.input_names]
     assert list(dict.fromkeys(name.split('.')[1] for name in names)) == driven
     newest: dict[str, float] = {}
     published = 0

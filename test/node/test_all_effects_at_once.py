@@ -179,8 +179,8 @@ def recorded(tmp_path_factory):
 
 def named_in(folder):
     scene = load_scene(folder / 'scene.yaml')
-    effects = [set(member.effects) for member in scene.linkages]
-    drives = {member.drive[0] for member in scene.linkages}
+    effects = [set(scene_linkage.effects) for scene_linkage in scene.linkages]
+    drives = {scene_linkage.drive[0] for scene_linkage in scene.linkages}
     return effects, drives, {fault.kind for fault in scene.faults.values()}
 
 

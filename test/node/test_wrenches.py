@@ -92,9 +92,9 @@ def test_without_its_wrenches_it_would_not(recorded, name):
 def test_a_bag_whose_account_names_more_wrenches_than_its_scene_can_be_read(recorded):
     done = recorded('held')
     scene = recorded_scene(done.bag)
-    (member,) = scene.linkages
-    loads = replace(member.loads, applied=type(member.loads.applied)())
-    bare = replace(scene, linkages=(replace(member, loads=loads),))
+    (scene_linkage,) = scene.linkages
+    loads = replace(scene_linkage.loads, applied=type(scene_linkage.loads.applied)())
+    bare = replace(scene, linkages=(replace(scene_linkage, loads=loads),))
     assert len(list(replay_ticks(done.bag, bare))) == len(done.published)
 
 

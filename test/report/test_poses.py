@@ -164,11 +164,11 @@ TICKS = 40
 def moments(scene):
     """Return ticks over the middle of the range, each with its sample of all inputs."""
     (line,) = Pipeline(scene).linkages
-    (member,) = scene.linkages
+    (scene_linkage,) = scene.linkages
     usual = usual_inputs(line.closure)
     interval = InputSweep(line.closure, usual).range_about(usual[0])
     values = sample_inputs(interval, TICKS) if interval else [usual[0]] * TICKS
-    write = JointStateWriter(member.inputs).write
+    write = JointStateWriter(scene_linkage.input_names).write
     for tick, value in enumerate(values):
         time = BEGIN + tick * MS
         given = (value, *usual[1:])

@@ -69,13 +69,13 @@ def test_a_scene_that_says_nothing(build):
     scene, _ = build()
     assert scene.rate == 1000.0
     assert not scene.wrapped
-    (member,) = scene.linkages
-    assert member.drive == (
+    (scene_linkage,) = scene.linkages
+    assert scene_linkage.drive == (
         'topic',
         TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1),
     )
-    assert member.effects == {}
-    assert (member.name, member.loads, scene.faults) == ('', None, {})
+    assert scene_linkage.effects == {}
+    assert (scene_linkage.name, scene_linkage.loads, scene.faults) == ('', None, {})
     assert scene.record is None
     assert scene.files == {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
 
@@ -93,12 +93,12 @@ record: {directory: bags, name: first, queue: 1000}
     )
     assert scene.rate == 0.0
     assert scene.wrapped
-    (member,) = scene.linkages
-    assert member.drive == (
+    (scene_linkage,) = scene.linkages
+    assert scene_linkage.drive == (
         'topic',
         TopicParameters(carry_forward=False, max_age=0.5, max_lead=0.0),
     )
-    assert member.effects == {'velocity': VelocityParameters()}
+    assert scene_linkage.effects == {'velocity': VelocityParameters()}
     assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
 
 
@@ -478,8 +478,8 @@ def test_a_scene_names_a_linkage_that_comes_with_the_package(tmp_path):
     file = tmp_path / 'scene.yaml'
     for name in ('hoeken', 'four_bar'):
         file.write_text(f'linkage: {name}')
-        (member,) = load_scene(file).linkages
-        assert member.linkage.links == load_scene(name).linkages[0].linkage.links
+        (scene_linkage,) = load_scene(file).linkages
+        assert scene_linkage.linkage.links == load_scene(name).linkages[0].linkage.links
     # A file with a suffix, or in a folder, is the user's.
     (tmp_path / 'four_bar.yaml').write_text(load_scene('hoeken').files['linkage.yaml'].decode())
     file.write_text('linkage: four_bar.yaml')

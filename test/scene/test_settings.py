@@ -51,8 +51,8 @@ SET = {
 def test_keys_with_dots_are_reached(kind, scene):
     text, settings, expected = SET[kind]
     loaded = scene(text, *settings)
-    (member,) = loaded.linkages
-    forces = member.loads.applied.forces
+    (scene_linkage,) = loaded.linkages
+    forces = scene_linkage.loads.applied.forces
     assert {name: force.constant for name, force in forces.items()} == expected
     # What a bag holds of the scene says the same by itself.
     assert b'--set' in loaded.files[next(iter(loaded.files))]

@@ -285,9 +285,9 @@ def test_an_error_in_a_scene_is_told_in_its_units(write, kind):
 def test_what_is_set_has_the_units_of_the_scene(write):
     write(IN_SI, 'linkage.yaml')
     settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
-    (member,) = load_scene(write(SCENE), settings).linkages
-    assert member.drive[1].amplitude == 0.5235987755982989
-    assert member.effects['tolerance'].given == {'crank.A': (0.0002, 0.0)}
+    (scene_linkage,) = load_scene(write(SCENE), settings).linkages
+    assert scene_linkage.drive[1].amplitude == 0.5235987755982989
+    assert scene_linkage.effects['tolerance'].given == {'crank.A': (0.0002, 0.0)}
     in_metres = [*settings, 'units=m', 'loads.gravity=[0, -9.81]']
     (metres,) = load_scene(write(SCENE), in_metres).linkages
     assert metres.drive[1].amplitude == 0.5235987755982989
