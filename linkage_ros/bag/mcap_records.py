@@ -54,22 +54,9 @@ class DamagedError(Exception):
 
 def decompress(data: bytes, compression: str, size: int) -> bytes:
     """
-    Decompress a chunk.
+    Decompress a chunk (compression '', 'lz4' or 'zstd') to its stated size [bytes], never beyond.
 
-    Parameters
-    ----------
-    data
-        Bytes of the chunk in the file.
-    compression
-        '', 'lz4' or 'zstd'.
-    size
-        Stated size after decompression [bytes]; no further byte is decompressed.
-
-    Raises
-    ------
-    DamagedError
-        The size is wrong or not allowed, or decompression fails.
-
+    Raise `DamagedError` if the size is wrong or not allowed, or if decompression fails.
     """
     if size > LARGEST:
         raise DamagedError(f'would be {size:,} bytes unpacked; no more than {LARGEST:,} are taken')
@@ -363,17 +350,8 @@ class DataSection:
 
     Content with a checksum is returned only if the checksum matches. Messages outside of chunks,
     and chunks without a checksum, are returned if the whole data section has a matching checksum,
-    or if the file has no checksum at all; then they are counted in `unchecked`.
-
-    Parameters
-    ----------
-    source
-        The file.
-    definitions
-        Schemas and channels that are known already.
-    index_start
-        Position of the file's index, directly after the data section; 0 if unknown.
-
+    or if the file has no checksum at all; then they are counted in `unchecked`. ``index_start`` is
+    the position of the file's index, directly after the data section; 0 if unknown.
     """
 
     def __init__(
@@ -396,20 +374,10 @@ class DataSection:
 
     def read_record(self, at: int) -> tuple[Iterable[FoundRecord], int]:
         """
-        Read the record at a position.
+        Return the content of the record at a position, and the position of the next record.
 
-        Returns
-        -------
-        found
-            Its content, to be consumed before the next call, since it may define channels.
-        end
-            Position of the next record.
-
-        Raises
-        ------
-        DamagedError
-            It is incomplete or invalid; also raised while `found` is consumed.
-
+        Consume the content before the next call: it may define channels. `DamagedError` is raised
+        for an incomplete or invalid record, also while the content is consumed.
         """
         opcode, end = self.source.read_head(at)
         if opcode == Opcode.CHUNK:

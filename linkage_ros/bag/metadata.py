@@ -64,18 +64,10 @@ def qos_text(qos: QosProfile) -> str:
 
 def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool = True) -> str:
     """
-    Return the text of ``metadata.yaml``.
+    Return the text of ``metadata.yaml``, with ``custom`` as its ``custom_data``.
 
-    Parameters
-    ----------
-    summary
-        Summary of the bag.
-    custom
-        Content of ``custom_data``.
-    root
-        Whether to write the root key: rosbag2 writes it in the file, and omits it in the MCAP
-        file's own ``serialized_metadata``.
-
+    rosbag2 writes the root key in the file, and omits it in the MCAP file's own
+    ``serialized_metadata``.
     """
     files = summary.parts or (summary,)
     topics = [
@@ -130,15 +122,7 @@ def merge_summaries(
 
 
 def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
-    """
-    Write ``metadata.yaml`` atomically: at every instant the whole old or new file is there.
-
-    Raises
-    ------
-    OSError
-        As the system raises it; an old file is unchanged.
-
-    """
+    """Write ``metadata.yaml`` atomically; an `OSError` leaves an old file unchanged."""
     target = summary.folder / METADATA_FILE
     temporary = target.with_suffix('.yaml.tmp')
     try:
@@ -250,19 +234,7 @@ class RecordingStats(NamedTuple):
 def custom_data(
     custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
 ) -> dict[str, str]:
-    """
-    Return the ``custom_data`` of a bag's metadata.
-
-    Parameters
-    ----------
-    custom
-        Further entries.
-    summary
-        Summary of the bag.
-    account
-        The statistics; None while they are unknown.
-
-    """
+    """Return a bag's ``custom_data``: ``custom``, and the statistics once they are known."""
     entries = dict(custom)
     if any(summary.discarded):
         entries[DISCARDED] = _by_topic(summary.discarded, summary)

@@ -68,11 +68,7 @@ def unpacked_file(file: Path) -> Path:
     """
     Return a file, or the unpacked one if it is packed with zstd.
 
-    Raises
-    ------
-    BagError
-        It is damaged from its start, or would be too large, or there is no room for it.
-
+    Raise `BagError` if it is damaged from its start or too large, or if there is no space for it.
     """
     try:
         if not file.is_file():

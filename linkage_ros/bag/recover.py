@@ -111,24 +111,10 @@ MOST_CHANNELS = 10_000
 
 class RecoveredBag:
     """
-    A new bag that is open for writing.
+    A new bag in an empty folder that is open for writing, with compression '', 'lz4' or 'zstd'.
 
-    Parameters
-    ----------
-    folder
-        Its folder, which exists and is empty.
-    profile
-        The profile of its file: 'ros2'.
-    compression
-        Compression of chunks: '', 'lz4' or 'zstd'.
-
-    Raises
-    ------
-    OSError
-        As the system raises it, here and in all methods that write.
-    BagError
-        From `add_item` and `add_channels`: more than `MOST_CHANNELS` channels.
-
+    Methods that write raise `OSError`; `add_item` and `add_channels` raise `BagError` for more
+    than `MOST_CHANNELS` channels.
     """
 
     def __init__(self, folder: Path, profile: str, compression: str) -> None:
@@ -278,27 +264,12 @@ def recover_bag(
     stopped: Stopped = lambda: False,
 ) -> Recovery | None:
     """
-    Save the whole parts of a bag to a new bag.
+    Save the whole parts of a bag to a new bag, by default at `recovered_name`.
 
-    Parameters
-    ----------
-    path
-        The bag's folder, or an MCAP file.
-    target
-        The new folder; by default `recovered_name`.
-    progress
-        Progress callback; receives the number of bytes examined and the total.
-    stopped
-        Returns whether to stop; then nothing is left behind, and the result is None.
-
-    Raises
-    ------
-    BagError
-        It is no bag, leads out of its folder, has too many channels, or no part of it is whole.
-        Nothing was written.
-    RecordingError
-        The new folder exists or cannot be written to. Nothing is left behind.
-
+    ``progress`` receives the number of bytes examined and the total; if ``stopped`` returns True,
+    the result is None and nothing is left behind. Raise `BagError` if it is not a bag, leads out
+    of its folder, has too many channels or has no whole part, and `RecordingError` if the new
+    folder exists or cannot be written to.
     """
     target = target or recovered_name(path)
     findings = _Findings()

@@ -124,15 +124,7 @@ class RunFiles(Protocol):
 
 
 def read_run_metadata(bag: RunFiles) -> RunMetadata:
-    """
-    Return the run's account in its bag.
-
-    Raises
-    ------
-    BagError
-        There is none, or it is damaged.
-
-    """
+    """Return the run's account in its bag; raise `BagError` if it is missing or damaged."""
     if RUN_FILE not in bag.attachments:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
@@ -208,17 +200,8 @@ def recorded_events(
     """
     Combine the messages of a bag into the events of the run, in order.
 
-    Parameters
-    ----------
-    run
-        The run's account of itself.
-    is_own
-        Recognises the run's own joint states where they share a topic with crank samples.
-    messages
-        Messages of the bag.
-    crank_topic
-        Topic of the crank samples; by default that of the run.
-
+    ``is_own`` recognises the run's own joint states where they share a topic with crank samples;
+    the samples are on ``crank_topic``, by default the run's own.
     """
     crank = run.crank_topic if crank_topic is None else crank_topic
     shared = run.crank_topic == run.joint_states_topic
@@ -271,17 +254,7 @@ _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 
 def missing_start_reason(bag: Bag, run: RunMetadata) -> str:
-    """
-    Return text on why the first messages of a run are not in its bag; '' if they are.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    run
-        The run's account in it.
-
-    """
+    """Return why the first messages of a run are not in its bag; '' if they are."""
     discarded = sum(counts_in(bag.custom, 'let_go').values())
     if discarded:
         return f'its first {discarded} messages have made way for newer ones'

@@ -142,15 +142,7 @@ class LostRange(NamedTuple):
 
 
 class Salvage:
-    """
-    Finds the whole records of a file, once.
-
-    Parameters
-    ----------
-    source
-        The file, with its size at the time of opening.
-
-    """
+    """Finds the whole records of a file, up to its size at the time of opening, once."""
 
     def __init__(self, source: RecordSource) -> None:
         self.examined_to = 0  # Position up to which it has been examined
