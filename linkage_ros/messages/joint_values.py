@@ -80,16 +80,10 @@ class MessageContent(NamedTuple):
 
 class MessageValues:
     """
-    Reads the numbers in the messages of one topic.
+    Reads the numbers in the messages of one topic, whose type is one of `TYPES`.
 
-    Parameters
-    ----------
-    message_type
-        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no numbers.
-    dependent
-        Names of joints that cannot be commanded. A JointState may name them without a number, as
-        in `JointEffortReader`.
-
+    Messages of other types have no numbers. A JointState may name the ``dependent`` joints, which
+    cannot be commanded, without a number, as in `JointEffortReader`.
     """
 
     __slots__ = ('_known', '_parse')
@@ -207,12 +201,6 @@ class JointTrajectoryWriter(ArrayWriter):
     Writes a JointTrajectory of a single point, the state of the joints at one instant.
 
     Positions are in [rad] or [m], rates and accelerations per [s] and [s²].
-
-    Parameters
-    ----------
-    names
-        The joints, in the order of the message.
-
     """
 
     __slots__ = ()
@@ -248,15 +236,9 @@ class PlanarWrenchWriter:
 
     def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
         """
-        Return a message.
+        Return a message with a wrench for each joint: force in x, y [N], torque about z [N·m].
 
-        Parameters
-        ----------
-        stamp
-            Time of the state, in [ns].
-        wrenches
-            One for each joint: force in x and y, in [N], and torque about z, in [N·m].
-
+        ``stamp`` is the time of the state, in [ns].
         """
         seconds, nanoseconds = divmod(stamp, NANOSECONDS)
         numbers: tuple[float, ...] = ()
