@@ -76,15 +76,7 @@ class Deviation:
 
 
 class TopicComparison:
-    """
-    Comparison of the recorded messages of a topic with the reproduced ones.
-
-    Parameters
-    ----------
-    name, message_type
-        Name and message type of the topic.
-
-    """
+    """Comparison of the recorded messages of a topic with the reproduced ones."""
 
     def __init__(self, name: str, message_type: str) -> None:
         self.name = name
@@ -122,18 +114,10 @@ class TopicComparison:
         self, recorded: bytes, now: bytes, at: TickPlace, turning: Mapping[str, bool]
     ) -> FirstDifference | None:
         """
-        Add two different messages; return their first difference.
+        Add two different messages of a tick; return their first difference.
 
-        Parameters
-        ----------
-        recorded, now
-            The two messages.
-        at
-            The tick.
-        turning
-            Joints whose positions may differ by whole turns. If the messages differ by nothing
-            else, the result is None.
-
+        Positions of the joints in ``turning`` may differ by whole turns: if the messages differ by
+        nothing else, the result is None.
         """
         then, again = self._then.read(recorded), self._now.read(now)
         if isinstance(then, str) or isinstance(again, str):
@@ -165,17 +149,7 @@ class TopicComparison:
 
 
 class Comparison:
-    """
-    Comparison of a recorded run with a second one.
-
-    Parameters
-    ----------
-    topics
-        Names and types of the compared topics.
-    turning
-        As for `TopicComparison.add_different`.
-
-    """
+    """Comparison of a recorded run with a second one, by topic."""
 
     def __init__(
         self, topics: Sequence[tuple[str, str]], turning: Mapping[str, bool] | None = None

@@ -101,15 +101,9 @@ def check_drives(scene: Scene, where: str) -> None:
 
 class Counterfactual:
     """
-    A scene that runs on the samples of a bag.
+    A scene, with all drives on one topic, that runs on the samples of a bag.
 
-    Parameters
-    ----------
-    scene
-        The scene; all its drives take messages of one topic.
-    recorded
-        The recorded scene; None if unknown.
-
+    ``recorded`` is the recorded scene; None if unknown.
     """
 
     def __init__(self, scene: Scene, recorded: Scene | None) -> None:
@@ -328,28 +322,12 @@ def find_crank_topic(
     typed: str | None,
 ) -> str:
     """
-    Return the topic whose samples drive all linkages of a scene.
+    Return the topic whose samples drive all linkages of a scene, or raise `BagError`.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-    messages
-        Its messages, read only as far as needed.
-    scene
-        The scene.
-    run, recorded
-        The run's account in the bag, and its scene; blank and None if the bag has none.
-    typed
-        The topic that the user asked for. If None, the topic of the run, that of `_TOPICS`, or
-        the only topic with such samples, whichever of these the bag has first. Commands are not
-        looked for on other topics: the efforts of joint states are none.
-
-    Raises
-    ------
-    BagError
-        There is no such topic, or more than one.
-
+    It is ``typed`` by the user. Otherwise it is the topic of the run, the topic in `_TOPICS`, or
+    the only topic with such samples, whichever the bag has first; commands are on no other topic,
+    since the efforts of joint states are not commands. ``messages`` are read only as far as
+    needed.
     """
     drive = scene.linkages[0].drive[0]
     readers = {

@@ -139,15 +139,7 @@ def announced_text(files: Mapping[str, bytes]) -> str:
 
 
 def read_announced(message: bytes, topic: str) -> AnnouncedScene:
-    """
-    Read the message of a node that holds the files of its scene.
-
-    Raises
-    ------
-    ValueError
-        The message has another content.
-
-    """
+    """Read a node's message with the files of its scene; raise `ValueError` for other content."""
     if len(message) > _LONGEST_ANNOUNCED:
         raise ValueError('too long')
     try:
@@ -222,15 +214,7 @@ def change_text(change: FaultChange, kind: str) -> str:
 
 
 def read_change(message: bytes) -> tuple[str, bool]:
-    """
-    Return the fault that a message of the faults' topic names, and whether it begins.
-
-    Raises
-    ------
-    ValueError
-        The message has another content.
-
-    """
+    """Return the fault that a message names and whether it begins, or raise `ValueError`."""
     try:
         content = json.loads(text_of(message))
     except RecursionError:

@@ -134,11 +134,7 @@ def runs_of(sweeps: Sequence[ParameterSweep], seeds: int, seed: int) -> list[Set
     """
     Return the settings of each run: every combination of the values, with every seed.
 
-    Raises
-    ------
-    LinkageError
-        There are too many, or a key is swept twice.
-
+    Raise `LinkageError` if there are too many, or if a key is swept twice.
     """
     keys = [sweep.key for sweep in sweeps]
     for key in keys:

@@ -75,18 +75,7 @@ def verify_replay(
     """
     Run a bag's scene once more and compare; memory does not grow with the bag.
 
-    Parameters
-    ----------
-    bag, scene, messages
-        As for `replay_all`.
-    observe
-        Callback that receives every tick.
-
-    Raises
-    ------
-    LinkageError
-        The scene cannot be run.
-
+    ``observe`` receives every tick. Raise `LinkageError` if the scene cannot be run.
     """
     run = read_run_metadata(bag)
     types = [extra.message for extra in Pipeline(scene).extras]
@@ -207,20 +196,8 @@ def examine_states(
     """
     Run a scene again on its bag and examine every state; memory does not grow with them.
 
-    Parameters
-    ----------
-    bag, scene
-        As for `replay_ticks`.
-    progress
-        Progress callback; receives the number of examined ticks, now and then.
-    stopped
-        Returns whether to stop.
-
-    Raises
-    ------
-    LinkageError
-        The scene cannot be run.
-
+    ``progress`` receives the number of examined ticks, now and then; ``stopped`` returns whether
+    to stop. Raise `LinkageError` if the scene cannot be run.
     """
     # The replay builds equal closures itself: they follow from the scene alone.
     watched = [_Watch(line.scene_linkage, line.closure) for line in Pipeline(scene).linkages]
