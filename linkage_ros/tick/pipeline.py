@@ -140,22 +140,8 @@ class LinkagePipeline:
     """
     The pipeline of one linkage. To reset it, build it again.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    scene_linkage
-        Its linkage, drive and effects.
-    closure
-        The closure of the linkage, if there is one already. It has no state, so resets reuse it.
-    injection
-        The faults of the scene, if any.
-
-    Raises
-    ------
-    FileError
-        Parts of the scene do not fit together, or the linkage does not close.
-
+    A given closure is reused: it has no state. Raise `FileError` if parts of the scene do not fit
+    together, or if the linkage does not close.
     """
 
     def __init__(

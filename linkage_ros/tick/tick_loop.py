@@ -187,28 +187,14 @@ def _take_nothing() -> None:
 
 class TickLoop:
     """
-    Runs a pipeline tick by tick.
+    Runs a pipeline tick by tick; a reset builds it again.
 
-    Parameters
-    ----------
-    build
-        Builds the pipeline; a reset calls it again.
-    take_sample
-        Takes the next message for the drives, as bytes and message info; returns None if there is
-        no message. None if the drives have no topic.
-    publish
-        Publishes a serialized JointState.
-    is_own
-        Recognises the node's own messages where they come back on the crank's topic.
-    publish_extras
-        Publish the serialized messages of the auxiliary topics, one function each.
-    publish_change
-        Publishes the begin or end of a fault, and returns the serialized message.
-    depth
-        Most messages that one tick takes: the depth of the queue in front of it.
-    take_wrenches
-        Take the next message of each topic with a wrench, as ``take_sample`` does.
-
+    ``take_sample`` takes the next message for the drives, as bytes and message info; it returns
+    None if there is no message, and is None if the drives have no topic. ``take_wrenches`` do the
+    same for each topic with a wrench. A tick takes ``depth`` messages at most, the depth of the
+    queue. ``is_own`` recognises the node's own messages on the crank's topic. ``publish_extras``
+    has a function for each auxiliary topic; ``publish_change`` publishes the begin or end of a
+    fault, and returns the message.
     """
 
     def __init__(
@@ -406,15 +392,10 @@ class TickLoop:
 
     def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """
-        Take the waiting messages, and tick.
+        Take the waiting messages, and tick at the time ``now``, in [ns].
 
-        Parameters
-        ----------
-        now
-            The time of the tick, in [ns].
-        clock
-            Returns the time when a message is taken, in [ns]; None for the time of the tick.
-
+        ``clock`` returns the time when a message is taken, in [ns]; by default it is the time of
+        the tick.
         """
         if self.injection is not None:
             now = self._advance_faults(self.injection, now)
