@@ -44,13 +44,7 @@ class BagSamples:
     """
     Good samples, in the order of their log times and stamps.
 
-    Parameters
-    ----------
-    use
-        How samples are used, which decides whether they need rates.
-    context
-        Context of the drive.
-
+    ``use`` decides whether they need rates.
     """
 
     __slots__ = (
@@ -127,23 +121,10 @@ class BagSamples:
 
 def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> BagSamples:
     """
-    Return the samples of a bag's crank topic.
+    Return the samples of a topic of a bag, or raise `BagError`.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-    topic
-        The topic; '' for the topic that the run's account in the bag names or, without an account,
-        for the only topic with good samples.
-    use, context
-        As for `BagSamples`.
-
-    Raises
-    ------
-    BagError
-        No topic, or more than one, has good samples; or the bag is damaged.
-
+    If the topic is '', it is the crank topic of the run or, without a run's account in the bag,
+    the only topic with good samples.
     """
     of_type = [each.name for each in bag.topics if each.type == _TYPE]
     if topic and topic not in of_type:
@@ -230,13 +211,8 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     """
     Read the bag and build the drive.
 
-    Raises
-    ------
-    BagError
-        The bag cannot be read, or no topic, or more than one, has the input joints.
-    DefinitionError
-        It should repeat, but its samples take no time.
-
+    Raise `BagError` if the bag cannot be read, or if no topic, or more than one, has the input
+    joints; raise `DefinitionError` if the samples should repeat, but take no time.
     """
     recorded = parameters.pace == 'recorded'
     use = TopicParameters(
@@ -255,22 +231,8 @@ class RecordedPace(Drive):
     """
     Recorded samples at their times: each as long after the first tick as after the first sample.
 
-    A `TopicDrive` makes the crank state between and after them.
-
-    Parameters
-    ----------
-    samples
-        The samples.
-    use
-        How samples are used.
-    repeat
-        Whether they start again at the end.
-
-    Raises
-    ------
-    DefinitionError
-        They should start again, but take no time.
-
+    A `TopicDrive` makes the crank state between and after them. If they ``repeat``, but take no
+    time, `DefinitionError` is raised.
     """
 
     __slots__ = ('_newest', '_period', '_start', '_topic', 'max_age', 'samples')
@@ -314,17 +276,7 @@ class RecordedPace(Drive):
 
 
 class FastPace(Drive):
-    """
-    Recorded samples one by one: each tick takes the next one as measured, whatever the time.
-
-    Parameters
-    ----------
-    samples
-        The samples.
-    repeat
-        Whether they start again after the last.
-
-    """
+    """Recorded samples one by one: each tick takes the next one as measured, whatever the time."""
 
     __slots__ = ('_next', '_repeat', 'samples')
 

@@ -94,11 +94,7 @@ def motion_curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
     """
     Return value, rate and acceleration as a function of time, in [ns].
 
-    Raises
-    ------
-    DefinitionError
-        The table has less than two rows, or times that do not increase.
-
+    Raise `DefinitionError` if the table has less than two rows, or times that do not increase.
     """
     times = _table_times(parameters.table, f'{where}.table')
     values = [value for _, value in parameters.table]

@@ -87,15 +87,7 @@ PARAMETERS = BiasParameters
 
 
 def sensor(parameters: BiasParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raises
-    ------
-    DefinitionError
-        There is no error, or a slide has a disc.
-
-    """
+    """Build the sensor; raise `DefinitionError` if there is no error, or if a slide has a disc."""
     if parameters == BiasParameters():
         raise DefinitionError(
             'effects.bias', 'names no joint', 'write joints: {JOINT: 0.01}, or leave it out'

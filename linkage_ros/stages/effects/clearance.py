@@ -60,15 +60,7 @@ PARAMETERS = ClearanceParameters
 
 
 def stage(parameters: ClearanceParameters, context: Context) -> Stage:
-    """
-    Build the stage.
-
-    Raises
-    ------
-    DefinitionError
-        A slider is named.
-
-    """
+    """Build the stage; raise `DefinitionError` if a slider is named."""
     joints = context.closure.structure.joints
     pins = {joint.name for joint in joints if joint.kind == 'R'}
     for name in parameters.pins:

@@ -66,15 +66,7 @@ class _Bar(NamedTuple):
 
 
 def stage(parameters: ComplianceParameters, context: Context) -> Stage:
-    """
-    Build the stage.
-
-    Raises
-    ------
-    DefinitionError
-        A link has not exactly two pins.
-
-    """
+    """Build the stage; raise `DefinitionError` if a link has not exactly two pins."""
     bars = tuple(_make_bar(context, link, k) for link, k in parameters.links.items())
     rigid = (0j,) * len(context.closure.structure.joints)
     shift_of = context.reactions.joint_deflections

@@ -120,12 +120,8 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
-    Raises
-    ------
-    DefinitionError
-        Readings of random latency are to be interpolated, or to overtake without a spread; or
-        joints that were measured at several times are to have one stamp.
-
+    Raise `DefinitionError` if readings of random latency are to be interpolated, or to overtake
+    without a spread, or if joints that were measured at several times are to have one stamp.
     """
     if parameters.joints is not None:
         from linkage_ros.stages.effects.own_sensors import (
@@ -160,20 +156,8 @@ class Delay:
     """
     A delay line.
 
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    mixes
-        Whether readings are interpolated between ticks; else the line carries one per tick.
-    with_rates
-        Whether the interpolation uses the rates too.
-
-    Attributes
-    ----------
-    gap_begins
-        Whether the last reported gap began there.
-
+    If it ``mixes``, it interpolates readings between ticks, with their rates if ``with_rates``;
+    otherwise it carries one reading per tick.
     """
 
     __slots__ = (
@@ -242,17 +226,7 @@ _LONGEST = 20.0
 
 
 class RandomDelay:
-    """
-    A line of messages with random latencies.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        The generator.
-
-    """
+    """A line of messages with random latencies."""
 
     __slots__ = ('_count', '_delay', '_draw', '_duplicates', '_latest', '_measured', '_random',
                  '_reorder', '_way', 'gap_begins')  # fmt: skip

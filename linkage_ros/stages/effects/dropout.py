@@ -76,15 +76,7 @@ PARAMETERS = DropoutParameters
 
 
 def sensor(parameters: DropoutParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raises
-    ------
-    DefinitionError
-        Bursts this short cannot lose so many samples.
-
-    """
+    """Build the sensor; raise `DefinitionError` if the bursts are too short for the losses."""
     if parameters.joints is None:
         return Dropout(parameters, context.random('dropout'))
     from linkage_ros.stages.effects.own_sensors import own_sensors  # local import: only for joints
@@ -130,17 +122,7 @@ def _least_burst(loss: float) -> str:
 
 
 class Dropout:
-    """
-    Sensor stage that loses samples.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        Random generator of the losses.
-
-    """
+    """Sensor stage that loses samples."""
 
     __slots__ = ('_begins', '_chance', '_goes_on', '_last', '_random', '_repeat')
 

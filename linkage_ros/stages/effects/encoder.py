@@ -100,11 +100,8 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
-    Raises
-    ------
-    DefinitionError
-        An absolute encoder has ``index: false``, or a low-pass has no differences to smooth.
-
+    Raise `DefinitionError` if an absolute encoder has ``index: false``, or if a low-pass has no
+    differences to smooth.
     """
     if parameters.cutoff and parameters.rates == 'exact':
         raise DefinitionError(
@@ -137,17 +134,9 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
 
 class Counter:
     """
-    The counts of one joint.
+    The counts of one joint; ``turns`` is True if the joint is an angle.
 
-    Parameters
-    ----------
-    encoder
-        Parameters of the encoder.
-    turns
-        Whether the joint is an angle.
-    cutoff
-        Of the low-pass of its rate, in [Hz]; 0 for none.
-
+    ``cutoff`` is the frequency of the low-pass of the rate, in [Hz]; 0 for none.
     """
 
     __slots__ = (
@@ -206,21 +195,9 @@ class Counter:
 
 class Encoder:
     """
-    The encoders of a linkage.
+    The encoders of a linkage: index and counter of each joint with an encoder.
 
-    Parameters
-    ----------
-    counters
-        Index and counter of each joint with an encoder.
-    differenced
-        Whether the rates are computed from the counts.
-
-    Attributes
-    ----------
-    read_at_ticks
-        Whether the driver reads the counts at every tick; else only when `difference_rates` is
-        called.
-
+    If ``differenced``, the rates are computed from the counts.
     """
 
     __slots__ = ('_counters', '_differenced', '_last', 'read_at_ticks')
@@ -229,7 +206,7 @@ class Encoder:
         self._counters = counters
         self._differenced = differenced
         self._last = 0
-        self.read_at_ticks = True
+        self.read_at_ticks = True  # If False, only `difference_rates` reads the counts
 
     def select_joints(self, places: Sequence[int]) -> Encoder:
         """Return a driver that reads the counts of these joints alone, at its own times."""

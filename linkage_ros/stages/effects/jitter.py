@@ -57,22 +57,9 @@ def sensor(parameters: JitterParameters, context: Context) -> Jitter:
 
 class Jitter:
     """
-    Sensor stage with varying instants of measurement.
+    Sensor stage with varying instants of measurement; ``random`` draws δ.
 
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        Random generator of δ.
-    with_rates
-        Whether the interpolation uses the rates too.
-
-    Attributes
-    ----------
-    gap_begins
-        Whether the last reported gap began there.
-
+    With ``with_rates`` the interpolation uses the rates too.
     """
 
     __slots__ = ('_earlier', '_history', 'gap_begins')

@@ -86,15 +86,7 @@ def sensor(parameters: RateLimitParameters, context: Context) -> Sensor:
 
 
 class RateLimit:
-    """
-    Sample and hold.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-
-    """
+    """Sample and hold."""
 
     __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_phase', '_repeat', '_unit')
 
