@@ -132,7 +132,7 @@ def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
             while rest:
                 count = file.write(rest)
                 if not count:
-                    raise OSError(errno.EIO, 'the disk takes nothing')
+                    raise OSError(errno.EIO, 'the disk accepts no data')
                 rest = rest[count:]
             os.fsync(file.fileno())
         temporary.replace(target)
@@ -171,7 +171,7 @@ def _describe_topic(topic: Topic) -> str:
 
 
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
-    # The keys of a file are in another order than those of the bag, as rosbag2 writes them.
+    # rosbag2 writes the keys of a file in another order than the keys of the bag.
     return _path_text(file) + _indent(
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
         f'duration:\n  nanoseconds: {duration}\n'
@@ -217,7 +217,7 @@ UNFINISHED = f'{_PREFIX}unfinished'
 """Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
 
 UNFINISHED_DATA: Mapping[str, str] = {
-    UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'
+    UNFINISHED: 'being recorded, or killed; the counts are from the last flush'
 }
 
 

@@ -126,7 +126,7 @@ class LogTimeOrder:
             raise BagError(
                 self._path,
                 f'more than {MOST_HELD:,} bytes of its messages are not in the order of time',
-                'write it anew in that order',
+                'write it again in this order',
             )
         return held
 
@@ -147,7 +147,7 @@ class LogTimeOrder:
             raise BagError(
                 file,
                 f'is damaged: the chunk at byte {place:,} {error}',
-                'linkage recover saves what is whole',
+                'linkage recover saves the whole parts',
             ) from None
 
 

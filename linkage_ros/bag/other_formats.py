@@ -44,8 +44,8 @@ _ROS_1 = (
     'ros2 bag convert does not read ROS 1)'
 )
 _OTHERS = {
-    b'SQLite format 3\0': ('is a bag in SQLite (.db3), and no MCAP file', _SQLITE),
-    b'#ROSBAG': ('is a bag of ROS 1, and no MCAP file', _ROS_1),
+    b'SQLite format 3\0': ('is a bag in SQLite (.db3), not an MCAP file', _SQLITE),
+    b'#ROSBAG': ('is a bag of ROS 1, not an MCAP file', _ROS_1),
 }
 
 LONGEST_MAGIC = max(map(len, _OTHERS))
@@ -88,7 +88,7 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
         zstandard: Any = import_module('zstandard')
     except ImportError:
         raise BagError(
-            file, 'is packed with zstd, and Python knows no zstandard', 'install zstandard'
+            file, 'is packed with zstd, and the Python package is missing', 'install zstandard'
         ) from None
     most = max(MOST_UNPACKED, MOST_TIMES * size)
     name = file.name.removesuffix('.zstd')
@@ -101,8 +101,8 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
                 if most < 0:
                     raise BagError(
                         file,
-                        f'would be more than {content.tell():,} bytes unpacked: no recording '
-                        'packs so well',
+                        f'would unpack to more than {content.tell():,} bytes: no recording '
+                        'packs as densely',
                         'ask who made it',
                     )
                 content.write(piece)
@@ -112,7 +112,7 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
         raise BagError(
             file,
             f'cannot be unpacked: {error.strerror or error}',
-            'name a folder with room in TMPDIR',
+            'name a folder with free space in TMPDIR',
         ) from None
     return target
 

@@ -61,7 +61,7 @@ def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
 
 
 def information_of(folder: Path) -> dict[str, Any]:
-    """Return the content of ``metadata.yaml``; empty if it is missing, which is no error."""
+    """Return the content of ``metadata.yaml``; empty if it is missing."""
     file = folder / METADATA_FILE
     try:
         text = read_regular(file, MOST_METADATA)
@@ -156,7 +156,7 @@ def is_finished(file: Path) -> bool:
     try:
         if file.exists() and not file.is_file():
             # Opening a pipe would wait for a writer.
-            raise BagError(file, 'is no file', "name a bag's folder, or its file")
+            raise BagError(file, 'is not a file', "name a bag's folder, or its file")
         with file.open('rb') as stream:
             start = stream.read(_RECOGNISED)
             size = stream.seek(0, SEEK_END)
@@ -174,7 +174,7 @@ def is_finished(file: Path) -> bool:
         binary = kind.noun == BINARY.noun
         found = f'starts with {quote(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
-            file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
+            file, f'{found}, not an MCAP file', "name a bag's folder, or its .mcap file"
         )
     return size > length and end == MCAP0_MAGIC
 
@@ -244,7 +244,7 @@ def footer_metadata(file: Path) -> FooterMetadata:
 RUN_FILE = 'run.json'
 """Name of the attachment with the run's scene, topics and versions."""
 
-_RECOVER = 'linkage recover makes a whole bag of what is there'
+_RECOVER = 'linkage recover makes a complete bag from it'
 
 MOST_ATTACHED = 64 * 2**20
 """Most bytes of a file's attachments in memory."""
@@ -457,10 +457,10 @@ def _read_contents(
             return
         data.has_checksum()
         if at != index.start:
-            raise DamagedError('its index begins elsewhere than it says')
+            raise DamagedError('its index does not begin at the stated position')
         promised = index.statistics
         if promised and promised.message_count != messages:
-            raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
+            raise DamagedError(f'{messages:,} of {promised.message_count:,} messages are there')
 
 
 @contextmanager
@@ -471,7 +471,7 @@ def _translate_errors(file: Path) -> Iterator[None]:
         raise unreadable_error(file, error) from None
     except DamagedError as error:
         raise BagError(
-            file, f'is damaged: {error}', 'linkage recover saves what is whole'
+            file, f'is damaged: {error}', 'linkage recover saves the whole parts'
         ) from None
 
 
@@ -496,5 +496,5 @@ def _parse_qos(text: str) -> QosProfile:
             raise ValueError
         return QosProfile.from_mapping(bounded_yaml(first, _MOST_QOS)[0])
     except Exception:  # noqa: BLE001 (yaml and its numbers raise many kinds)
-        # An invalid QoS is no reason to refuse the messages.
+        # The messages are read even if their QoS is invalid.
         return QosProfile(understood=not text)

@@ -189,7 +189,7 @@ class Recorder:
     def read_counts(self) -> tuple[TopicCounts, ...]:
         """Return the current counts; after a failure, ``recorded`` counts the messages kept."""
         counts = []
-        # Read first, so that no message is let go before it is recorded.
+        # Read first, so that no message is discarded before it is recorded.
         discarded = self._writer.discarded
         opened = self._writer.opening_counts
         taken, lost = self._taken_and_lost

@@ -209,7 +209,7 @@ class RecoveredBag:
             if len(self._channels) == MOST_CHANNELS:
                 raise BagError(
                     self._folder,
-                    f'would hold more than {MOST_CHANNELS:,} channels; no more are recovered',
+                    f'would contain more than {MOST_CHANNELS:,} channels; no more are recovered',
                     'no ROS graph has as many: ask who made the bag',
                 )
             number = 0
@@ -333,7 +333,7 @@ def _find_files(path: Path, information: Mapping[str, Any], findings: _Findings)
                     refuse_other_format(file, stream.read(LONGEST_MAGIC))
                 present.append(file)
                 continue
-            reason = 'is no file' if file.exists() else 'does not exist'
+            reason = 'is not a file' if file.exists() else 'does not exist'
         except OSError as error:
             reason = unreadable_error(file, error).reason
         if len(files) == 1:
@@ -381,7 +381,7 @@ def _why_nothing(file: Path, salvage: Salvage) -> str:
     if not start:
         return f'{file.name} is empty'
     if BEGINNING in salvage.repaired:
-        return f'{file.name} starts with {quote(start)}, as no MCAP file does'
+        return f'{file.name} starts with {quote(start)}, unlike an MCAP file'
     if salvage.losses:
         loss = salvage.losses[0]
         return f'{file.name} at byte {loss.start:,}: {loss.reason}'
@@ -405,8 +405,7 @@ def _copy_file(file: Path, bag: RecoveredBag, findings: _Findings) -> Iterator[i
     findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
     if salvage.data.unchecked:
         findings.remarks.append(
-            f'{file.name}: {salvage.data.unchecked:,} messages that no checksum covers, taken as '
-            'they stand'
+            f'{file.name}: {salvage.data.unchecked:,} messages without a checksum, kept unchecked'
         )
     statistics = salvage.index.statistics if salvage.index else None
     if statistics is None:
@@ -456,7 +455,7 @@ def _known_expected_count(
 @contextmanager
 def _new_folder(target: Path) -> Iterator[None]:
     """Create a folder; remove it again if the body fails."""
-    remedy = 'name a folder on a disk with room, with -o'
+    remedy = 'name a folder on a disk with free space, with -o'
     try:
         target.mkdir(parents=True)
     except FileExistsError:

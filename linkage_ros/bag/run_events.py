@@ -55,7 +55,7 @@ class WrenchEvent(NamedTuple):
     log_time: int
     publish_time: int
     data: bytes  # The message
-    number: int  # Index of its topic among those of the run
+    number: int  # Index of its topic among the run's topics
 
 
 class FaultEvent(NamedTuple):
@@ -91,7 +91,7 @@ Event = SampleEvent | WrenchEvent | FaultEvent | ResetEvent | TickEvent
 class RunMetadata(NamedTuple):
     """The run's account in its bag; '' for missing topics."""
 
-    # Name of the scene, and the folder for its paths, relative to that of the bag; '' without any.
+    # Name of the scene, and the folder for its paths, relative to the bag's folder; '' if unknown.
     scene: str = ''
     scene_folder: str = ''
     # Names of the topics.
@@ -175,7 +175,7 @@ _TEXTS = (
 
 
 def _are_names(values: Any) -> bool:
-    # A string that is not printable is no topic, and some cannot be stored in a bag.
+    # A string that is not printable is not a topic, and some cannot be stored in a bag.
     return isinstance(values, list) and all(
         isinstance(value, str) and value.isprintable() for value in values
     )
@@ -257,7 +257,7 @@ def missing_start_reason(bag: Bag, run: RunMetadata) -> str:
     """Return why the first messages of a run are not in its bag; '' if they are."""
     discarded = sum(counts_in(bag.custom, 'let_go').values())
     if discarded:
-        return f'its first {discarded} messages have made way for newer ones'
+        return f'its first {discarded} messages were removed for newer ones'
     if run.begun == MID_RUN:
         return 'begun in mid-run'
     first = bag.files[0].name

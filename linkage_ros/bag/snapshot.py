@@ -11,7 +11,7 @@ Memory of the last seconds of a run, until a snapshot of it is written to a bag.
 
 `LastSeconds` packs the messages into blocks of bytes. They take half the memory of Python objects,
 the garbage collector has nothing to visit, and a snapshot only copies the list of blocks.
-`SnapshotMemory` fills it on its own thread; its `offer` is that of a recorder. `SnapshotWriting`
+`SnapshotMemory` fills it on its own thread; its `offer` works as a recorder's. `SnapshotWriting`
 writes a snapshot to a bag, on another thread.
 """
 

@@ -313,7 +313,7 @@ def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
 def test_what_is_no_bag_says_so(tmp_path):
     file = tmp_path / 'crank.csv'
     file.write_text('time, angle\n')
-    for path, said in ((file, 'and no MCAP file'), (tmp_path / 'none', 'does not exist')):
+    for path, said in ((file, 'not an MCAP file'), (tmp_path / 'none', 'does not exist')):
         with pytest.raises(BagError, match=said):
             build(BagParameters(str(path)), one_input())
 
