@@ -271,7 +271,9 @@ def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, ri
     if fits:
         Pipeline(scene)
         return
-    with pytest.raises(FileError, match=r'effects\.delay\.stamp: measured is a stamp of its own'):
+    with pytest.raises(
+        FileError, match=r'effects\.delay\.stamp: measured gives a linkage its own stamp'
+    ):
         Pipeline(scene)
 
 

@@ -52,7 +52,7 @@ class Deviation:
     def __init__(self) -> None:
         self.compared = self.differing = 0
         self.greatest, self.at = 0.0, TickPlace(0, 0)
-        """The greatest difference, without its sign; infinite where one is no number."""
+        """The greatest difference, without its sign; infinite where one is not a number."""
         self.ulps, self.ulps_at = 0, TickPlace(0, 0)
         self._squares = 0.0
 
@@ -246,4 +246,4 @@ def _difference_text(then: MessageContent, again: MessageContent) -> str:
         return f'{had} then, {has} now'
     if then.stamp != again.stamp:
         return f'stamp: {then.stamp} ns then, {again.stamp} ns now'
-    return 'bytes that are no number of a joint'
+    return 'bytes outside of the numbers of joints'

@@ -9,7 +9,7 @@
 """
 Run another scene on the crank samples of a bag, or on the commands that it holds.
 
-If both scenes have the same rate, the ticks are those of the bag. Where the bag has none, because
+If both scenes have the same rate, the ticks come from the bag. Where the bag has none, because
 the linkage was open or had no crank state, ticks are one period apart. At another rate ticks are
 one period apart from the first one on, and each moves to a tick of the bag that is within half a
 period, so that both can be compared. A scene with a rate of 0 ticks for every good sample.
@@ -87,14 +87,13 @@ def check_drives(scene: Scene, where: str) -> None:
             raise LinkageError(
                 where,
                 f'{f"{scene_linkage.name}: " if scene_linkage.name else ""}its drive is '
-                f'{drive}{beside}, which '
-                "takes no samples of a bag's",
+                f'{drive}{beside}, which takes no samples from a bag',
                 f'write drive: {{{drives[0] if beside else "topic"}: {{}}}}',
             )
         if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
             raise LinkageError(
                 where,
-                'its loads.wrenches come on topics, of which another scene takes no messages',
+                'its loads.wrenches have topics, and another scene takes no messages from these',
                 'leave them out',
             )
 

@@ -187,7 +187,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             if event.time >= TIME_END:
                 raise BagError(
                     bag.path,
-                    f'holds what was made at {event.time} ns, beyond the times of messages',
+                    f'has a tick at {event.time} ns, beyond the range of message times',
                     'name another bag',
                 )
             joint_states, *extras = event.messages
@@ -223,7 +223,7 @@ def read_change(message: bytes) -> tuple[str, bool]:
         (content.get('fault'), content.get('injected')) if isinstance(content, dict) else (0, 0)
     )
     if not isinstance(name, str) or not isinstance(on, bool):
-        raise ValueError('not a change')
+        raise ValueError('not the begin or end of a fault')
     return name, on
 
 
@@ -233,7 +233,9 @@ def turn_fault(bag: Bag, injection: Injection, message: bytes) -> None:
         injection.switch_fault(*read_change(message))
     except (ValueError, KeyError):
         raise BagError(
-            bag.path, 'a message on its faults topic names no fault of its scene', 'name another'
+            bag.path,
+            'a message on its faults topic names no fault of its scene',
+            'name another bag',
         ) from None
 
 

@@ -177,7 +177,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
 
 
 def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
-    """Tick a pipeline, and keep of it what a study needs."""
+    """Tick a pipeline, and keep what a study needs."""
     lines, injection = pipeline.linkages, pipeline.injection
     joints = [line.scene_linkage.joint_names for line in lines]
     firsts = [sum(map(len, joints[:index])) for index in range(len(joints))]
@@ -308,7 +308,7 @@ def _in_processes(
         ended = True
         raise LinkageError(
             'the study',
-            'a process of it was killed',
+            'one of its processes was killed',
             'run the same command again: finished runs are kept; for less memory take fewer '
             '--workers',
         ) from None

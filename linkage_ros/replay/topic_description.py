@@ -75,7 +75,7 @@ def describe_topic(name: str, message_class: Any, qos: QosProfile) -> Topic:
 def _collect_definitions(
     message_class: Any, package: str, kind: str, texts: dict[str, str]
 ) -> None:
-    """Collect the text of a type and, after it, those of all types that it contains."""
+    """Collect the text of a type and, after it, the texts of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
     texts[f'{package}/{kind}'] = _installed_file(package, f'{kind}.msg').read_text('utf-8')

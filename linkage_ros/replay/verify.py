@@ -12,7 +12,7 @@ Run a bag's scene again on its samples: compare with its messages, and find its 
 A bag may lack the start of its run (recording began later, or its first files made way for newer
 ones). Then the state of the node at that time is missing: the newest sample, whole turns, delay
 lines, random generators. The ticks before the first one that is reproduced do not count, and whole
-turns are no difference.
+turns do not count as a difference.
 """
 
 from __future__ import annotations
@@ -109,11 +109,11 @@ def verify_replay(
 def beginning_text(proof: ReplayVerification) -> str:
     """Return text on the ticks that cannot be judged in a bag without the start of its run."""
     text = (
-        f'{proof.missing_start}: what the node remembered then is not in it, so {proof.undecided} '
+        f'{proof.missing_start}: it lacks the state of the node then, so {proof.undecided} '
+        f'of {proof.tick_count} ticks, at the start, are undecided'
     )
-    text += f'of {proof.tick_count} ticks, at the start, could not be told'
     if proof.verdict == UNDECIDED and proof.unrecoverable:
-        text += f'; {" and ".join(proof.unrecoverable)} cannot come to the same again'
+        text += f'; {" and ".join(proof.unrecoverable)} cannot be reproduced'
     return text
 
 

@@ -97,7 +97,7 @@ def make_wrench_topics(
             )
         if not fullmatch(_NAME, name) or len(name) > _LONGEST:
             raise one.refusal(
-                f'{quote(name)} is no ROS topic', 'write a topic, as topic: wrenches/coupler'
+                f'{quote(name)} is not a ROS topic', 'write a topic, as topic: wrenches/coupler'
             )
         name = name.removeprefix('/')
         if name in taken:

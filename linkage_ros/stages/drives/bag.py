@@ -14,7 +14,7 @@ joints, numbers beyond its bounds, stamps that go back. Absent rates are differe
 lead of a stamp over the clock does not matter, since the first sample counts as taken at the first
 tick.
 
-The order of the messages is that of their log times, whatever that in the file: other writers do
+The messages are ordered by their log times, whatever their order in the file: other writers do
 not keep it. The drive reads the bag when it is built, and again at every reset. A sample takes 8
 bytes for its time and 16 for each input: 86 MB for an hour at 1 kHz, and some 150 MB while the bag
 is read.
@@ -249,7 +249,7 @@ class RecordedPace(Drive):
         length, intervals = samples.offsets[-1], len(samples) - 1
         if repeat and not length:
             raise DefinitionError(
-                'drive.bag.repeat', 'the samples are of one instant', 'leave repeat out'
+                'drive.bag.repeat', 'all samples have the same time', 'leave repeat out'
             )
         self._period = length + length // intervals if repeat else 0
 

@@ -66,7 +66,7 @@ class CrankState(NamedTuple):
     accelerations
         Accelerations in [rad/s²] or [m/s²]; 0 where unknown.
     age
-        Time of the tick minus that of the sample, in [ns].
+        Time of the tick minus time of the sample, in [ns].
 
     """
 
@@ -195,7 +195,7 @@ class Context:
         return tuple(self.prefix + given.joint for given in self.closure.linkage.inputs)
 
     def random(self, effect: str) -> Random:
-        """Return the random generator of an effect, independent of those of other effects."""
+        """Return the random generator of an effect, independent of other effects."""
         return self.generator(self.seed, effect)
 
     @staticmethod

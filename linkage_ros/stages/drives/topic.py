@@ -116,10 +116,10 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
     """
     if parameters.cutoff and parameters.acceleration == 'zero':
         raise DefinitionError(
-            'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
+            'drive.topic.cutoff', 'has nothing to filter', 'add acceleration: differenced'
         )
     if parameters.branch and not parameters.joint:
-        raise DefinitionError('drive.topic.branch', 'is of no joint', 'name it: joint: NAME')
+        raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
     return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
 
 

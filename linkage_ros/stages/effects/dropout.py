@@ -100,8 +100,8 @@ def _loss_probabilities(loss: float, burst: float) -> tuple[float, float]:
             remedy = f'write {_least_burst(loss)} or more [samples], or a lower probability'
         raise DefinitionError(
             'effects.dropout.burst',
-            f'with a mean of {burst:g} no {loss:g} of all samples can be lost, since between two '
-            'bursts one arrives',
+            f'bursts of {burst:g} on average cannot lose {loss:g} of all samples, since one '
+            'arrives between two bursts',
             remedy,
         )
     return min(loss / (burst * (1.0 - loss)), 1.0), 1.0 - 1.0 / burst

@@ -176,7 +176,7 @@ class Counter:
         return encoder.offset + count * span / counts
 
     def read_rate(self, elapsed: int) -> float:
-        """Return the rate that a driver computes, so many [ns] after its last reading."""
+        """Return the rate that a driver computes, a time [ns] after its last reading."""
         if self._read is not None and self._last is not None and elapsed > 0:
             moved = self._last - self._read
             rate = moved * self._span / (self._counts * elapsed * 1e-9)

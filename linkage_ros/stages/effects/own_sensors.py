@@ -22,7 +22,7 @@ repeated; likewise for accelerations and efforts.
 For the own sensors behind these, a joint is silent where its sensor has no reading: `dropout`
 loses its samples, and not their repetitions.
 
-The stamp is that of the newest reading.
+The stamp is the stamp of the newest reading.
 """
 
 from __future__ import annotations
