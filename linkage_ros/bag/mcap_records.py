@@ -44,8 +44,65 @@ LARGEST = 256 * 2**20
 """
 What one record may take in memory, packed or unpacked [bytes].
 
-rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigabytes are no bag.
+rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigabytes are not a bag.
 """
+
+HEAD = Struct('<BQ')
+"""Head of a record: its kind, and the length of its content."""
+
+_CHUNK = Struct('<QQQII')
+"""First and last time, decompressed size, its checksum, length of the compression's name."""
+
+_MESSAGE = Struct('<HIQQ')
+_LONG = Struct('<Q')
+_INT = Struct('<I')
+_LONGEST_NAME = 16
+_LONGEST_RECORD = 8 * 2**20
+"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
+
+MOST_CHANNELS = 10_000
+"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
+
+_INDEX = Struct('<HI')
+_CRC = Struct('<I')
+_WINDOW = 2**20
+
+MOST_UNPACKED, MOST_TIMES = 2**30, 1000
+"""
+Bounds on the unpacked size of all chunks of a file: bytes, or multiples of the file's size.
+
+A megabyte of zstd can hold fifty gigabytes of zeros.
+"""
+
+_ELSEWHERE = {
+    0,
+    Opcode.FOOTER,
+    Opcode.STATISTICS,
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+}
+"""Kinds of records that no data section contains."""
+
+_FOOTER = Struct('<BQQQI')
+"""Kind, length, start of the index and of its second part, checksum."""
+
+_KINDS: dict[int, Any] = {
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.STATISTICS: Statistics,
+}
+
+_PLACES = {
+    Opcode.CHUNK_INDEX: 'chunk_start_offset',
+    Opcode.ATTACHMENT_INDEX: 'offset',
+    Opcode.METADATA_INDEX: 'offset',
+}
+
+MOST_RECORDS = 1_000_000
+"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class DamagedError(Exception):
@@ -95,22 +152,6 @@ _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {
     'lz4': _decompress_lz4,
     'zstd': _decompress_zstd,
 }
-
-HEAD = Struct('<BQ')
-"""Head of a record: its kind, and the length of its content."""
-
-_CHUNK = Struct('<QQQII')
-"""First and last time, decompressed size, its checksum, length of the compression's name."""
-
-_MESSAGE = Struct('<HIQQ')
-_LONG = Struct('<Q')
-_INT = Struct('<I')
-_LONGEST_NAME = 16
-_LONGEST_RECORD = 8 * 2**20
-"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
-
-MOST_CHANNELS = 10_000
-"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
 
 
 class RecordSource:
@@ -322,26 +363,6 @@ def message_of(content: bytes, at: int, end: int, definitions: Definitions) -> M
 
 FoundRecord = Message | Attachment | Metadata
 
-_INDEX = Struct('<HI')
-_CRC = Struct('<I')
-_WINDOW = 2**20
-
-MOST_UNPACKED, MOST_TIMES = 2**30, 1000
-"""
-What the chunks of a file may make together when unpacked: so many bytes, or so many times the
-file's. A megabyte of zstd can hold fifty gigabytes of zeros.
-"""
-_ELSEWHERE = {
-    0,
-    Opcode.FOOTER,
-    Opcode.STATISTICS,
-    Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX,
-    Opcode.SUMMARY_OFFSET,
-}
-"""Kinds of records that no data section contains."""
-
 
 class DataSection:
     """
@@ -498,26 +519,6 @@ def definitions_in(content: bytes) -> Definitions:
         while not data.finished:
             _, at = data.read_record(at)
     return definitions
-
-
-_FOOTER = Struct('<BQQQI')
-"""Kind, length, start of the index and of its second part, checksum."""
-
-_KINDS: dict[int, Any] = {
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.STATISTICS: Statistics,
-}
-
-_PLACES = {
-    Opcode.CHUNK_INDEX: 'chunk_start_offset',
-    Opcode.ATTACHMENT_INDEX: 'offset',
-    Opcode.METADATA_INDEX: 'offset',
-}
-
-MOST_RECORDS = 1_000_000
-"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class FileIndex(NamedTuple):

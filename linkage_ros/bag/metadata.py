@@ -37,6 +37,24 @@ _NAME = '/_'
 _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
 """Names that YAML writes unquoted; asking yaml would take a millisecond for each."""
 
+_PREFIX = 'linkage_ros.'
+
+STATS_RECORD = f'{_PREFIX}account'
+"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
+
+DISCARDED = f'{_PREFIX}let_go'
+"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
+
+FAILURE = f'{_PREFIX}failure'
+"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
+
+UNFINISHED = f'{_PREFIX}unfinished'
+"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
+
+UNFINISHED_DATA: Mapping[str, str] = {
+    UNFINISHED: 'being recorded, or killed; the counts are from the last flush'
+}
+
 
 @dataclass(frozen=True, slots=True)
 class BagSummary:
@@ -200,25 +218,6 @@ def _indent(text: str) -> str:
 def _dump_yaml(content: Any) -> str:
     text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
     return text
-
-
-_PREFIX = 'linkage_ros.'
-
-STATS_RECORD = f'{_PREFIX}account'
-"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
-
-DISCARDED = f'{_PREFIX}let_go'
-"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
-
-FAILURE = f'{_PREFIX}failure'
-"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
-
-UNFINISHED = f'{_PREFIX}unfinished'
-"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
-
-UNFINISHED_DATA: Mapping[str, str] = {
-    UNFINISHED: 'being recorded, or killed; the counts are from the last flush'
-}
 
 
 class RecordingStats(NamedTuple):

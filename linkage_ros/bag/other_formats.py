@@ -27,10 +27,10 @@ from linkage_ros.errors import BagError
 
 MCAP_SUFFIXES = '.mcap', '.mcap.zstd'
 BAG_SUFFIXES = *MCAP_SUFFIXES, '.db3', '.db3.zstd', '.bag'
-"""Ends of the names of files that are bags, or parts of one; those of MCAP are read."""
+"""Suffixes of files that are bags, or parts of one; MCAP files are read."""
 
 MOST_UNPACKED, MOST_TIMES = 256 * 2**20, 200
-"""What a packed file may make: so many bytes, or so many times its own size."""
+"""Bounds on the unpacked size of a file: bytes, or multiples of its own size."""
 
 _ZSTD = b'\x28\xb5\x2f\xfd'
 _PIECE = 2**20

@@ -51,6 +51,23 @@ MOST_METADATA = 8 * 2**20
 
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
+_RECOGNISED = 512
+"""Length of the start by which a text file is recognised [bytes]."""
+
+RUN_FILE = 'run.json'
+"""Name of the attachment with the run's scene, topics and versions."""
+
+_RECOVER = 'linkage recover makes a complete bag from it'
+
+MOST_ATTACHED = 64 * 2**20
+"""Most bytes of a file's attachments in memory."""
+
+_LONGEST_QOS, _MOST_QOS = 1024, 64
+"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
+
+ProgressCallback = Callable[[int], None]
+"""Takes the number of bytes read of a file; an exception from it ends the reading."""
+
 
 def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
     """Return the ``custom_data`` of a bag's metadata: its plain values, as strings."""
@@ -146,10 +163,6 @@ def is_empty(file: Path) -> bool:
         return False
 
 
-_RECOGNISED = 512
-"""Length of the start by which a text file is recognised [bytes]."""
-
-
 def is_finished(file: Path) -> bool:
     """Return whether an MCAP file is complete; raise if it is not an MCAP file."""
     length = len(MCAP0_MAGIC)
@@ -239,21 +252,6 @@ def footer_metadata(file: Path) -> FooterMetadata:
     except (DamagedError, OSError):
         pass  # reading the messages reports the error
     return FooterMetadata(custom, accounted)
-
-
-RUN_FILE = 'run.json'
-"""Name of the attachment with the run's scene, topics and versions."""
-
-_RECOVER = 'linkage recover makes a complete bag from it'
-
-MOST_ATTACHED = 64 * 2**20
-"""Most bytes of a file's attachments in memory."""
-
-_LONGEST_QOS, _MOST_QOS = 1024, 64
-"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
-
-ProgressCallback = Callable[[int], None]
-"""Takes the number of bytes read of a file; an exception from it ends the reading."""
 
 
 class BagMessage(NamedTuple):

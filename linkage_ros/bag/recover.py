@@ -55,6 +55,12 @@ RECOVERED = 'linkage_ros.recovered'
 NOTHING_LOST = 'nothing lost'
 """End of that text if nothing was lost."""
 
+MOST_CHANNELS = 10_000
+"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
+
+ProgressCallback = Callable[[int, int], None]
+Stopped = Callable[[], bool]
+
 
 class TopicRecovery(NamedTuple):
     """Numbers of messages of a topic: saved, and originally present (None if unknown)."""
@@ -103,10 +109,6 @@ def expected_counts(information: Mapping[str, Any]) -> dict[str, int]:
     except Exception:  # noqa: BLE001 (its content may be anything)
         return {}
     return counts if any(counts.values()) else {}
-
-
-MOST_CHANNELS = 10_000
-"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
 
 
 class RecoveredBag:
@@ -234,10 +236,6 @@ class RecoveredBag:
             duration=max(0, self._end - self._start),
             size=self._file.tell(),
         )
-
-
-ProgressCallback = Callable[[int, int], None]
-Stopped = Callable[[], bool]
 
 
 class _Findings:

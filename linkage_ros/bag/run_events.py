@@ -39,6 +39,19 @@ _LONGEST_ACCOUNT = 4 * 2**20
 
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
+_TEXTS = (
+    'scene',
+    'scene_folder',
+    'crank_topic',
+    'joint_states_topic',
+    'faults_topic',
+    'withheld_topic',
+    'resets_topic',
+)
+"""Keys of the account that are also fields of `RunMetadata`."""
+
+_NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
+
 
 class SampleEvent(NamedTuple):
     """Crank message that a tick took, with the tick's time and the source's, in [ns]."""
@@ -162,18 +175,6 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
     )
 
 
-_TEXTS = (
-    'scene',
-    'scene_folder',
-    'crank_topic',
-    'joint_states_topic',
-    'faults_topic',
-    'withheld_topic',
-    'resets_topic',
-)
-"""Keys of the account that are also fields of `RunMetadata`."""
-
-
 def _are_names(values: Any) -> bool:
     # A string that is not printable is not a topic, and some cannot be stored in a bag.
     return isinstance(values, list) and all(
@@ -248,9 +249,6 @@ def recorded_events(
     if open_tick is not None:
         log, time, made = open_tick
         yield TickEvent(log, time, tuple(made))
-
-
-_NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 
 def missing_start_reason(bag: Bag, run: RunMetadata) -> str:

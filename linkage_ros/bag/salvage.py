@@ -57,6 +57,18 @@ _BEGINNING = re.compile(rb'[\x06\x09](?=.{4}\x00{4})|' + re.escape(MCAP0_MAGIC),
 _MOST_IN_VAIN = 16
 """Limit for reading false candidates of chunks, in multiples of the file size."""
 
+_INT = Struct('<I')
+_CHECKSUM_PLACE = HEAD.size + 24
+_KINDS = {
+    ChunkIndex: Opcode.CHUNK,
+    AttachmentIndex: Opcode.ATTACHMENT,
+    MetadataIndex: Opcode.METADATA,
+}
+_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
+_IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
+
+BEGINNING = 'the MCAP magic at the beginning'
+
 
 def find_next_whole(source: RecordSource, at: int) -> int:
     """
@@ -118,19 +130,6 @@ def _end_of_file_at(source: RecordSource, at: int) -> int:
             return end if end < source.size else 0
         place += size
     return 0
-
-
-_INT = Struct('<I')
-_CHECKSUM_PLACE = HEAD.size + 24
-_KINDS = {
-    ChunkIndex: Opcode.CHUNK,
-    AttachmentIndex: Opcode.ATTACHMENT,
-    MetadataIndex: Opcode.METADATA,
-}
-_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
-_IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
-
-BEGINNING = 'the MCAP magic at the beginning'
 
 
 class LostRange(NamedTuple):

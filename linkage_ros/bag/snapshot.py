@@ -41,6 +41,15 @@ _BLOCKS_IN_SPAN = 16
 _JUMP = 1_000_000_000
 """A larger step back of log time is a jump of the clock, not a message out of order [ns]."""
 
+_WHERE = 'the memory of the last seconds'
+_BLOCKS = 16  # 1 MiB
+
+_AHEAD = 5000
+"""Most messages handed to the recorder that it has not written yet."""
+
+_PATIENCE = 10.0
+"""Longest wait for a disk that does not answer, in [s]."""
+
 
 class Extent(NamedTuple):
     """Amount of messages in memory."""
@@ -173,10 +182,6 @@ class LastSeconds:
             self._newest, self._newest_size = [], 0
 
 
-_WHERE = 'the memory of the last seconds'
-_BLOCKS = 16  # 1 MiB
-
-
 class KeptCounts(NamedTuple):
     """Counts of one topic's messages; always ``received == kept + discarded + dropped``."""
 
@@ -290,13 +295,6 @@ class SnapshotMemory:
         )
         for index, counts in enumerate(self.read_counts()):
             self._last.discarded[index] += counts.kept
-
-
-_AHEAD = 5000
-"""Most messages handed to the recorder that it has not written yet."""
-
-_PATIENCE = 10.0
-"""Longest wait for a disk that does not answer, in [s]."""
 
 
 class SnapshotWriting:

@@ -42,6 +42,16 @@ JOINT_STATE = parse_declaration(
 )
 """``sensor_msgs/msg/JointState``."""
 
+_COUNT = Struct('<I')
+
+_NO_FRAME = pack_message(parse_declaration('Time stamp, string frame_id'), {})[STAMP_END:].ljust(
+    8, b'\0'
+)
+"""Bytes between the stamp and the count of the names: an empty frame_id."""
+
+_COUNT_AT = STAMP_END + len(_NO_FRAME)
+_FIRST_NAME = _COUNT_AT + _COUNT.size
+
 
 class Rejection(Enum):
     """Reason for the rejection of a message."""
@@ -207,17 +217,6 @@ class OwnJointStates:
                 at += len(names)
                 left -= joints
         return count > left == 0 and message.startswith(counted, at)
-
-
-_COUNT = Struct('<I')
-
-_NO_FRAME = pack_message(parse_declaration('Time stamp, string frame_id'), {})[STAMP_END:].ljust(
-    8, b'\0'
-)
-"""Bytes between the stamp and the count of the names: an empty frame_id."""
-
-_COUNT_AT = STAMP_END + len(_NO_FRAME)
-_FIRST_NAME = _COUNT_AT + _COUNT.size
 
 
 def _encode_names(joints: Sequence[str]) -> bytes:

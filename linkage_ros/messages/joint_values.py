@@ -67,6 +67,19 @@ NO_JOINTS = 'not about joints'
 Key = tuple[str, str]
 """A joint's name, and the quantity."""
 
+JOINT_TRAJECTORY = parse_declaration(
+    'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
+    JointTrajectoryPoint=parse_declaration(
+        'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
+        'Duration time_from_start'
+    ),
+)
+
+MULTI_DOF_JOINT_STATE = parse_declaration(
+    'Time stamp, string frame_id, string[] joint_names, '
+    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
+)
+
 
 class MessageContent(NamedTuple):
     """The values in a message."""
@@ -187,15 +200,6 @@ def _decode_names(names: Sequence[bytes]) -> list[str]:
     return [name.decode('utf-8', 'backslashreplace') for name in names]
 
 
-JOINT_TRAJECTORY = parse_declaration(
-    'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
-    JointTrajectoryPoint=parse_declaration(
-        'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
-        'Duration time_from_start'
-    ),
-)
-
-
 class JointTrajectoryWriter(ArrayWriter):
     """
     Writes a JointTrajectory of a single point, the state of the joints at one instant.
@@ -212,12 +216,6 @@ class JointTrajectoryWriter(ArrayWriter):
             'accelerations': 'accelerations',
         }
         super().__init__(JOINT_TRAJECTORY, {'joint_names': names}, arrays, 'points')
-
-
-MULTI_DOF_JOINT_STATE = parse_declaration(
-    'Time stamp, string frame_id, string[] joint_names, '
-    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
-)
 
 
 class PlanarWrenchWriter:

@@ -39,6 +39,8 @@ incremental encoder, which counts from power-on, for a low-pass, which never for
 bit, for random latencies, for loads over the time, and for markers with a trail.
 """
 
+_REPORT_EVERY = 1024
+
 
 class ReplayVerification(NamedTuple):
     """Result of running the scene of a bag again."""
@@ -152,9 +154,6 @@ def _lost_state(scene: Scene) -> tuple[str, ...]:
         if markers and markers.trace:
             named.append('markers')
     return tuple(dict.fromkeys(named))
-
-
-_REPORT_EVERY = 1024
 
 
 class StatePlace(NamedTuple):

@@ -36,6 +36,12 @@ if TYPE_CHECKING:
 _STEPS = 5
 """Leading bits kept of a duration: the width of a bin is at most 1/32 of its value."""
 
+_LONGEST_DRAIN = 20_000_000
+"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
+
+_TakenMessage = tuple[bytes, dict[str, Any]]
+TakeMessage = Callable[[], _TakenMessage | None]
+
 
 class DurationHistogram:
     """Histogram of durations, in [ns], of constant size; the bins widen with the duration."""
@@ -111,10 +117,6 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
     )
 
 
-_LONGEST_DRAIN = 20_000_000
-"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
-
-
 class Stall(NamedTuple):
     """A lag that lost ticks."""
 
@@ -175,8 +177,6 @@ class Counts:
     """Of each topic with a wrench."""
 
 
-_TakenMessage = tuple[bytes, dict[str, Any]]
-TakeMessage = Callable[[], _TakenMessage | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event is set: waits, and calls `tick_at` or `tick_samples`."""
 

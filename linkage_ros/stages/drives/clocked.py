@@ -23,6 +23,17 @@ from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics import Closure, InputSweep
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive
 
+LARGEST = 1e10
+"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
+
+Curve = Callable[[int], tuple[float, float, float]]
+"""
+Value, rate and acceleration of an input at a time since the first tick, in [ns].
+
+In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
+derivative by time of the one before it.
+"""
+
 
 def refuse_beyond(
     closure: Closure, number: int, where: str, start: float, extent: tuple[float, float]
@@ -68,18 +79,6 @@ def refuse_beyond(
                 f'{goes}, beyond {end:.6g} {unit}, where {quote(by)} is at its limit',
                 'stay within it, or widen it in the linkage file',
             )
-
-
-LARGEST = 1e10
-"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
-
-Curve = Callable[[int], tuple[float, float, float]]
-"""
-Value, rate and acceleration of an input at a time since the first tick, in [ns].
-
-In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
-derivative by time of the one before it.
-"""
 
 
 class ClockedDrive(Drive):

@@ -52,6 +52,9 @@ DRIVES = {
 LARGEST = 1e10
 """Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
 
+Reader = Callable[[bytes], Any]
+"""Reads a sample, or a Rejection, from a message."""
+
 
 class CrankState(NamedTuple):
     """
@@ -224,7 +227,3 @@ class Context:
         from linkage_ros.dynamics import Reactions  # local import: only with forces
 
         return Reactions(self.mechanics)
-
-
-Reader = Callable[[bytes], Any]
-"""Reads a sample, or a Rejection, from a message."""

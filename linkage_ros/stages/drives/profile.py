@@ -37,6 +37,8 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import build_clocked, Curve, LARGEST
 
+_Polynomial = tuple[float, float, float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Profile:
@@ -157,9 +159,6 @@ def _table_times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
                 'write times that increase, by 1 ns at least',
             )
     return times
-
-
-_Polynomial = tuple[float, float, float, float, float]
 
 
 def _cubic_spline(

@@ -38,6 +38,8 @@ from linkage_ros.stages.drives.drive import Context, CrankState, Drive, LARGEST,
 
 TOPIC = 'crank_states'
 
+_Values = tuple[float, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class TopicParameters:
@@ -121,9 +123,6 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
     if parameters.branch and not parameters.joint:
         raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
     return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
-
-
-_Values = tuple[float, ...]
 
 
 class TopicDrive(Drive):

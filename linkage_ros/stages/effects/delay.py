@@ -61,6 +61,9 @@ from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 _AUTOMATIC = 'automatic'
 
+_LONGEST = 20.0
+"""Largest exponential latency, in its mean: one of 5e8 is longer."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointDelay:
@@ -219,10 +222,6 @@ class Delay:
         if self._on_the_way and self._on_the_way[0][0] <= due:
             return self._on_the_way.popleft()[1]
         return None
-
-
-_LONGEST = 20.0
-"""Largest exponential latency, in its mean: one of 5e8 is longer."""
 
 
 class RandomDelay:

@@ -59,6 +59,15 @@ from linkage_ros.messages import (
 ARROW_POINTS = 16
 """Number of points of an effort's arrow, with its head."""
 
+_GRAVITY = 9.81
+_SHORTEST = 0.25
+"""Least length of an arrow, in half bars."""
+
+_WIDEST = 1.7 * pi
+"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
+
+Points = Mapping[tuple[str, str], complex]
+
 
 class Key(NamedTuple):
     """A point of a link, as a key."""
@@ -269,16 +278,6 @@ def _fan_triangles(corners: Sequence[Place]) -> list[Place]:
 
 def _flat_point(place: complex) -> Place:
     return place.real, place.imag, 0.0
-
-
-_GRAVITY = 9.81
-_SHORTEST = 0.25
-"""Least length of an arrow, in half bars."""
-
-_WIDEST = 1.7 * pi
-"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
-
-Points = Mapping[tuple[str, str], complex]
 
 
 class Arrows:
