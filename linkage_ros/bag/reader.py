@@ -281,7 +281,7 @@ class Bag:
     passed_over
         Names of the attachments that are not read, since they exceed this limit.
     custom
-        ``custom_data`` of its metadata; without metadata, that of its last file.
+        ``custom_data`` of its metadata; without metadata, the custom data of its last file.
     truncated
         Whether an end is missing, since the recording was killed or is still running: the end of a
         file, or a further file of a bag whose files are complete.

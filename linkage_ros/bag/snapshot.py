@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Memory of the last seconds of a run, until a snapshot of it is written to a bag.
+Memory of the last seconds of a run, until a snapshot is written to a bag.
 
 `LastSeconds` packs the messages into blocks of bytes. They take half the memory of Python objects,
 the garbage collector has nothing to visit, and a snapshot only copies the list of blocks.

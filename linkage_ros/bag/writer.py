@@ -360,7 +360,7 @@ class BagWriter:
         if error.errno in NO_ROOM:
             reason, remedy = 'the recording was interrupted', _GO_ON
         elif isinstance(error, LostError):
-            kept, remedy = 'what is left of it', _KEEP_OUT
+            kept, remedy = 'what is left', _KEEP_OUT
         return RecordingError(
             self.folder,
             f'{reason}: {error.strerror or error}',

@@ -9,7 +9,7 @@
 """
 Read three types of messages about joints, by joint and quantity, and write two of them.
 
-A message is parsed only if its layout differs from that of the previous one; else one call unpacks
+A message is parsed only if its layout differs from the previous one's; otherwise one call unpacks
 it. A ``sensor_msgs/msg/JointState`` is read completely. A ``trajectory_msgs/msg/JointTrajectory``
 must have one point, as in ``~/motion``: the state at an instant. A
 ``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``; the planar

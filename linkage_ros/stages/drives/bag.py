@@ -179,7 +179,7 @@ class BagParameters:
     """The crank samples of a recorded bag, from the first tick on."""
 
     file: str = file("the bag's folder, or its MCAP file")
-    topic: str = text('topic of the samples; absent, that which holds the input joints', '')
+    topic: str = text('topic of the samples; absent, the topic with the input joints', '')
     pace: str = choice(
         'recorded: samples follow each other as recorded; fast: one for every tick, as it is',
         ('recorded', 'fast'),

@@ -26,7 +26,7 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
     """
     Return the closure that a joint drives, on the branch of a number; 0 means the only branch.
 
-    Errors are those of `Closure.driven_by`, with the key of the scene.
+    Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
     # Another solver has no branches of its own.
     closed: Closure = getattr(closure, 'closed', closure)

@@ -21,7 +21,7 @@ angle at which it passes through 0 upwards (R. M. Kennel, Encoders for simultane
 position and speed in electrical drives with digital control, IEEE Transactions on Industry
 Applications 43, 2007).
 
-bᵥ and bₑ, ``rates`` and ``efforts``, are those of sensors that measure rates, and torques or
+bᵥ and bₑ, ``rates`` and ``efforts``, belong to sensors that measure rates, and torques or
 forces. Accelerations have no bias.
 """
 

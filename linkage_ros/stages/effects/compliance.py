@@ -17,10 +17,10 @@ included::
     N = ½·(F_Q − F_P)·u
 
 So each end bears half of the loads between the pins: weight, inertia and springs. The force is
-that of the rigid linkage. The displacement of the published joints is computed to first order,
-with fixed inputs: valid for stretches that are small against the links, with an error of the order
-of their square. The model is quasi-static: the stretch adds no vibration, and the rates are those
-of the rigid linkage.
+computed for the rigid linkage. The displacement of the published joints is computed to first
+order, with fixed inputs: valid for stretches that are small against the links, with an error of
+the order of their square. The model is quasi-static: the stretch adds no vibration, and the rates
+belong to the rigid linkage.
 """
 
 from __future__ import annotations

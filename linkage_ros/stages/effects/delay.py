@@ -30,7 +30,7 @@ reading arrives once, unchanged, at the first tick that is d later; if several a
 ticks, one at each tick.
 
 With ``stamp: arrival`` the message has the stamp of its tick, as from a driver that does not know
-the delay; with ``measured`` the time of measurement, t − d, or that of the reading.
+the delay; with ``measured`` the time of measurement, t − d, or the stamp of the reading.
 
 The line holds the readings of the last d: 1000 for a second at 1 kHz.
 

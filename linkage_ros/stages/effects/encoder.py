@@ -39,9 +39,8 @@ estimation from discrete position versus time data, IEEE Transactions on Industr
     v ← v + (1 − e^(−2π·cutoff·Δt))·(d − v)
 
 which is exact for a difference d that is held over Δt. Turns and the step of y at the index mark
-are no motion, and not part of them. ``exact``
-leaves the rates unchanged. A reading without rates gets none. Accelerations, efforts, and joints
-without an encoder are unchanged.
+are not a motion, and not part of the differences. ``exact`` leaves the rates unchanged. A reading
+without rates gets none. Accelerations, efforts, and joints without an encoder are unchanged.
 """
 
 from __future__ import annotations

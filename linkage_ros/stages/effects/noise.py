@@ -30,7 +30,7 @@ Over times far below T it is a walk of K = s·√(2/T).
 measure torque or force: rates and efforts do not contain the noise of y, nor do accelerations.
 
 Each joint and each kind of noise has its own generator, which draws once in every tick, with or
-without rates: the noise of one joint does not change that of another.
+without rates: the noise of one joint does not change another joint's noise.
 """
 
 from __future__ import annotations
