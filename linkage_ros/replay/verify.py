@@ -148,7 +148,7 @@ def _lost_state(scene: Scene) -> tuple[str, ...]:
         ):
             named.append('encoder')
         delay = scene_linkage.effects.get('delay')
-        if delay and any(line.random for line in delay.lines):
+        if delay and any(line.is_random for line in delay.delay_lines):
             named.append('delay')
         markers = scene_linkage.effects.get('markers')
         if markers and markers.trace:

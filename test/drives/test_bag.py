@@ -334,7 +334,7 @@ def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path)
 
 def test_one_instant_cannot_repeat(tmp_path):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5), sample(0, 0.6)))
-    with pytest.raises(DefinitionError, match='of one instant; leave repeat out') as caught:
+    with pytest.raises(DefinitionError, match='have the same time; leave repeat out') as caught:
         build(BagParameters(file, repeat=True), one_input())
     assert caught.value.where == 'drive.bag.repeat'
     fast = build(BagParameters(file, repeat=True, pace='fast'), one_input())
