@@ -7,10 +7,10 @@
 # language governing permissions and limitations under the License.
 
 """
-A run without a ROS graph: the node's tick loop, as fast as it goes, on a time of its own.
+A run without a ROS graph: the node's tick loop, as fast as it goes, on its own time.
 
-Tick k is at `BEGIN` plus k periods, to the whole nanosecond. The bag is the bag that a node of
-this scene would record, so that its replay gives the same bytes. Nothing of rclpy is imported.
+Tick k is at `BEGIN` plus k periods, to the whole nanosecond. The bag is what a node of this
+scene would record, so that its replay gives the same bytes. Nothing of rclpy is imported.
 """
 
 from __future__ import annotations

@@ -313,7 +313,7 @@ def _in_processes(
             '--workers',
         ) from None
     finally:
-        # At an end of its own the processes end first: torn down with the interpreter, they write
+        # At its own end the processes end first: torn down with the interpreter, they write
         # a traceback now and then. A stop does not wait for runs.
         pool.shutdown(wait=ended, cancel_futures=True)
 

@@ -240,7 +240,7 @@ class TickLoop:
         self.run_seconds = 0.0
 
     def start(self, pace: Pace) -> None:
-        """Start ticking on a thread of its own."""
+        """Start ticking on its own thread."""
         self._stopping.clear()
         self._start_time = monotonic_ns()
         self._thread = Thread(target=self._guard_pace, args=(pace,), name='tick', daemon=True)
@@ -297,7 +297,7 @@ class TickLoop:
         """
         Take the waiting messages: record, count and offer each to the pipeline.
 
-        A clock moves `_last_time` on to the time when a message is taken. Wrenches come first: a
+        A clock advances `_last_time` to the time when a message is taken. Wrenches come first: a
         tick for a sample has them.
         """
         for which, take in enumerate(self._take_wrenches):
@@ -384,7 +384,7 @@ class TickLoop:
                 break
 
     def _advance_time(self, time: int) -> None:
-        """Move `_last_time` on: a message may be newer than the tick that takes it."""
+        """Advance `_last_time`: a message may be newer than the tick that takes it."""
         if self.injection is not None:
             time = self.injection.tick_time(time)
         if time > self._last_time:

@@ -28,7 +28,7 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
 
     Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
-    # Another solver has no branches of its own.
+    # Another solver has no branches.
     closed: Closure = getattr(closure, 'closed', closure)
     try:
         return closed.driven_by(joint, branch=number or None)

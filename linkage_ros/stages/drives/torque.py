@@ -118,7 +118,7 @@ class MotorParameters:
 
 @dataclass(frozen=True, slots=True)
 class PlayParameters:
-    """Play between the motor and the crank, each with an inertia of its own."""
+    """Play between the motor and the crank, each with its own inertia."""
 
     width: float = number(
         'by which the motor turns against the crank', unit='rad or m', above=0.0, most=100.0

@@ -38,11 +38,11 @@ With ``spread``, v, the latency of each reading is random: d + v·u, with u unif
 with the mean 1 if ``distribution`` is exponential (cut off at 20). Then readings are messages from
 the beginning. With ``reorder`` a message may overtake others, as over several paths or by UDP;
 else it arrives with the one before it at the earliest, as over TCP. With the probability
-``duplicates`` a message arrives a second time, after a latency of its own. Of several that arrive
+``duplicates`` a message arrives a second time, after its own latency. Of several that arrive
 between two ticks the last one is published. (On latencies in networked control: J. Nilsson,
 Real-Time Control Systems with Delays, 1998.)
 
-A joint under ``joints`` has a line of its own, with its own latency: see `own_sensors`.
+A joint under ``joints`` has its own line, with its own latency: see `own_sensors`.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
         if parameters.stamp == 'measured':
             raise DefinitionError(
                 'effects.delay.stamp',
-                'measured is one time, and joints with lines of their own have several',
+                'measured is one time, and joints with their own lines have several',
                 'write arrival, or leave joints out',
             )
         return own_sensors('delay', sensor, parameters, context)

@@ -30,7 +30,7 @@ sample to lose.
 ``hold: silent`` publishes nothing for a lost sample; ``repeat`` publishes the last one that
 arrived, with the stamp of the tick, and nothing before the first.
 
-A joint under ``joints`` has a line of its own, with its own losses: see `own_sensors`.
+A joint under ``joints`` has its own line, with its own losses: see `own_sensors`.
 """
 
 from __future__ import annotations

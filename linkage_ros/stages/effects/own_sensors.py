@@ -7,9 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Own sensors: joints that are read by sensors of their own, beside the one of the other joints.
+Own sensors: joints that have their own sensors, beside the sensor of the other joints.
 
-A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has such a sensor of its own, with
+A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has its own sensor, with
 its own parameters (those that it leaves out have their defaults) and its own random generator. So
 one more such joint changes nothing for the others.
 

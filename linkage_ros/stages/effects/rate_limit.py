@@ -27,7 +27,7 @@ between two samples.
 and with the stamp of the tick, as a driver that polls its sensor. ``silent`` publishes a sample
 once.
 
-A joint under ``joints`` has a sensor of its own, with its own rate, phase and clock error: see
+A joint under ``joints`` has its own sensor, with its own rate, phase and clock error: see
 `own_sensors`.
 """
 
