@@ -226,11 +226,11 @@ REFUSED_EFFECTS = {
         ('{probability: 0.1, joints: {}}', 'joints: names no joint'),
         (
             '{probability: 0, joints: {rocker_joint: {probability: 0.75, burst: 2}}}',
-            'joints.rocker_joint.burst: with a mean of 2 …; write 3 or more',
+            'joints.rocker_joint.burst: bursts of 2 …; write 3 or more',
         ),
         (
             '{probability: 0.75, burst: 2, joints: {rocker_joint: {probability: 0}}}',
-            '.burst: with a mean of 2',
+            '.burst: bursts of 2',
         ),
     ],
     'delay': [
@@ -328,7 +328,7 @@ REFUSED_FAULTS = [
     (
         'mine',
         '{not_a_number: {}}',
-        'faults: not_a_number spoils messages, and constant_rate has none',
+        'faults: not_a_number corrupts messages, and constant_rate has none',
     ),
 ]
 

@@ -271,7 +271,9 @@ def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, ri
     if fits:
         Pipeline(scene)
         return
-    with pytest.raises(FileError, match=r'effects\.delay\.stamp: measured is a stamp of its own'):
+    with pytest.raises(
+        FileError, match=r'effects\.delay\.stamp: measured gives a linkage its own stamp'
+    ):
         Pipeline(scene)
 
 
@@ -324,7 +326,7 @@ def test_without_a_prefix_names_are_those_of_the_files(load, tmp_path, where):
     if where == 'scene':
         text = text.replace(", prefix: ''", '') + "prefix: ''\n"
     scene = load(text)
-    assert scene.joints == ('left_knee', 'right_knee')
+    assert scene.joint_names == ('left_knee', 'right_knee')
     pipeline = Pipeline(scene)
     assert pipeline.offer(crank(BEGIN, crank_joint=0.5), BEGIN) is None
     state = read(pipeline.tick(BEGIN).message)
@@ -346,7 +348,7 @@ PREFIXES = {
 def test_a_prefix_is_as_it_is_written(load, kind):
     text, joint = PREFIXES[kind]
     scene = load(f'linkage: four_bar.yaml\n{text}\n')
-    assert scene.joints[0] == joint
+    assert scene.joint_names[0] == joint
     assert scene.linkages[0].input_names == (joint.replace('coupler', 'crank'),)
 
 

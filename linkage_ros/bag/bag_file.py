@@ -44,11 +44,7 @@ def compression_type(name: str, folder: Path) -> CompressionType:
     """
     Return mcap's compression for a name.
 
-    Raises
-    ------
-    RecordingError
-        Its library is not installed; ``folder``, the target of the recording, is in the message.
-
+    Raise `RecordingError`, which names ``folder``, if the library for it is not installed.
     """
     kind = COMPRESSION_TYPES[name]
     try:
@@ -107,33 +103,9 @@ class BagFile:
     """
     MCAP file that is open for writing.
 
-    Parameters
-    ----------
-    path
-        Path of the file, which must not exist.
-    topics
-        Topics of the messages; the index in this sequence is the topic's number.
-    attachments
-        Name to (media type, content); written first, so that the bag of a killed process has them.
-    compression
-        Compression of chunks.
-
-    Attributes
-    ----------
-    counts
-        Number of messages, by topic.
-    first
-        Log time of the first message [ns]; None before it.
-    finished
-        Whether its end is written.
-    removed
-        Whether another process has removed it.
-
-    Raises
-    ------
-    OSError
-        It cannot be created or written. Nothing is left behind.
-
+    ``path`` must not exist. A topic's number is its index in ``topics``. ``attachments`` (name to
+    media type and content) are written first, so that the bag of a killed process has them. An
+    `OSError` at creation leaves nothing behind.
     """
 
     def __init__(
@@ -144,9 +116,9 @@ class BagFile:
         compression: CompressionType,
     ) -> None:
         self.path = path
-        self.counts = [0] * len(topics)
-        self.first: int | None = None
-        self.finished = self.removed = False
+        self.counts = [0] * len(topics)  # Messages by topic
+        self.first: int | None = None  # Log time of the first message [ns]
+        self.finished = self.removed = False  # By this process, by another process
         self._start, self._end = NO_START, 0
         self._flushes, self._flushed = 0, 0
         self._flushed_counts = (tuple(self.counts), self._start, self._end)
@@ -221,13 +193,8 @@ class BagFile:
         """
         End the file as well as the disk allows; return the error, if any, now or before.
 
-        Messages that the disk does not keep in the end are not counted, even if they are there.
-
-        Parameters
-        ----------
-        records
-            Metadata records for the end of the file, by name.
-
+        ``records`` are metadata records for the end of the file, by name. Messages that the disk
+        does not keep in the end are not counted, even if they are there.
         """
         self.finished = True
         self._file.keep_tail()

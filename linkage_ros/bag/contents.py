@@ -82,15 +82,7 @@ class Tally:
 
 
 class Tallies(dict[str, Tally]):
-    """
-    Counts of all topics, by name.
-
-    Parameters
-    ----------
-    bag
-        The bag; its topics come first, others in the order of their first message.
-
-    """
+    """Counts of all topics, by name: first the bag's topics, then others as they appear."""
 
     def __init__(self, bag: Bag) -> None:
         super().__init__({topic.name: Tally(topic) for topic in bag.topics})
@@ -123,15 +115,8 @@ def contents_of(
     """
     Count all messages of a bag; memory does not grow with them.
 
-    Parameters
-    ----------
-    bag
-        The bag. If it is damaged, the messages before the damage are counted.
-    progress
-        Receives the number of bytes read, now and then.
-    stopped
-        Returns whether to stop.
-
+    If the bag is damaged, the messages before the damage are counted. ``progress`` receives the
+    number of bytes read, now and then; ``stopped`` returns whether to stop.
     """
     tallies = Tallies(bag)
     damage, halted = '', False

@@ -210,7 +210,7 @@ class RecordFile:
         while view:
             count = os.pwrite(self._descriptor, view, offset)
             if not count:
-                raise OSError(errno.EIO, 'the disk takes nothing')
+                raise OSError(errno.EIO, 'the disk accepts no data')
             view, offset = view[count:], offset + count
 
 

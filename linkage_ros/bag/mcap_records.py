@@ -44,8 +44,65 @@ LARGEST = 256 * 2**20
 """
 What one record may take in memory, packed or unpacked [bytes].
 
-rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigabytes are no bag.
+rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigabytes are not a bag.
 """
+
+HEAD = Struct('<BQ')
+"""Head of a record: its kind, and the length of its content."""
+
+_CHUNK = Struct('<QQQII')
+"""First and last time, decompressed size, its checksum, length of the compression's name."""
+
+_MESSAGE = Struct('<HIQQ')
+_LONG = Struct('<Q')
+_INT = Struct('<I')
+_LONGEST_NAME = 16
+_LONGEST_RECORD = 8 * 2**20
+"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
+
+MOST_CHANNELS = 10_000
+"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
+
+_INDEX = Struct('<HI')
+_CRC = Struct('<I')
+_WINDOW = 2**20
+
+MOST_UNPACKED, MOST_TIMES = 2**30, 1000
+"""
+Bounds on the unpacked size of all chunks of a file: bytes, or multiples of the file's size.
+
+A megabyte of zstd can hold fifty gigabytes of zeros.
+"""
+
+_ELSEWHERE = {
+    0,
+    Opcode.FOOTER,
+    Opcode.STATISTICS,
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+}
+"""Kinds of records that no data section contains."""
+
+_FOOTER = Struct('<BQQQI')
+"""Kind, length, start of the index and of its second part, checksum."""
+
+_KINDS: dict[int, Any] = {
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.STATISTICS: Statistics,
+}
+
+_PLACES = {
+    Opcode.CHUNK_INDEX: 'chunk_start_offset',
+    Opcode.ATTACHMENT_INDEX: 'offset',
+    Opcode.METADATA_INDEX: 'offset',
+}
+
+MOST_RECORDS = 1_000_000
+"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class DamagedError(Exception):
@@ -54,25 +111,12 @@ class DamagedError(Exception):
 
 def decompress(data: bytes, compression: str, size: int) -> bytes:
     """
-    Decompress a chunk.
+    Decompress a chunk (compression '', 'lz4' or 'zstd') to its stated size [bytes], never beyond.
 
-    Parameters
-    ----------
-    data
-        Bytes of the chunk in the file.
-    compression
-        '', 'lz4' or 'zstd'.
-    size
-        Stated size after decompression [bytes]; no further byte is decompressed.
-
-    Raises
-    ------
-    DamagedError
-        The size is wrong or not allowed, or decompression fails.
-
+    Raise `DamagedError` if the size is wrong or not allowed, or if decompression fails.
     """
     if size > LARGEST:
-        raise DamagedError(f'would be {size:,} bytes unpacked; no more than {LARGEST:,} are taken')
+        raise DamagedError(f'would unpack to {size:,} bytes; at most {LARGEST:,} are read')
     if compression == '':
         content = data
     elif compression in _UNPACKERS:
@@ -80,14 +124,14 @@ def decompress(data: bytes, compression: str, size: int) -> bytes:
             content = _UNPACKERS[compression](data, size + 1)
         except ImportError:
             raise DamagedError(
-                f'is packed with {compression}, and Python knows no {compression} here'
+                f'is packed with {compression}, and the Python package for it is missing'
             ) from None
         except Exception as error:  # noqa: BLE001 (each library has its own exceptions)
             raise DamagedError(f'cannot be unpacked: {error}') from None
     else:
-        raise DamagedError(f'is packed in an unknown way, {compression!r}')
+        raise DamagedError(f'has the unknown compression {compression!r}')
     if len(content) != size:
-        raise DamagedError(f'is not of the {size:,} bytes that it says to be')
+        raise DamagedError(f'does not unpack to its stated {size:,} bytes')
     return content
 
 
@@ -109,22 +153,6 @@ _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {
     'zstd': _decompress_zstd,
 }
 
-HEAD = Struct('<BQ')
-"""Head of a record: its kind, and the length of its content."""
-
-_CHUNK = Struct('<QQQII')
-"""First and last time, decompressed size, its checksum, length of the compression's name."""
-
-_MESSAGE = Struct('<HIQQ')
-_LONG = Struct('<Q')
-_INT = Struct('<I')
-_LONGEST_NAME = 16
-_LONGEST_RECORD = 8 * 2**20
-"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
-
-MOST_CHANNELS = 10_000
-"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
-
 
 class RecordSource:
     """A file open for reading, with its size at the time of opening."""
@@ -136,7 +164,7 @@ class RecordSource:
     def read(self, at: int, length: int) -> bytes:
         """Return `length` bytes from position `at`; raise DamagedError if they are missing."""
         if length > LARGEST:
-            raise DamagedError(f'would be {length:,} bytes; no more than {LARGEST:,} are taken')
+            raise DamagedError(f'would be {length:,} bytes; at most {LARGEST:,} are read')
         if not 0 <= at <= self.size - length:
             raise DamagedError('goes beyond the end of the file')
         try:
@@ -196,13 +224,13 @@ class Definitions:
         if opcode == Opcode.SCHEMA:
             schema = parse_strictly(Schema, content)
             if self.schemas.setdefault(schema.id, schema) != schema:
-                raise DamagedError(f'makes schema {schema.id} another one')
+                raise DamagedError(f'redefines schema {schema.id}')
         else:
             channel = parse_strictly(Channel, content)
             if self.channels.setdefault(channel.id, channel) != channel:
-                raise DamagedError(f'makes channel {channel.id} another one')
+                raise DamagedError(f'redefines channel {channel.id}')
         if max(len(self.schemas), len(self.channels)) > MOST_CHANNELS:
-            raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
+            raise DamagedError(f'defines more than {MOST_CHANNELS:,} channels or schemas')
 
     def add_missing(self, others: Definitions) -> None:
         """Add the schemas and channels whose numbers are new."""
@@ -218,8 +246,7 @@ def parse_strictly(kind: Any, content: bytes) -> Any:
     """Parse a record of this kind; its fields must fill the content to the last byte."""
     if len(content) > _LONGEST_RECORD:
         raise DamagedError(
-            f'is a {kind.__name__} of {len(content):,} bytes; no more than {_LONGEST_RECORD:,} '
-            'are taken'
+            f'is a {kind.__name__} of {len(content):,} bytes; at most {_LONGEST_RECORD:,} are read'
         )
     try:
         record = kind.read(ReadDataStream(BytesIO(content)))
@@ -227,10 +254,10 @@ def parse_strictly(kind: Any, content: bytes) -> Any:
         record.write(builder)
         again: bytes = builder.end()  # type: ignore[no-untyped-call]
     except Exception as error:  # noqa: BLE001 (damage makes mcap raise many kinds)
-        raise DamagedError(f'is no {kind.__name__}: {error}') from None
+        raise DamagedError(f'is not a valid {kind.__name__}: {error}') from None
     # mcap reads a truncated string as its remains; written again, the record differs.
     if again != HEAD.pack(again[0], len(content)) + content:
-        raise DamagedError(f'is no {kind.__name__}')
+        raise DamagedError(f'is not a valid {kind.__name__}')
     return record
 
 
@@ -239,7 +266,7 @@ def chunk_head(source: RecordSource, at: int) -> ChunkHead:
     begin = at + HEAD.size
     _, _, size, crc, letters = _CHUNK.unpack(source.read(begin, _CHUNK.size))
     if letters > _LONGEST_NAME:
-        raise DamagedError(f'has {letters:,} letters for how it is packed')
+        raise DamagedError(f'has a compression name of {letters:,} bytes')
     begin += _CHUNK.size
     name = source.read(begin, letters + _LONG.size)
     (length,) = _LONG.unpack_from(name, letters)
@@ -257,7 +284,7 @@ def content_of(chunk: Chunk) -> bytes:
     """Decompress the content of a chunk, and check its CRC if it has one."""
     content = decompress(chunk.data, chunk.compression, chunk.size)
     if chunk.crc and crc32(content) != chunk.crc:
-        raise DamagedError('its checksum does not fit')
+        raise DamagedError('its checksum does not match')
     return content
 
 
@@ -272,14 +299,14 @@ def attachment_at(source: RecordSource, at: int) -> tuple[Attachment, int, int]:
     content = source.read(begin - 16, end - begin + 16)
     (crc,) = _INT.unpack(source.read(end, _INT.size))
     if crc and crc32(content) != crc:
-        raise DamagedError('its checksum does not fit')
+        raise DamagedError('its checksum does not match')
     # If the length is damaged, zeros of the content may take the place of the checksum.
     if not crc and source.read_head(at)[1] != end + _INT.size:
-        raise DamagedError('is not as long as it says')
+        raise DamagedError('does not have its stated length')
     try:
         attachment = Attachment.read(ReadDataStream(BytesIO(content + _INT.pack(crc))))
     except UnicodeDecodeError:
-        raise DamagedError('has a name that is no text') from None
+        raise DamagedError('has a name that is not UTF-8') from None
     return attachment, end + _INT.size, crc
 
 
@@ -318,43 +345,23 @@ def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add_record(opcode, content[at:end])
         elif not opcode:  # a zeroed area may hold millions of such records
-            raise DamagedError('holds a record of no kind')
+            raise DamagedError('contains a record without a type')
         at = end
 
 
 def message_of(content: bytes, at: int, end: int, definitions: Definitions) -> Message:
     """Parse the message in this range of bytes."""
     if end - at < _MESSAGE.size:
-        raise DamagedError('holds a message without its times')
+        raise DamagedError('contains a message that ends before its timestamps')
     number, sequence, log_time, publish_time = _MESSAGE.unpack_from(content, at)
     channel = definitions.channels.get(number)
     if channel is None:
-        raise DamagedError(f'holds a message of channel {number}, which is nowhere described')
+        raise DamagedError(f'contains a message of channel {number}, which is not defined')
     begin = at + _MESSAGE.size
     return Message(channel, sequence, log_time, publish_time, content[begin:end])
 
 
 FoundRecord = Message | Attachment | Metadata
-
-_INDEX = Struct('<HI')
-_CRC = Struct('<I')
-_WINDOW = 2**20
-
-MOST_UNPACKED, MOST_TIMES = 2**30, 1000
-"""
-What the chunks of a file may make together when unpacked: so many bytes, or so many times the
-file's. A megabyte of zstd can hold fifty gigabytes of zeros.
-"""
-_ELSEWHERE = {
-    0,
-    Opcode.FOOTER,
-    Opcode.STATISTICS,
-    Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX,
-    Opcode.SUMMARY_OFFSET,
-}
-"""Kinds of records that no data section contains."""
 
 
 class DataSection:
@@ -363,17 +370,8 @@ class DataSection:
 
     Content with a checksum is returned only if the checksum matches. Messages outside of chunks,
     and chunks without a checksum, are returned if the whole data section has a matching checksum,
-    or if the file has no checksum at all; then they are counted in `unchecked`.
-
-    Parameters
-    ----------
-    source
-        The file.
-    definitions
-        Schemas and channels that are known already.
-    index_start
-        Position of the file's index, directly after the data section; 0 if unknown.
-
+    or if the file has no checksum at all; then they are counted in `unchecked`. ``index_start`` is
+    the position of the file's index, directly after the data section; 0 if unknown.
     """
 
     def __init__(
@@ -396,20 +394,10 @@ class DataSection:
 
     def read_record(self, at: int) -> tuple[Iterable[FoundRecord], int]:
         """
-        Read the record at a position.
+        Return the content of the record at a position, and the position of the next record.
 
-        Returns
-        -------
-        found
-            Its content, to be consumed before the next call, since it may define channels.
-        end
-            Position of the next record.
-
-        Raises
-        ------
-        DamagedError
-            It is incomplete or invalid; also raised while `found` is consumed.
-
+        Consume the content before the next call: it may define channels. `DamagedError` is raised
+        for an incomplete or invalid record, also while the content is consumed.
         """
         opcode, end = self.source.read_head(at)
         if opcode == Opcode.CHUNK:
@@ -420,14 +408,14 @@ class DataSection:
         if opcode == Opcode.ATTACHMENT:
             attachment, inner, crc = attachment_at(self.source, at)
             if not crc and self._crc_seen and not self.has_checksum():
-                raise DamagedError('has no checksum, others have')
+                raise DamagedError('has no checksum, but others have one')
             self._crc_seen |= bool(crc)
             self._ends_at_content(at, inner, end, crc)
             return (attachment,), inner
         if opcode == Opcode.MESSAGE and not self.allows_unchunked:
             raise DamagedError('is a message outside of the chunks')
         if opcode in _ELSEWHERE:
-            raise DamagedError('is of a kind that is not for this place')
+            raise DamagedError('has a record type that is not allowed here')
         content = self.source.read(at + HEAD.size, end - at - HEAD.size)
         found: tuple[FoundRecord, ...] = ()
         if opcode == Opcode.MESSAGE:
@@ -445,13 +433,13 @@ class DataSection:
                 or len(content) % 16 != _INDEX.size
                 or (_INDEX.unpack_from(content)[1] != len(content) - _INDEX.size)
             ):
-                raise DamagedError('is no index of messages')
+                raise DamagedError('is not a valid message index')
         elif opcode == Opcode.DATA_END:
             if len(content) != _CRC.size:
-                raise DamagedError('is no end of the data')
+                raise DamagedError('is not the end of the data')
             self.finished, self._end = True, at
         elif is_whole_chunk(self.source, at) or is_whole_attachment(self.source, at):
-            raise DamagedError('is a chunk or an attachment that calls itself something else')
+            raise DamagedError('is a chunk or an attachment with another record type')
         else:
             self.unknown.append((at, end))
         return found, end
@@ -460,17 +448,17 @@ class DataSection:
         """Return a chunk's messages; `fits`: it begins and ends where its record does."""
         if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
             raise DamagedError(
-                f'would make more than {self._unpacked:,} bytes of a file of '
-                f'{self.source.size:,}: no recording packs so well'
+                f'would unpack to more than {self._unpacked:,} bytes, from a file of '
+                f'{self.source.size:,}: no recording packs as densely'
             )
         content = content_of(chunk)
         self._unpacked += len(content)
         if not chunk.crc and content:
             if not fits:
-                raise DamagedError('is not as long as it says')
+                raise DamagedError('does not have its stated length')
             # No writer gives a checksum to only some of the chunks.
             if self._crc_seen and not self.has_checksum():
-                raise DamagedError('has no checksum, others have')
+                raise DamagedError('has no checksum, but others have one')
             known = Definitions()
             known.schemas |= self.definitions.schemas
             known.channels |= self.definitions.channels
@@ -489,13 +477,13 @@ class DataSection:
             try:
                 end = self._end or self._find_end()
                 if self.source.read_head(end) != (Opcode.DATA_END, end + HEAD.size + _CRC.size):
-                    raise DamagedError('is no end of the data')
+                    raise DamagedError('is not the end of the data')
                 (crc,) = _CRC.unpack(self.source.read(end + HEAD.size, _CRC.size))
             except DamagedError:
                 crc = 0
             self._covered = bool(crc)
             if crc and crc != self._crc_to(end):
-                self._checksum_error = DamagedError('the checksum of all data does not fit')
+                self._checksum_error = DamagedError('the checksum of all data does not match')
                 raise self._checksum_error
         return self._covered
 
@@ -518,7 +506,7 @@ class DataSection:
         if inner == end:
             return True
         if not crc:
-            raise DamagedError('is not as long as it says')
+            raise DamagedError('does not have its stated length')
         self.wrong_lengths.append(at)
         return False
 
@@ -531,26 +519,6 @@ def definitions_in(content: bytes) -> Definitions:
         while not data.finished:
             _, at = data.read_record(at)
     return definitions
-
-
-_FOOTER = Struct('<BQQQI')
-"""Kind, length, start of the index and of its second part, checksum."""
-
-_KINDS: dict[int, Any] = {
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.STATISTICS: Statistics,
-}
-
-_PLACES = {
-    Opcode.CHUNK_INDEX: 'chunk_start_offset',
-    Opcode.ATTACHMENT_INDEX: 'offset',
-    Opcode.METADATA_INDEX: 'offset',
-}
-
-MOST_RECORDS = 1_000_000
-"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class FileIndex(NamedTuple):
@@ -572,13 +540,13 @@ def index_of(source: RecordSource) -> FileIndex:
     footer = source.read(footer_at, _FOOTER.size)
     opcode, length, start, _, crc = _FOOTER.unpack(footer)
     if (opcode, length) != (Opcode.FOOTER, _FOOTER.size - HEAD.size):
-        raise DamagedError('its last record is no footer')
+        raise DamagedError('its last record is not a footer')
     start = start or footer_at
     if start > footer_at:
-        raise DamagedError('its index begins behind the end')
+        raise DamagedError('its index begins after the footer')
     content = source.read(start, footer_at - start)
     if crc and crc32(footer[:-4], crc32(content)) != crc:
-        raise DamagedError("its index's checksum does not fit")
+        raise DamagedError('the checksum of its index does not match')
     definitions = Definitions()
     by_kind: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
     places = set()

@@ -37,6 +37,24 @@ _NAME = '/_'
 _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
 """Names that YAML writes unquoted; asking yaml would take a millisecond for each."""
 
+_PREFIX = 'linkage_ros.'
+
+STATS_RECORD = f'{_PREFIX}account'
+"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
+
+DISCARDED = f'{_PREFIX}let_go'
+"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
+
+FAILURE = f'{_PREFIX}failure'
+"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
+
+UNFINISHED = f'{_PREFIX}unfinished'
+"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
+
+UNFINISHED_DATA: Mapping[str, str] = {
+    UNFINISHED: 'being recorded, or killed; the counts are from the last flush'
+}
+
 
 @dataclass(frozen=True, slots=True)
 class BagSummary:
@@ -64,18 +82,10 @@ def qos_text(qos: QosProfile) -> str:
 
 def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool = True) -> str:
     """
-    Return the text of ``metadata.yaml``.
+    Return the text of ``metadata.yaml``, with ``custom`` as its ``custom_data``.
 
-    Parameters
-    ----------
-    summary
-        Summary of the bag.
-    custom
-        Content of ``custom_data``.
-    root
-        Whether to write the root key: rosbag2 writes it in the file, and omits it in the MCAP
-        file's own ``serialized_metadata``.
-
+    rosbag2 writes the root key in the file, and omits it in the MCAP file's own
+    ``serialized_metadata``.
     """
     files = summary.parts or (summary,)
     topics = [
@@ -130,15 +140,7 @@ def merge_summaries(
 
 
 def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
-    """
-    Write ``metadata.yaml`` atomically: at every instant the whole old or new file is there.
-
-    Raises
-    ------
-    OSError
-        As the system raises it; an old file is unchanged.
-
-    """
+    """Write ``metadata.yaml`` atomically; an `OSError` leaves an old file unchanged."""
     target = summary.folder / METADATA_FILE
     temporary = target.with_suffix('.yaml.tmp')
     try:
@@ -148,7 +150,7 @@ def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
             while rest:
                 count = file.write(rest)
                 if not count:
-                    raise OSError(errno.EIO, 'the disk takes nothing')
+                    raise OSError(errno.EIO, 'the disk accepts no data')
                 rest = rest[count:]
             os.fsync(file.fileno())
         temporary.replace(target)
@@ -187,7 +189,7 @@ def _describe_topic(topic: Topic) -> str:
 
 
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
-    # The keys of a file are in another order than those of the bag, as rosbag2 writes them.
+    # rosbag2 writes the keys of a file in another order than the keys of the bag.
     return _path_text(file) + _indent(
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
         f'duration:\n  nanoseconds: {duration}\n'
@@ -218,25 +220,6 @@ def _dump_yaml(content: Any) -> str:
     return text
 
 
-_PREFIX = 'linkage_ros.'
-
-STATS_RECORD = f'{_PREFIX}account'
-"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
-
-DISCARDED = f'{_PREFIX}let_go'
-"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
-
-FAILURE = f'{_PREFIX}failure'
-"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
-
-UNFINISHED = f'{_PREFIX}unfinished'
-"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
-
-UNFINISHED_DATA: Mapping[str, str] = {
-    UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'
-}
-
-
 class RecordingStats(NamedTuple):
     """Messages by topic: ``received == recorded + dropped + discarded``."""
 
@@ -250,19 +233,7 @@ class RecordingStats(NamedTuple):
 def custom_data(
     custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
 ) -> dict[str, str]:
-    """
-    Return the ``custom_data`` of a bag's metadata.
-
-    Parameters
-    ----------
-    custom
-        Further entries.
-    summary
-        Summary of the bag.
-    account
-        The statistics; None while they are unknown.
-
-    """
+    """Return a bag's ``custom_data``: ``custom``, and the statistics once they are known."""
     entries = dict(custom)
     if any(summary.discarded):
         entries[DISCARDED] = _by_topic(summary.discarded, summary)

@@ -53,16 +53,7 @@ class LogTimeOrder:
     """
     Messages of a bag, ordered by log time.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-
-    Raises
-    ------
-    BagError
-        A file cannot be read, or its beginning is damaged.
-
+    Raise `BagError` if a file cannot be read, or if its beginning is damaged.
     """
 
     def __init__(self, bag: Bag) -> None:
@@ -89,15 +80,7 @@ class LogTimeOrder:
         self.begin = first.log_time if first else None
 
     def messages(self, since: int = 0) -> Iterator[BagMessage]:
-        """
-        Yield the messages from a log time on, in [ns].
-
-        Raises
-        ------
-        BagError
-            A file is damaged; the messages before the damage have been yielded by then.
-
-        """
+        """Yield the messages from a log time [ns] on; raise `BagError` where a file is damaged."""
         yield from merge(
             self._read_indexed(since),
             self._order_messages(
@@ -143,7 +126,7 @@ class LogTimeOrder:
             raise BagError(
                 self._path,
                 f'more than {MOST_HELD:,} bytes of its messages are not in the order of time',
-                'write it anew in that order',
+                'write it again in this order',
             )
         return held
 
@@ -164,7 +147,7 @@ class LogTimeOrder:
             raise BagError(
                 file,
                 f'is damaged: the chunk at byte {place:,} {error}',
-                'linkage recover saves what is whole',
+                'linkage recover saves the whole parts',
             ) from None
 
 

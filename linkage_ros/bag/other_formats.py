@@ -27,10 +27,10 @@ from linkage_ros.errors import BagError
 
 MCAP_SUFFIXES = '.mcap', '.mcap.zstd'
 BAG_SUFFIXES = *MCAP_SUFFIXES, '.db3', '.db3.zstd', '.bag'
-"""Ends of the names of files that are bags, or parts of one; those of MCAP are read."""
+"""Suffixes of files that are bags, or parts of one; MCAP files are read."""
 
 MOST_UNPACKED, MOST_TIMES = 256 * 2**20, 200
-"""What a packed file may make: so many bytes, or so many times its own size."""
+"""Bounds on the unpacked size of a file: bytes, or multiples of its own size."""
 
 _ZSTD = b'\x28\xb5\x2f\xfd'
 _PIECE = 2**20
@@ -44,8 +44,8 @@ _ROS_1 = (
     'ros2 bag convert does not read ROS 1)'
 )
 _OTHERS = {
-    b'SQLite format 3\0': ('is a bag in SQLite (.db3), and no MCAP file', _SQLITE),
-    b'#ROSBAG': ('is a bag of ROS 1, and no MCAP file', _ROS_1),
+    b'SQLite format 3\0': ('is a bag in SQLite (.db3), not an MCAP file', _SQLITE),
+    b'#ROSBAG': ('is a bag of ROS 1, not an MCAP file', _ROS_1),
 }
 
 LONGEST_MAGIC = max(map(len, _OTHERS))
@@ -68,11 +68,7 @@ def unpacked_file(file: Path) -> Path:
     """
     Return a file, or the unpacked one if it is packed with zstd.
 
-    Raises
-    ------
-    BagError
-        It is damaged from its start, or would be too large, or there is no room for it.
-
+    Raise `BagError` if it is damaged from its start or too large, or if there is no space for it.
     """
     try:
         if not file.is_file():
@@ -92,7 +88,7 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
         zstandard: Any = import_module('zstandard')
     except ImportError:
         raise BagError(
-            file, 'is packed with zstd, and Python knows no zstandard', 'install zstandard'
+            file, 'is packed with zstd, and the Python package is missing', 'install zstandard'
         ) from None
     most = max(MOST_UNPACKED, MOST_TIMES * size)
     name = file.name.removesuffix('.zstd')
@@ -105,8 +101,8 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
                 if most < 0:
                     raise BagError(
                         file,
-                        f'would be more than {content.tell():,} bytes unpacked: no recording '
-                        'packs so well',
+                        f'would unpack to more than {content.tell():,} bytes: no recording '
+                        'packs as densely',
                         'ask who made it',
                     )
                 content.write(piece)
@@ -116,7 +112,7 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
         raise BagError(
             file,
             f'cannot be unpacked: {error.strerror or error}',
-            'name a folder with room in TMPDIR',
+            'name a folder with free space in TMPDIR',
         ) from None
     return target
 

@@ -51,6 +51,23 @@ MOST_METADATA = 8 * 2**20
 
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
+_RECOGNISED = 512
+"""Length of the start by which a text file is recognised [bytes]."""
+
+RUN_FILE = 'run.json'
+"""Name of the attachment with the run's scene, topics and versions."""
+
+_RECOVER = 'linkage recover makes a complete bag from it'
+
+MOST_ATTACHED = 64 * 2**20
+"""Most bytes of a file's attachments in memory."""
+
+_LONGEST_QOS, _MOST_QOS = 1024, 64
+"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
+
+ProgressCallback = Callable[[int], None]
+"""Takes the number of bytes read of a file; an exception from it ends the reading."""
+
 
 def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
     """Return the ``custom_data`` of a bag's metadata: its plain values, as strings."""
@@ -61,7 +78,7 @@ def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
 
 
 def information_of(folder: Path) -> dict[str, Any]:
-    """Return the content of ``metadata.yaml``; empty if it is missing, which is no error."""
+    """Return the content of ``metadata.yaml``; empty if it is missing."""
     file = folder / METADATA_FILE
     try:
         text = read_regular(file, MOST_METADATA)
@@ -146,17 +163,13 @@ def is_empty(file: Path) -> bool:
         return False
 
 
-_RECOGNISED = 512
-"""Length of the start by which a text file is recognised [bytes]."""
-
-
 def is_finished(file: Path) -> bool:
     """Return whether an MCAP file is complete; raise if it is not an MCAP file."""
     length = len(MCAP0_MAGIC)
     try:
         if file.exists() and not file.is_file():
             # Opening a pipe would wait for a writer.
-            raise BagError(file, 'is no file', "name a bag's folder, or its file")
+            raise BagError(file, 'is not a file', "name a bag's folder, or its file")
         with file.open('rb') as stream:
             start = stream.read(_RECOGNISED)
             size = stream.seek(0, SEEK_END)
@@ -174,7 +187,7 @@ def is_finished(file: Path) -> bool:
         binary = kind.noun == BINARY.noun
         found = f'starts with {quote(start[:length])}' if binary else f'is {kind.noun}'
         raise BagError(
-            file, f'{found}, and no MCAP file', "name a bag's folder, or its .mcap file"
+            file, f'{found}, not an MCAP file', "name a bag's folder, or its .mcap file"
         )
     return size > length and end == MCAP0_MAGIC
 
@@ -241,21 +254,6 @@ def footer_metadata(file: Path) -> FooterMetadata:
     return FooterMetadata(custom, accounted)
 
 
-RUN_FILE = 'run.json'
-"""Name of the attachment with the run's scene, topics and versions."""
-
-_RECOVER = 'linkage recover makes a whole bag of what is there'
-
-MOST_ATTACHED = 64 * 2**20
-"""Most bytes of a file's attachments in memory."""
-
-_LONGEST_QOS, _MOST_QOS = 1024, 64
-"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
-
-ProgressCallback = Callable[[int], None]
-"""Takes the number of bytes read of a file; an exception from it ends the reading."""
-
-
 class BagMessage(NamedTuple):
     """A message: name of the topic, log and publish time [ns], and its CDR bytes."""
 
@@ -283,7 +281,7 @@ class Bag:
     passed_over
         Names of the attachments that are not read, since they exceed this limit.
     custom
-        ``custom_data`` of its metadata; without metadata, that of its last file.
+        ``custom_data`` of its metadata; without metadata, the custom data of its last file.
     truncated
         Whether an end is missing, since the recording was killed or is still running: the end of a
         file, or a further file of a bag whose files are complete.
@@ -457,10 +455,10 @@ def _read_contents(
             return
         data.has_checksum()
         if at != index.start:
-            raise DamagedError('its index begins elsewhere than it says')
+            raise DamagedError('its index does not begin at the stated position')
         promised = index.statistics
         if promised and promised.message_count != messages:
-            raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
+            raise DamagedError(f'{messages:,} of {promised.message_count:,} messages are there')
 
 
 @contextmanager
@@ -471,7 +469,7 @@ def _translate_errors(file: Path) -> Iterator[None]:
         raise unreadable_error(file, error) from None
     except DamagedError as error:
         raise BagError(
-            file, f'is damaged: {error}', 'linkage recover saves what is whole'
+            file, f'is damaged: {error}', 'linkage recover saves the whole parts'
         ) from None
 
 
@@ -496,5 +494,5 @@ def _parse_qos(text: str) -> QosProfile:
             raise ValueError
         return QosProfile.from_mapping(bounded_yaml(first, _MOST_QOS)[0])
     except Exception:  # noqa: BLE001 (yaml and its numbers raise many kinds)
-        # An invalid QoS is no reason to refuse the messages.
+        # The messages are read even if their QoS is invalid.
         return QosProfile(understood=not text)

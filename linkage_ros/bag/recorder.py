@@ -82,13 +82,7 @@ class MessageQueue:
     """
     Queue of messages to one thread, with counts of offered and dropped messages by topic.
 
-    Parameters
-    ----------
-    topics
-        Number of topics.
-    capacity
-        Messages that may wait, each of up to `PLACE` bytes; a larger one counts as several.
-
+    ``capacity`` messages may wait, each of up to `PLACE` bytes; a larger one counts as several.
     """
 
     def __init__(self, topics: int, capacity: int) -> None:
@@ -105,16 +99,8 @@ class MessageQueue:
         """
         Hand over one message, from any thread; never blocks, and never raises on a disk error.
 
-        Parameters
-        ----------
-        topic
-            The topic's number.
-        log_time, publish_time
-            Time of reception, and time at the source [ns].
-        data
-            The CDR bytes. They are kept, not copied: pass ``bytes(buffer)`` for a buffer that is
-            reused.
-
+        Log time and publish time are in [ns]. The CDR bytes are kept, not copied: pass
+        ``bytes(buffer)`` for a buffer that is reused.
         """
         self._add_received[topic]()
         if not self.is_open or len(self._waiting) >= self._capacity:
@@ -168,18 +154,11 @@ class RecordingSummary:
 
 class Recorder:
     """
-    Writes a bag on its own thread.
+    Writes a bag on its own thread; owns the writer from now on.
 
-    Parameters
-    ----------
-    writer
-        The open bag, which the recorder owns from now on.
-    capacity
-        Messages that may wait, each of up to 16 KiB; a larger one counts as several. The default
-        is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
-    flush_period
-        Time whose messages a power cut may lose [s], if the disk answers within a tenth of it.
-
+    ``capacity`` messages may wait, each of up to 16 KiB; a larger one counts as several. The
+    default is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most. A power cut may lose
+    the messages of the last ``flush_period`` [s], if the disk answers within a tenth of this time.
     """
 
     def __init__(
@@ -210,7 +189,7 @@ class Recorder:
     def read_counts(self) -> tuple[TopicCounts, ...]:
         """Return the current counts; after a failure, ``recorded`` counts the messages kept."""
         counts = []
-        # Read first, so that no message is let go before it is recorded.
+        # Read first, so that no message is discarded before it is recorded.
         discarded = self._writer.discarded
         opened = self._writer.opening_counts
         taken, lost = self._taken_and_lost
@@ -230,14 +209,8 @@ class Recorder:
         """
         Write the waiting messages, close the bag and return the outcome; raises nothing.
 
-        Parameters
-        ----------
-        custom
-            Additional entries for ``custom_data`` of the bag's metadata.
-        timeout
-            Longest wait for a disk that does not answer [s]. After it, the summary counts only
-            flushed messages as recorded.
-
+        ``custom`` is added to ``custom_data`` in the bag's metadata. After ``timeout`` [s] without
+        an answer from the disk, the summary counts only flushed messages as recorded.
         """
         if self._summary:
             return self._summary

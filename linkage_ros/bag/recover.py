@@ -55,6 +55,12 @@ RECOVERED = 'linkage_ros.recovered'
 NOTHING_LOST = 'nothing lost'
 """End of that text if nothing was lost."""
 
+MOST_CHANNELS = 10_000
+"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
+
+ProgressCallback = Callable[[int, int], None]
+Stopped = Callable[[], bool]
+
 
 class TopicRecovery(NamedTuple):
     """Numbers of messages of a topic: saved, and originally present (None if unknown)."""
@@ -105,30 +111,12 @@ def expected_counts(information: Mapping[str, Any]) -> dict[str, int]:
     return counts if any(counts.values()) else {}
 
 
-MOST_CHANNELS = 10_000
-"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
-
-
 class RecoveredBag:
     """
-    A new bag that is open for writing.
+    A new bag in an empty folder that is open for writing, with compression '', 'lz4' or 'zstd'.
 
-    Parameters
-    ----------
-    folder
-        Its folder, which exists and is empty.
-    profile
-        The profile of its file: 'ros2'.
-    compression
-        Compression of chunks: '', 'lz4' or 'zstd'.
-
-    Raises
-    ------
-    OSError
-        As the system raises it, here and in all methods that write.
-    BagError
-        From `add_item` and `add_channels`: more than `MOST_CHANNELS` channels.
-
+    Methods that write raise `OSError`; `add_item` and `add_channels` raise `BagError` for more
+    than `MOST_CHANNELS` channels.
     """
 
     def __init__(self, folder: Path, profile: str, compression: str) -> None:
@@ -223,7 +211,7 @@ class RecoveredBag:
             if len(self._channels) == MOST_CHANNELS:
                 raise BagError(
                     self._folder,
-                    f'would hold more than {MOST_CHANNELS:,} channels; no more are recovered',
+                    f'would contain more than {MOST_CHANNELS:,} channels; no more are recovered',
                     'no ROS graph has as many: ask who made the bag',
                 )
             number = 0
@@ -250,10 +238,6 @@ class RecoveredBag:
         )
 
 
-ProgressCallback = Callable[[int, int], None]
-Stopped = Callable[[], bool]
-
-
 class _Findings:
     """Collected losses, repairs and remarks."""
 
@@ -278,27 +262,12 @@ def recover_bag(
     stopped: Stopped = lambda: False,
 ) -> Recovery | None:
     """
-    Save the whole parts of a bag to a new bag.
+    Save the whole parts of a bag to a new bag, by default at `recovered_name`.
 
-    Parameters
-    ----------
-    path
-        The bag's folder, or an MCAP file.
-    target
-        The new folder; by default `recovered_name`.
-    progress
-        Progress callback; receives the number of bytes examined and the total.
-    stopped
-        Returns whether to stop; then nothing is left behind, and the result is None.
-
-    Raises
-    ------
-    BagError
-        It is no bag, leads out of its folder, has too many channels, or no part of it is whole.
-        Nothing was written.
-    RecordingError
-        The new folder exists or cannot be written to. Nothing is left behind.
-
+    ``progress`` receives the number of bytes examined and the total; if ``stopped`` returns True,
+    the result is None and nothing is left behind. Raise `BagError` if it is not a bag, leads out
+    of its folder, has too many channels or has no whole part, and `RecordingError` if the new
+    folder exists or cannot be written to.
     """
     target = target or recovered_name(path)
     findings = _Findings()
@@ -362,7 +331,7 @@ def _find_files(path: Path, information: Mapping[str, Any], findings: _Findings)
                     refuse_other_format(file, stream.read(LONGEST_MAGIC))
                 present.append(file)
                 continue
-            reason = 'is no file' if file.exists() else 'does not exist'
+            reason = 'is not a file' if file.exists() else 'does not exist'
         except OSError as error:
             reason = unreadable_error(file, error).reason
         if len(files) == 1:
@@ -410,7 +379,7 @@ def _why_nothing(file: Path, salvage: Salvage) -> str:
     if not start:
         return f'{file.name} is empty'
     if BEGINNING in salvage.repaired:
-        return f'{file.name} starts with {quote(start)}, as no MCAP file does'
+        return f'{file.name} starts with {quote(start)}, unlike an MCAP file'
     if salvage.losses:
         loss = salvage.losses[0]
         return f'{file.name} at byte {loss.start:,}: {loss.reason}'
@@ -434,8 +403,7 @@ def _copy_file(file: Path, bag: RecoveredBag, findings: _Findings) -> Iterator[i
     findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
     if salvage.data.unchecked:
         findings.remarks.append(
-            f'{file.name}: {salvage.data.unchecked:,} messages that no checksum covers, taken as '
-            'they stand'
+            f'{file.name}: {salvage.data.unchecked:,} messages without a checksum, kept unchecked'
         )
     statistics = salvage.index.statistics if salvage.index else None
     if statistics is None:
@@ -485,7 +453,7 @@ def _known_expected_count(
 @contextmanager
 def _new_folder(target: Path) -> Iterator[None]:
     """Create a folder; remove it again if the body fails."""
-    remedy = 'name a folder on a disk with room, with -o'
+    remedy = 'name a folder on a disk with free space, with -o'
     try:
         target.mkdir(parents=True)
     except FileExistsError:

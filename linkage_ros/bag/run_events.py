@@ -39,6 +39,19 @@ _LONGEST_ACCOUNT = 4 * 2**20
 
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
+_TEXTS = (
+    'scene',
+    'scene_folder',
+    'crank_topic',
+    'joint_states_topic',
+    'faults_topic',
+    'withheld_topic',
+    'resets_topic',
+)
+"""Keys of the account that are also fields of `RunMetadata`."""
+
+_NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
+
 
 class SampleEvent(NamedTuple):
     """Crank message that a tick took, with the tick's time and the source's, in [ns]."""
@@ -55,7 +68,7 @@ class WrenchEvent(NamedTuple):
     log_time: int
     publish_time: int
     data: bytes  # The message
-    number: int  # Index of its topic among those of the run
+    number: int  # Index of its topic among the run's topics
 
 
 class FaultEvent(NamedTuple):
@@ -91,7 +104,7 @@ Event = SampleEvent | WrenchEvent | FaultEvent | ResetEvent | TickEvent
 class RunMetadata(NamedTuple):
     """The run's account in its bag; '' for missing topics."""
 
-    # Name of the scene, and the folder for its paths, relative to that of the bag; '' without any.
+    # Name of the scene, and the folder for its paths, relative to the bag's folder; '' if unknown.
     scene: str = ''
     scene_folder: str = ''
     # Names of the topics.
@@ -124,15 +137,7 @@ class RunFiles(Protocol):
 
 
 def read_run_metadata(bag: RunFiles) -> RunMetadata:
-    """
-    Return the run's account in its bag.
-
-    Raises
-    ------
-    BagError
-        There is none, or it is damaged.
-
-    """
+    """Return the run's account in its bag; raise `BagError` if it is missing or damaged."""
     if RUN_FILE not in bag.attachments:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
@@ -170,20 +175,8 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
     )
 
 
-_TEXTS = (
-    'scene',
-    'scene_folder',
-    'crank_topic',
-    'joint_states_topic',
-    'faults_topic',
-    'withheld_topic',
-    'resets_topic',
-)
-"""Keys of the account that are also fields of `RunMetadata`."""
-
-
 def _are_names(values: Any) -> bool:
-    # A string that is not printable is no topic, and some cannot be stored in a bag.
+    # A string that is not printable is not a topic, and some cannot be stored in a bag.
     return isinstance(values, list) and all(
         isinstance(value, str) and value.isprintable() for value in values
     )
@@ -208,17 +201,8 @@ def recorded_events(
     """
     Combine the messages of a bag into the events of the run, in order.
 
-    Parameters
-    ----------
-    run
-        The run's account of itself.
-    is_own
-        Recognises the run's own joint states where they share a topic with crank samples.
-    messages
-        Messages of the bag.
-    crank_topic
-        Topic of the crank samples; by default that of the run.
-
+    ``is_own`` recognises the run's own joint states where they share a topic with crank samples;
+    the samples are on ``crank_topic``, by default the run's own.
     """
     crank = run.crank_topic if crank_topic is None else crank_topic
     shared = run.crank_topic == run.joint_states_topic
@@ -267,24 +251,11 @@ def recorded_events(
         yield TickEvent(log, time, tuple(made))
 
 
-_NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
-
-
 def missing_start_reason(bag: Bag, run: RunMetadata) -> str:
-    """
-    Return text on why the first messages of a run are not in its bag; '' if they are.
-
-    Parameters
-    ----------
-    bag
-        The bag.
-    run
-        The run's account in it.
-
-    """
+    """Return why the first messages of a run are not in its bag; '' if they are."""
     discarded = sum(counts_in(bag.custom, 'let_go').values())
     if discarded:
-        return f'its first {discarded} messages have made way for newer ones'
+        return f'its first {discarded} messages were removed for newer ones'
     if run.begun == MID_RUN:
         return 'begun in mid-run'
     first = bag.files[0].name

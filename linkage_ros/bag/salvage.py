@@ -57,13 +57,25 @@ _BEGINNING = re.compile(rb'[\x06\x09](?=.{4}\x00{4})|' + re.escape(MCAP0_MAGIC),
 _MOST_IN_VAIN = 16
 """Limit for reading false candidates of chunks, in multiples of the file size."""
 
+_INT = Struct('<I')
+_CHECKSUM_PLACE = HEAD.size + 24
+_KINDS = {
+    ChunkIndex: Opcode.CHUNK,
+    AttachmentIndex: Opcode.ATTACHMENT,
+    MetadataIndex: Opcode.METADATA,
+}
+_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
+_IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
+
+BEGINNING = 'the MCAP magic at the beginning'
+
 
 def find_next_whole(source: RecordSource, at: int) -> int:
     """
     Return the position of the next chunk or attachment; the file's size if there is none.
 
     A candidate must have a matching checksum. A whole MCAP file within the file, as in an
-    attachment, is skipped: its messages are not those of this file.
+    attachment, is skipped: its messages are not in this file.
     """
     budget = _MOST_IN_VAIN * source.size + LARGEST
     while at < source.size:
@@ -120,19 +132,6 @@ def _end_of_file_at(source: RecordSource, at: int) -> int:
     return 0
 
 
-_INT = Struct('<I')
-_CHECKSUM_PLACE = HEAD.size + 24
-_KINDS = {
-    ChunkIndex: Opcode.CHUNK,
-    AttachmentIndex: Opcode.ATTACHMENT,
-    MetadataIndex: Opcode.METADATA,
-}
-_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
-_IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
-
-BEGINNING = 'the beginning, which is not that of an MCAP file'
-
-
 class LostRange(NamedTuple):
     """Lost bytes of a file, from `start` to before `end`, and the reason."""
 
@@ -142,15 +141,7 @@ class LostRange(NamedTuple):
 
 
 class Salvage:
-    """
-    Finds the whole records of a file, once.
-
-    Parameters
-    ----------
-    source
-        The file, with its size at the time of opening.
-
-    """
+    """Finds the whole records of a file, up to its size at the time of opening, once."""
 
     def __init__(self, source: RecordSource) -> None:
         self.examined_to = 0  # Position up to which it has been examined
@@ -189,7 +180,7 @@ class Salvage:
                 self._add_loss(at, end, str(error))
             else:
                 if self.data.unknown[-1:] == [(at, end)]:
-                    self._add_loss(at, end, 'is of a kind that nobody has defined')
+                    self._add_loss(at, end, 'has an undefined record type')
                 try:
                     yield from self._wanted_records(self._count_messages(records, end))
                 except DamagedError as error:
@@ -204,9 +195,9 @@ class Salvage:
         try:
             opcode, end = self._source.read_head(at)
             if promised and opcode != _KINDS[type(promised)]:
-                raise DamagedError('is not what the index says')
+                raise DamagedError('does not match the index')
             if opcode not in (Opcode.CHUNK, Opcode.ATTACHMENT) and end > self._next_place(at):
-                raise DamagedError('reaches into what the index says to be another')
+                raise DamagedError('overlaps the next record of the index')
             return self.data.read_record(at)
         except DamagedError:
             taken: tuple[Iterable[FoundRecord], int]
@@ -296,7 +287,7 @@ class Salvage:
         promised = self._expected.get(start)
         ours = (type(promised), getattr(promised, 'name', '')) in _MADE_ANEW
         if (self._all_known and not promised) or ours or end <= self._indexes_end:
-            self.repaired.append(f'what marks and describes, at byte {start:,}: {reason}')
+            self.repaired.append(f'descriptions or index, at byte {start:,}: {reason}')
         else:
             self.losses.append(LostRange(start, end, reason))
 
@@ -310,13 +301,13 @@ class Salvage:
         elif self.index is None:
             self.repaired.append('the index')
         elif self._source.read(size - length, length) != MCAP0_MAGIC:
-            self.repaired.append('the end, which is not that of an MCAP file')
+            self.repaired.append('the MCAP magic at the end')
         if self.losses:
             return
         promised = self.index.statistics if self.index else None
         missing = promised.message_count - self._messages if promised else 0
         if missing > 0:
-            reason = f'{missing:,} messages that the index counts are nowhere'
+            reason = f'{missing:,} messages that the index counts are missing'
             self.losses.append(LostRange(size, size, reason))
         try:
             _ = self.data.finished and self.data.has_checksum()

@@ -7,11 +7,11 @@
 # language governing permissions and limitations under the License.
 
 """
-Memory of the last seconds of a run, until a snapshot of it is written to a bag.
+Memory of the last seconds of a run, until a snapshot is written to a bag.
 
 `LastSeconds` packs the messages into blocks of bytes. They take half the memory of Python objects,
 the garbage collector has nothing to visit, and a snapshot only copies the list of blocks.
-`SnapshotMemory` fills it on its own thread; its `offer` is that of a recorder. `SnapshotWriting`
+`SnapshotMemory` fills it on its own thread; its `offer` works as a recorder's. `SnapshotWriting`
 writes a snapshot to a bag, on another thread.
 """
 
@@ -40,6 +40,15 @@ _BLOCKS_IN_SPAN = 16
 
 _JUMP = 1_000_000_000
 """A larger step back of log time is a jump of the clock, not a message out of order [ns]."""
+
+_WHERE = 'the memory of the last seconds'
+_BLOCKS = 16  # 1 MiB
+
+_AHEAD = 5000
+"""Most messages handed to the recorder that it has not written yet."""
+
+_PATIENCE = 10.0
+"""Longest wait for a disk that does not answer, in [s]."""
 
 
 class Extent(NamedTuple):
@@ -79,23 +88,13 @@ class KeptMessages(NamedTuple):
 
 class LastSeconds:
     """
-    Keeps messages, and removes those that are too old.
+    Keeps messages; removes those older than ``span`` [ns], and the oldest beyond ``most`` bytes.
 
     The age of a message is the time that has passed since, by the log times of the topic by which
     most time has passed. Where log times go back, no time passes: if by less than a second, until
     they reach the earlier value again; if by more, the clock has jumped, and time continues from
     there. So messages from before a jump are kept like all others, and differing clocks of the
     topics remove none.
-
-    Parameters
-    ----------
-    topics
-        Number of topics.
-    span
-        Greatest age of a message [ns].
-    most
-        Most memory for the messages [bytes]; if it is too little, the oldest are removed.
-
     """
 
     def __init__(self, topics: int, span: int, most: int) -> None:
@@ -183,51 +182,22 @@ class LastSeconds:
             self._newest, self._newest_size = [], 0
 
 
-_WHERE = 'the memory of the last seconds'
-_BLOCKS = 16  # 1 MiB
-
-
 class KeptCounts(NamedTuple):
-    """
-    Counts of one topic's messages: at every instant ``received == kept + discarded + dropped``.
-
-    Attributes
-    ----------
-    name
-        Name of the topic.
-    received
-        Messages offered.
-    kept
-        Messages in memory.
-    discarded
-        Messages that became too old, or were removed for lack of memory.
-    dropped
-        Messages that no bag can hold, or that came while the memory's thread was too slow.
-
-    """
+    """Counts of one topic's messages; always ``received == kept + discarded + dropped``."""
 
     name: str
-    received: int
-    kept: int
-    discarded: int
-    dropped: int
+    received: int  # Messages offered
+    kept: int  # Messages in memory
+    discarded: int  # Too old, or removed for lack of memory
+    dropped: int  # That no bag can hold, or that came while the memory's thread was too slow
 
 
 class SnapshotMemory:
     """
-    Memory of the last seconds of the offered messages, as in `LastSeconds`.
+    Memory of the last ``seconds`` [s] of the offered messages, as in `LastSeconds`.
 
-    Parameters
-    ----------
-    topics
-        Topics of the messages; the index in this sequence is the topic's number.
-    seconds
-        Greatest age of a message [s].
-    most
-        Most memory for the messages [bytes]; if it is too little, the oldest are removed.
-    capacity
-        Messages that may wait for the memory's thread; as for `Recorder`.
-
+    A topic's number is its index in ``topics``. If the messages need more than ``most`` bytes, the
+    oldest are removed. ``capacity`` is the same as for `Recorder`.
     """
 
     def __init__(
@@ -327,27 +297,8 @@ class SnapshotMemory:
             self._last.discarded[index] += counts.kept
 
 
-_AHEAD = 5000
-"""Most messages handed to the recorder that it has not written yet."""
-
-_PATIENCE = 10.0
-"""Longest wait for a disk that does not answer, in [s]."""
-
-
 class SnapshotWriting:
-    """
-    Writes a bag from memory on its own thread.
-
-    Parameters
-    ----------
-    kept
-        Content of the bag.
-    make_writer
-        Creates the bag; called on the writing thread.
-    on_done
-        Called on the writing thread when the outcome is ready.
-
-    """
+    """Writes a bag from memory on its own thread, which calls ``make_writer`` and ``on_done``."""
 
     def __init__(
         self, kept: KeptMessages, make_writer: Callable[[], BagWriter], on_done: Callable[[], None]

@@ -97,30 +97,15 @@ class QosProfile:
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """
-    A topic of a bag.
+    """A topic of a bag."""
 
-    Parameters
-    ----------
-    name
-        Absolute name: '/arm/joint_states'.
-    type
-        'sensor_msgs/msg/JointState'.
-    definition
-        Text of the type's ``.msg`` file, then for each type that it contains a line of 80 '=', a
-        line 'MSG: std_msgs/Header' and that type's text: MCAP's ``ros2msg``.
-    type_hash
-        'RIHS01_' and 64 hexadecimal digits (REP 2016).
-    qos
-        QoS offered by the publisher.
-
-    """
-
-    name: str
-    type: str  # noqa: A003
+    name: str  # Absolute: '/arm/joint_states'
+    type: str  # noqa: A003  # 'sensor_msgs/msg/JointState'
+    # Text of the type's .msg file, then for each type that it contains a line of 80 '=', a line
+    # 'MSG: std_msgs/Header' and that type's text: MCAP's ros2msg.
     definition: str
-    type_hash: str
-    qos: QosProfile = QosProfile()
+    type_hash: str  # 'RIHS01_' and 64 hexadecimal digits (REP 2016)
+    qos: QosProfile = QosProfile()  # Offered by the publisher
 
 
 def _to_time(nanoseconds: int) -> dict[str, int]:

@@ -55,26 +55,12 @@ class BagWriter:
     """
     A new bag that is open for writing; not thread-safe.
 
-    Parameters
-    ----------
-    folder
-        Folder of the bag. It is created here; an existing one is refused and not changed.
-    topics
-        Topics of the messages; the index in this sequence is the topic's number.
-    attachments
-        Name to (media type, content). Each file gets them, and its topics, so that each file is
-        complete in itself.
-    storage
-        Storage settings; the caller has to call `flush` every ``flush_period``.
-    opening
-        Topic number and CDR bytes of latched messages, written before the first message of each
-        file, with its log time.
-
-    Raises
-    ------
-    RecordingError
-        The folder exists, or cannot be created or written to. Nothing is left behind.
-
+    A topic's number is its index in ``topics``. Each file gets the ``attachments`` (name to media
+    type and content) and topics, so that it is complete in itself. ``opening`` (topic number and
+    CDR bytes of latched messages) is written before the first message of each file, with its log
+    time. The caller has to call `flush` every ``flush_period`` of the storage. Raise
+    `RecordingError`, which leaves nothing behind, if the folder exists, or cannot be created or
+    written to.
     """
 
     def __init__(
@@ -135,28 +121,12 @@ class BagWriter:
 
     def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
         """
-        Take a message; it is on the disk after the next `flush` at the latest.
+        Take a message (CDR with header, times in [ns]); return whether it was accepted.
 
-        Parameters
-        ----------
-        topic
-            The topic's number.
-        log_time, publish_time
-            Time of reception, and time at the source [ns].
-        data
-            The CDR bytes with their 4-byte header.
-
-        Returns
-        -------
-        bool
-            Whether the message was accepted. One whose times are negative or beyond 63 bits is
-            refused and counted: in mcap it would corrupt its chunk.
-
-        Raises
-        ------
-        RecordingError
-            The recording has ended, and the bag is closed as well as the disk allows.
-
+        The message is on the disk after the next `flush` at the latest. A message with negative
+        times, or times beyond 63 bits, is refused and counted: in mcap it would corrupt its chunk.
+        Raise `RecordingError` once the recording has ended; the bag is closed as well as the disk
+        allows.
         """
         if self._failure:
             raise self._failure
@@ -223,18 +193,10 @@ class BagWriter:
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
         """
-        Finish the bag and return its summary; after a failure, that of the messages kept.
+        Finish the bag and return its summary; after a failure, the summary of the messages kept.
 
-        Parameters
-        ----------
-        custom
-            Additional entries for ``custom_data`` of the bag's metadata.
-
-        Raises
-        ------
-        RecordingError
-            As for `write`, once; the next call returns the summary.
-
+        ``custom`` is added to ``custom_data`` in the bag's metadata. A `RecordingError` as for
+        `write` is raised once; the next call returns the summary.
         """
         if self._summary:
             return self._summary
@@ -398,7 +360,7 @@ class BagWriter:
         if error.errno in NO_ROOM:
             reason, remedy = 'the recording was interrupted', _GO_ON
         elif isinstance(error, LostError):
-            kept, remedy = 'what is left of it', _KEEP_OUT
+            kept, remedy = 'what is left', _KEEP_OUT
         return RecordingError(
             self.folder,
             f'{reason}: {error.strerror or error}',

@@ -42,6 +42,16 @@ JOINT_STATE = parse_declaration(
 )
 """``sensor_msgs/msg/JointState``."""
 
+_COUNT = Struct('<I')
+
+_NO_FRAME = pack_message(parse_declaration('Time stamp, string frame_id'), {})[STAMP_END:].ljust(
+    8, b'\0'
+)
+"""Bytes between the stamp and the count of the names: an empty frame_id."""
+
+_COUNT_AT = STAMP_END + len(_NO_FRAME)
+_FIRST_NAME = _COUNT_AT + _COUNT.size
+
 
 class Rejection(Enum):
     """Reason for the rejection of a message."""
@@ -147,15 +157,9 @@ def _sample_pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection
 
 class JointStateWriter(ArrayWriter):
     """
-    Writes messages for a fixed list of joints.
+    Writes messages for a fixed list of joints, in this order.
 
     Positions are in [rad] or [m], rates in [rad/s] or [m/s], efforts in [N·m] or [N].
-
-    Parameters
-    ----------
-    names
-        The joints, in the order of the message.
-
     """
 
     __slots__ = ()
@@ -184,12 +188,8 @@ class OwnJointStates:
     """
     Recognises the joint states of a scene among other messages on their topic, by their joints.
 
-    Parameters
-    ----------
-    linkages
-        The published joints of each linkage, in order. If there are several linkages, a message
-        may omit any that are open.
-
+    ``linkages`` are the published joints of each linkage, in order. If there are several linkages,
+    a message may omit any that are open.
     """
 
     __slots__ = ('_all', '_linkages')
@@ -217,17 +217,6 @@ class OwnJointStates:
                 at += len(names)
                 left -= joints
         return count > left == 0 and message.startswith(counted, at)
-
-
-_COUNT = Struct('<I')
-
-_NO_FRAME = pack_message(parse_declaration('Time stamp, string frame_id'), {})[STAMP_END:].ljust(
-    8, b'\0'
-)
-"""Bytes between the stamp and the count of the names: an empty frame_id."""
-
-_COUNT_AT = STAMP_END + len(_NO_FRAME)
-_FIRST_NAME = _COUNT_AT + _COUNT.size
 
 
 def _encode_names(joints: Sequence[str]) -> bytes:
@@ -266,21 +255,14 @@ class EffortCommand(NamedTuple):
 
 class JointEffortReader:
     """
-    Reads the effort of a joint from serialized messages.
+    Reads the effort of a joint, at any place in a message, from serialized messages.
 
     Controllers fill name and effort; positions and velocities may be present, and are ignored. So
     is the stamp: a command holds from its arrival. The topic-based hardware of ros2_control
     (joint_state_topic_hardware_interface 1.1.0) names all joints of a system, but gives efforts
     only for those that have a command, without saying which; a joint that depends on others has
-    none.
-
-    Parameters
-    ----------
-    joint
-        Name of the joint. A message may have it at any place among others.
-    dependent
-        Names of joints that cannot be commanded. A message may name them without an effort.
-
+    none. So a message may name the ``dependent`` joints, which cannot be commanded, without an
+    effort.
     """
 
     __slots__ = ('_dependent', '_joint', '_known')

@@ -9,7 +9,7 @@
 """
 Read three types of messages about joints, by joint and quantity, and write two of them.
 
-A message is parsed only if its layout differs from that of the previous one; else one call unpacks
+A message is parsed only if its layout differs from the previous one's; otherwise one call unpacks
 it. A ``sensor_msgs/msg/JointState`` is read completely. A ``trajectory_msgs/msg/JointTrajectory``
 must have one point, as in ``~/motion``: the state at an instant. A
 ``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``; the planar
@@ -67,6 +67,19 @@ NO_JOINTS = 'not about joints'
 Key = tuple[str, str]
 """A joint's name, and the quantity."""
 
+JOINT_TRAJECTORY = parse_declaration(
+    'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
+    JointTrajectoryPoint=parse_declaration(
+        'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
+        'Duration time_from_start'
+    ),
+)
+
+MULTI_DOF_JOINT_STATE = parse_declaration(
+    'Time stamp, string frame_id, string[] joint_names, '
+    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
+)
+
 
 class MessageContent(NamedTuple):
     """The values in a message."""
@@ -80,16 +93,10 @@ class MessageContent(NamedTuple):
 
 class MessageValues:
     """
-    Reads the numbers in the messages of one topic.
+    Reads the numbers in the messages of one topic, whose type is one of `TYPES`.
 
-    Parameters
-    ----------
-    message_type
-        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no numbers.
-    dependent
-        Names of joints that cannot be commanded. A JointState may name them without a number, as
-        in `JointEffortReader`.
-
+    Messages of other types have no numbers. A JointState may name the ``dependent`` joints, which
+    cannot be commanded, without a number, as in `JointEffortReader`.
     """
 
     __slots__ = ('_known', '_parse')
@@ -193,26 +200,11 @@ def _decode_names(names: Sequence[bytes]) -> list[str]:
     return [name.decode('utf-8', 'backslashreplace') for name in names]
 
 
-JOINT_TRAJECTORY = parse_declaration(
-    'Time stamp, string frame_id, string[] joint_names, JointTrajectoryPoint[] points',
-    JointTrajectoryPoint=parse_declaration(
-        'float64[] positions, float64[] velocities, float64[] accelerations, float64[] effort, '
-        'Duration time_from_start'
-    ),
-)
-
-
 class JointTrajectoryWriter(ArrayWriter):
     """
     Writes a JointTrajectory of a single point, the state of the joints at one instant.
 
     Positions are in [rad] or [m], rates and accelerations per [s] and [s²].
-
-    Parameters
-    ----------
-    names
-        The joints, in the order of the message.
-
     """
 
     __slots__ = ()
@@ -224,12 +216,6 @@ class JointTrajectoryWriter(ArrayWriter):
             'accelerations': 'accelerations',
         }
         super().__init__(JOINT_TRAJECTORY, {'joint_names': names}, arrays, 'points')
-
-
-MULTI_DOF_JOINT_STATE = parse_declaration(
-    'Time stamp, string frame_id, string[] joint_names, '
-    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
-)
 
 
 class PlanarWrenchWriter:
@@ -248,15 +234,9 @@ class PlanarWrenchWriter:
 
     def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
         """
-        Return a message.
+        Return a message with a wrench for each joint: force in x, y [N], torque about z [N·m].
 
-        Parameters
-        ----------
-        stamp
-            Time of the state, in [ns].
-        wrenches
-            One for each joint: force in x and y, in [N], and torque about z, in [N·m].
-
+        ``stamp`` is the time of the state, in [ns].
         """
         seconds, nanoseconds = divmod(stamp, NANOSECONDS)
         numbers: tuple[float, ...] = ()

@@ -73,15 +73,9 @@ class Field(NamedTuple):
 
 def parse_declaration(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
     """
-    Parse the declaration of a message.
+    Parse a declaration of fields: types and names as in a ``.msg`` file, separated by commas.
 
-    Parameters
-    ----------
-    text
-        Types and names of its fields, as in the ``.msg`` file, separated by commas.
-    nested
-        Declarations of nested message types.
-
+    ``nested`` are the declarations of nested message types.
     """
     fields = []
     for field in text.split(','):
@@ -173,14 +167,8 @@ def pack_message(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
     """
     Serialize a message, little-endian.
 
-    Parameters
-    ----------
-    fields
-        Its declaration.
-    values
-        Values by field name: a string, a number or a tuple of numbers, the values of a nested
-        message; sequences of these. A field without a value is zero, or empty.
-
+    A value is a string, a number or a tuple of numbers, the values of a nested message, or a
+    sequence of these. A field without a value is zero, or empty.
     """
     data = bytearray(ENCAPSULATION)
     _pack_fields(data, fields, values)
@@ -232,18 +220,9 @@ def compile_pattern(
     """
     Compile the layout of a message whose first field is a header.
 
-    Parameters
-    ----------
-    data
-        The message.
-    arrays
-        Its consecutive sequences of 8-byte numbers; all data before and between them is part of
-        the layout, except padding.
-    groups
-        Places of the wanted numbers, for each group.
-    width
-        Number of numbers in an element of an array.
-
+    ``arrays`` are its consecutive sequences of 8-byte numbers, with ``width`` numbers in an
+    element; all data before and between them is part of the layout, except padding. ``groups`` are
+    the places of the wanted numbers.
     """
     parts = [(0, 2, '2s'), (4, STAMP_END, 'iI')]
     end = STAMP_END
@@ -286,20 +265,9 @@ def compile_packing(
     """
     Compile a writer of messages that differ from a given one in stamps and arrays of numbers only.
 
-    Parameters
-    ----------
-    message
-        The message; it begins with a stamp.
-    arrays
-        Start of each array, and its format.
-
-    Returns
-    -------
-    pack : callable
-        Takes bytes, the stamp in [s] and [ns], bytes, the first array, bytes, and so on.
-    constants : list of bytes
-        The constant bytes.
-
+    The message begins with a stamp; ``arrays`` are the start and the format of each array. The
+    writer takes bytes, the stamp in [s] and [ns], bytes, the first array, bytes, and so on; the
+    bytes are the second result.
     """
     fields, constants, at = '<', [], 0
     for first, kind in ((4, 'iI'), *arrays):
@@ -316,17 +284,9 @@ class ArrayWriter:
     """
     Writes messages with a stamp and arrays of numbers, for a fixed list of joints.
 
-    Parameters
-    ----------
-    fields
-        Declaration of the message.
-    names
-        Names of the joints, in the order of the message, by name of the field that holds them.
-    arrays
-        Field of each array, by its name as a parameter of `write`.
-    within
-        The sequence, with one element, that contains the arrays; '' if none does.
-
+    ``names`` are the joints by the field that holds them, ``arrays`` the field of each array by
+    its name as a parameter of `write`. ``within`` is the sequence, with one element, that contains
+    the arrays; '' if none does.
     """
 
     __slots__ = ('_arrays', '_fields', '_names', '_within', 'write')
@@ -362,14 +322,8 @@ class ArrayWriter:
         """
         Return an expression for a message from ``seconds``, ``nanoseconds`` and numbers.
 
-        Parameters
-        ----------
-        numbers
-            Expressions of the numbers, separated by commas, by name of each array that is not
-            empty.
-        name
-            Prefix of the names bound in the expression.
-
+        ``numbers`` are the expressions of the numbers, separated by commas, by the name of each
+        array that is not empty. ``name`` is the prefix of the names that the expression binds.
         """
         (joints,) = self._names.values()
         values = dict.fromkeys((self._arrays[array] for array in numbers), (0.0,) * len(joints))

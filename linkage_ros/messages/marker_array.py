@@ -41,25 +41,6 @@ Colour = tuple[float, float, float, float]
 Place = tuple[float, float, float]
 """x, y and z, in [m]."""
 
-
-class Marker(NamedTuple):
-    """A marker before serialization."""
-
-    # Together they identify the marker.
-    ns: str
-    number: int
-    kind: int  # Its type
-    scale: Place  # Widths and lengths, depending on its type, in [m]
-    colour: Colour  # Its colour
-    points: Sequence[Place] = ()  # Points in its own frame, in [m]
-    # Origin of its frame, in [m].
-    at: complex = 0j
-    z: float = 0.0
-    text: str = ''  # The text, of a text marker
-    action: int = ADD  # `ADD` or `DELETE`
-    lifetime: int = 0  # Time after which it disappears without an update, in [ns]; 0 for never
-
-
 _COUNT = Struct('<I')
 _STAMP = Struct('<iI')
 _COLOUR = Struct('<4f')
@@ -79,6 +60,24 @@ MARKER_ARRAY = parse_declaration(
         MeshFile=parse_declaration('string filename, uint8[] data'),
     ),
 )
+
+
+class Marker(NamedTuple):
+    """A marker before serialization."""
+
+    # Together they identify the marker.
+    ns: str
+    number: int
+    kind: int  # Its type
+    scale: Place  # Widths and lengths, depending on its type, in [m]
+    colour: Colour  # Its colour
+    points: Sequence[Place] = ()  # Points in its own frame, in [m]
+    # Origin of its frame, in [m].
+    at: complex = 0j
+    z: float = 0.0
+    text: str = ''  # The text, of a text marker
+    action: int = ADD  # `ADD` or `DELETE`
+    lifetime: int = 0  # Time after which it disappears without an update, in [ns]; 0 for never
 
 
 def _field_values(frame: str, marker: Marker) -> dict[str, Any]:

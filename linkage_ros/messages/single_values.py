@@ -38,14 +38,6 @@ def text_message(text: str) -> bytes:
 
 
 def text_of(message: bytes) -> str:
-    """
-    Return the text of a ``std_msgs/msg/String``.
-
-    Raises
-    ------
-    ValueError
-        The bytes are no such message, or no text.
-
-    """
+    """Return the text of a ``std_msgs/msg/String``; raise `ValueError` for other bytes."""
     data: bytes = parse_message(message, _STRING)['data']
     return data.decode()

@@ -52,7 +52,7 @@ class Deviation:
     def __init__(self) -> None:
         self.compared = self.differing = 0
         self.greatest, self.at = 0.0, TickPlace(0, 0)
-        """The greatest difference, without its sign; infinite where one is no number."""
+        """The greatest difference, without its sign; infinite where one is not a number."""
         self.ulps, self.ulps_at = 0, TickPlace(0, 0)
         self._squares = 0.0
 
@@ -76,15 +76,7 @@ class Deviation:
 
 
 class TopicComparison:
-    """
-    Comparison of the recorded messages of a topic with the reproduced ones.
-
-    Parameters
-    ----------
-    name, message_type
-        Name and message type of the topic.
-
-    """
+    """Comparison of the recorded messages of a topic with the reproduced ones."""
 
     def __init__(self, name: str, message_type: str) -> None:
         self.name = name
@@ -122,18 +114,10 @@ class TopicComparison:
         self, recorded: bytes, now: bytes, at: TickPlace, turning: Mapping[str, bool]
     ) -> FirstDifference | None:
         """
-        Add two different messages; return their first difference.
+        Add two different messages of a tick; return their first difference.
 
-        Parameters
-        ----------
-        recorded, now
-            The two messages.
-        at
-            The tick.
-        turning
-            Joints whose positions may differ by whole turns. If the messages differ by nothing
-            else, the result is None.
-
+        Positions of the joints in ``turning`` may differ by whole turns: if the messages differ by
+        nothing else, the result is None.
         """
         then, again = self._then.read(recorded), self._now.read(now)
         if isinstance(then, str) or isinstance(again, str):
@@ -165,17 +149,7 @@ class TopicComparison:
 
 
 class Comparison:
-    """
-    Comparison of a recorded run with a second one.
-
-    Parameters
-    ----------
-    topics
-        Names and types of the compared topics.
-    turning
-        As for `TopicComparison.add_different`.
-
-    """
+    """Comparison of a recorded run with a second one, by topic."""
 
     def __init__(
         self, topics: Sequence[tuple[str, str]], turning: Mapping[str, bool] | None = None
@@ -272,4 +246,4 @@ def _difference_text(then: MessageContent, again: MessageContent) -> str:
         return f'{had} then, {has} now'
     if then.stamp != again.stamp:
         return f'stamp: {then.stamp} ns then, {again.stamp} ns now'
-    return 'bytes that are no number of a joint'
+    return 'bytes outside of the numbers of joints'

@@ -9,7 +9,7 @@
 """
 Run another scene on the crank samples of a bag, or on the commands that it holds.
 
-If both scenes have the same rate, the ticks are those of the bag. Where the bag has none, because
+If both scenes have the same rate, the ticks come from the bag. Where the bag has none, because
 the linkage was open or had no crank state, ticks are one period apart. At another rate ticks are
 one period apart from the first one on, and each moves to a tick of the bag that is within half a
 period, so that both can be compared. A scene with a rate of 0 ticks for every good sample.
@@ -87,29 +87,22 @@ def check_drives(scene: Scene, where: str) -> None:
             raise LinkageError(
                 where,
                 f'{f"{scene_linkage.name}: " if scene_linkage.name else ""}its drive is '
-                f'{drive}{beside}, which '
-                "takes no samples of a bag's",
+                f'{drive}{beside}, which takes no samples from a bag',
                 f'write drive: {{{drives[0] if beside else "topic"}: {{}}}}',
             )
         if scene_linkage.loads is not None and scene_linkage.loads.applied.wrenches:
             raise LinkageError(
                 where,
-                'its loads.wrenches come on topics, of which another scene takes no messages',
+                'its loads.wrenches have topics, and another scene takes no messages from these',
                 'leave them out',
             )
 
 
 class Counterfactual:
     """
-    A scene that runs on the samples of a bag.
+    A scene, with all drives on one topic, that runs on the samples of a bag.
 
-    Parameters
-    ----------
-    scene
-        The scene; all its drives take messages of one topic.
-    recorded
-        The recorded scene; None if unknown.
-
+    ``recorded`` is the recorded scene; None if unknown.
     """
 
     def __init__(self, scene: Scene, recorded: Scene | None) -> None:
@@ -328,28 +321,12 @@ def find_crank_topic(
     typed: str | None,
 ) -> str:
     """
-    Return the topic whose samples drive all linkages of a scene.
+    Return the topic whose samples drive all linkages of a scene, or raise `BagError`.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-    messages
-        Its messages, read only as far as needed.
-    scene
-        The scene.
-    run, recorded
-        The run's account in the bag, and its scene; blank and None if the bag has none.
-    typed
-        The topic that the user asked for. If None, the topic of the run, that of `_TOPICS`, or
-        the only topic with such samples, whichever of these the bag has first. Commands are not
-        looked for on other topics: the efforts of joint states are none.
-
-    Raises
-    ------
-    BagError
-        There is no such topic, or more than one.
-
+    It is ``typed`` by the user. Otherwise it is the topic of the run, the topic in `_TOPICS`, or
+    the only topic with such samples, whichever the bag has first; commands are on no other topic,
+    since the efforts of joint states are not commands. ``messages`` are read only as far as
+    needed.
     """
     drive = scene.linkages[0].drive[0]
     readers = {

@@ -31,20 +31,7 @@ class FinishedRuns:
     """
     The outcomes of a study by the numbers of the runs; each is written to the disk at once.
 
-    Parameters
-    ----------
-    output
-        The file that the study writes in the end.
-    study
-        The study.
-    runs
-        The settings of all runs.
-
-    Raises
-    ------
-    LinkageError
-        The file is that of another study, or cannot be read or written.
-
+    Raise `LinkageError` if the file belongs to another study, or cannot be read or written.
     """
 
     def __init__(self, output: Path, study: Study, runs: list[Settings]) -> None:

@@ -139,15 +139,7 @@ def announced_text(files: Mapping[str, bytes]) -> str:
 
 
 def read_announced(message: bytes, topic: str) -> AnnouncedScene:
-    """
-    Read the message of a node that holds the files of its scene.
-
-    Raises
-    ------
-    ValueError
-        The message has another content.
-
-    """
+    """Read a node's message with the files of its scene; raise `ValueError` for other content."""
     if len(message) > _LONGEST_ANNOUNCED:
         raise ValueError('too long')
     try:
@@ -195,7 +187,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             if event.time >= TIME_END:
                 raise BagError(
                     bag.path,
-                    f'holds what was made at {event.time} ns, beyond the times of messages',
+                    f'has a tick at {event.time} ns, beyond the range of message times',
                     'name another bag',
                 )
             joint_states, *extras = event.messages
@@ -222,15 +214,7 @@ def change_text(change: FaultChange, kind: str) -> str:
 
 
 def read_change(message: bytes) -> tuple[str, bool]:
-    """
-    Return the fault that a message of the faults' topic names, and whether it begins.
-
-    Raises
-    ------
-    ValueError
-        The message has another content.
-
-    """
+    """Return the fault that a message names and whether it begins, or raise `ValueError`."""
     try:
         content = json.loads(text_of(message))
     except RecursionError:
@@ -239,7 +223,7 @@ def read_change(message: bytes) -> tuple[str, bool]:
         (content.get('fault'), content.get('injected')) if isinstance(content, dict) else (0, 0)
     )
     if not isinstance(name, str) or not isinstance(on, bool):
-        raise ValueError('not a change')
+        raise ValueError('not the begin or end of a fault')
     return name, on
 
 
@@ -249,7 +233,9 @@ def turn_fault(bag: Bag, injection: Injection, message: bytes) -> None:
         injection.switch_fault(*read_change(message))
     except (ValueError, KeyError):
         raise BagError(
-            bag.path, 'a message on its faults topic names no fault of its scene', 'name another'
+            bag.path,
+            'a message on its faults topic names no fault of its scene',
+            'name another bag',
         ) from None
 
 

@@ -37,19 +37,8 @@ def scene_files(
     """
     Return a scene as files: its own, and the run's account of itself.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    topics
-        Names of the topics, by their keys in the account.
-    begun
-        Beginning of the bag.
-    lines
-        Pipelines of the linkages.
-    bag
-        Folder of the bag that gets the files; None for none.
-
+    ``topics`` are the names of the topics by their keys in the account, ``begun`` is the beginning
+    of the bag, and ``bag`` is the folder of the bag that gets the files, if any.
     """
     run = {
         'scene': scene.name,

@@ -7,10 +7,10 @@
 # language governing permissions and limitations under the License.
 
 """
-A run without a ROS graph: the node's tick loop, as fast as it goes, on a time of its own.
+A run without a ROS graph: the node's tick loop, as fast as it goes, on its own time.
 
-Tick k is at `BEGIN` plus k periods, to the whole nanosecond. The bag is the one that a node of
-this scene would record, so that a replay of it gives the same bytes. Nothing of rclpy is imported.
+Tick k is at `BEGIN` plus k periods, to the whole nanosecond. The bag is what a node of this
+scene would record, so that its replay gives the same bytes. Nothing of rclpy is imported.
 """
 
 from __future__ import annotations
@@ -52,13 +52,8 @@ def check_simulated(scene: Scene, seconds: float) -> int:
     """
     Return the number of ticks of a simulation, the last at its end.
 
-    Raises
-    ------
-    FileError
-        A drive waits for samples, or a load for messages.
-    LinkageError
-        There would be too many ticks.
-
+    Raise `FileError` if a drive or a load waits for messages, and `LinkageError` if there are too
+    many ticks.
     """
     for scene_linkage in scene.linkages:
         if scene_linkage.drive[0] == 'topic':
@@ -94,32 +89,13 @@ def simulate_run(
     warn: Callable[[str], None] = lambda _: None,
 ) -> dict[str, int]:
     """
-    Run a scene, and write what its node would record.
+    Run a scene, and write what its node would record; return the number of messages by topic.
 
-    Parameters
-    ----------
-    scene
-        The scene; see `check_simulated`.
-    folder
-        Folder of the bag, which does not exist yet.
-    ticks
-        Number of ticks.
-    keep_going
-        Called now and then with the number of ticks so far; if it returns False, the run ends and
-        the bag is complete up to there. Signals only set the stop event: it has to look at that.
-    warn
-        Called at the end with a line on what a node would have warned of.
-
-    Returns
-    -------
-    counts
-        Number of messages by topic.
-
-    Raises
-    ------
-    LinkageError
-        Parts of the scene do not fit together, or the bag cannot be written.
-
+    ``folder`` must not exist yet. ``keep_going`` is called now and then with the number of ticks
+    so far; if it returns False, the run ends and the bag is complete up to there. Signals only set
+    the stop event: ``keep_going`` has to look at it. ``warn`` receives, at the end, a line on what
+    a node would have warned of. Raise `LinkageError` if parts of the scene do not fit together, or
+    if the bag cannot be written.
     """
     first = Pipeline(scene)
     kinds = {name: fault.kind for name, fault in scene.faults.items()}
@@ -162,17 +138,7 @@ def simulate_run(
 
 
 class _Recording:
-    """
-    Writes each message at once; a tick sees a recorder.
-
-    Parameters
-    ----------
-    writer
-        The bag.
-    topics
-        Number of topics.
-
-    """
+    """Writes each message at once; a tick sees a recorder."""
 
     def __init__(self, writer: BagWriter, topics: int) -> None:
         self._writer = writer

@@ -134,11 +134,7 @@ def runs_of(sweeps: Sequence[ParameterSweep], seeds: int, seed: int) -> list[Set
     """
     Return the settings of each run: every combination of the values, with every seed.
 
-    Raises
-    ------
-    LinkageError
-        There are too many, or a key is swept twice.
-
+    Raise `LinkageError` if there are too many, or if a key is swept twice.
     """
     keys = [sweep.key for sweep in sweeps]
     for key in keys:
@@ -181,7 +177,7 @@ def run_one(study: Study, settings: Settings) -> Outcome:
 
 
 def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome:
-    """Tick a pipeline, and keep of it what a study needs."""
+    """Tick a pipeline, and keep what a study needs."""
     lines, injection = pipeline.linkages, pipeline.injection
     joints = [line.scene_linkage.joint_names for line in lines]
     firsts = [sum(map(len, joints[:index])) for index in range(len(joints))]
@@ -312,12 +308,12 @@ def _in_processes(
         ended = True
         raise LinkageError(
             'the study',
-            'a process of it was killed',
+            'one of its processes was killed',
             'run the same command again: finished runs are kept; for less memory take fewer '
             '--workers',
         ) from None
     finally:
-        # At an end of its own the processes end first: torn down with the interpreter, they write
+        # At its own end the processes end first: torn down with the interpreter, they write
         # a traceback now and then. A stop does not wait for runs.
         pool.shutdown(wait=ended, cancel_futures=True)
 

@@ -30,23 +30,12 @@ _SEPARATOR = f'\n{"=" * 80}\n'
 
 def message_type(name: str, key: str) -> Any:
     """
-    Return the class of a message type.
+    Return the class of a message type (package/msg/Type).
 
     Names come from bags and from the graph, so nothing is imported but the package of a message
-    whose definition is installed.
-
-    Parameters
-    ----------
-    name
-        package/msg/Type.
-    key
-        Topic, or key of the scene, that has this type.
-
-    Raises
-    ------
-    LinkageError
-        It does not name a message, or its package is not installed.
-
+    whose definition is installed. Raise `LinkageError`, which names ``key`` (the topic, or the key
+    of the scene, with this type), if it does not name a message, or if its package is not
+    installed.
     """
     matched = _MESSAGE.fullmatch(name)
     if matched is None:
@@ -69,22 +58,9 @@ def message_type(name: str, key: str) -> Any:
 
 def describe_topic(name: str, message_class: Any, qos: QosProfile) -> Topic:
     """
-    Describe a topic for a bag.
+    Describe a topic, by its resolved name, for a bag.
 
-    Parameters
-    ----------
-    name
-        Resolved name.
-    message_class
-        The message's class.
-    qos
-        QoS offered on the topic.
-
-    Raises
-    ------
-    RecordingError
-        The definition of the message is not installed.
-
+    Raise `RecordingError` if the definition of the message is not installed.
     """
     package, kind = message_class.__module__.split('.')[0], message_class.__name__
     texts: dict[str, str] = {}
@@ -99,7 +75,7 @@ def describe_topic(name: str, message_class: Any, qos: QosProfile) -> Topic:
 def _collect_definitions(
     message_class: Any, package: str, kind: str, texts: dict[str, str]
 ) -> None:
-    """Collect the text of a type and, after it, those of all types that it contains."""
+    """Collect the text of a type and, after it, the texts of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
     texts[f'{package}/{kind}'] = _installed_file(package, f'{kind}.msg').read_text('utf-8')

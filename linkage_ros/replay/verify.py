@@ -12,7 +12,7 @@ Run a bag's scene again on its samples: compare with its messages, and find its 
 A bag may lack the start of its run (recording began later, or its first files made way for newer
 ones). Then the state of the node at that time is missing: the newest sample, whole turns, delay
 lines, random generators. The ticks before the first one that is reproduced do not count, and whole
-turns are no difference.
+turns do not count as a difference.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ Effects whose state is not recovered: random generators, and the time of the fir
 incremental encoder, which counts from power-on, for a low-pass, which never forgets to the last
 bit, for random latencies, for loads over the time, and for markers with a trail.
 """
+
+_REPORT_EVERY = 1024
 
 
 class ReplayVerification(NamedTuple):
@@ -75,18 +77,7 @@ def verify_replay(
     """
     Run a bag's scene once more and compare; memory does not grow with the bag.
 
-    Parameters
-    ----------
-    bag, scene, messages
-        As for `replay_all`.
-    observe
-        Callback that receives every tick.
-
-    Raises
-    ------
-    LinkageError
-        The scene cannot be run.
-
+    ``observe`` receives every tick. Raise `LinkageError` if the scene cannot be run.
     """
     run = read_run_metadata(bag)
     types = [extra.message for extra in Pipeline(scene).extras]
@@ -120,11 +111,11 @@ def verify_replay(
 def beginning_text(proof: ReplayVerification) -> str:
     """Return text on the ticks that cannot be judged in a bag without the start of its run."""
     text = (
-        f'{proof.missing_start}: what the node remembered then is not in it, so {proof.undecided} '
+        f'{proof.missing_start}: it lacks the state of the node then, so {proof.undecided} '
+        f'of {proof.tick_count} ticks, at the start, are undecided'
     )
-    text += f'of {proof.tick_count} ticks, at the start, could not be told'
     if proof.verdict == UNDECIDED and proof.unrecoverable:
-        text += f'; {" and ".join(proof.unrecoverable)} cannot come to the same again'
+        text += f'; {" and ".join(proof.unrecoverable)} cannot be reproduced'
     return text
 
 
@@ -157,15 +148,12 @@ def _lost_state(scene: Scene) -> tuple[str, ...]:
         ):
             named.append('encoder')
         delay = scene_linkage.effects.get('delay')
-        if delay and any(line.random for line in delay.lines):
+        if delay and any(line.is_random for line in delay.delay_lines):
             named.append('delay')
         markers = scene_linkage.effects.get('markers')
         if markers and markers.trace:
             named.append('markers')
     return tuple(dict.fromkeys(named))
-
-
-_REPORT_EVERY = 1024
 
 
 class StatePlace(NamedTuple):
@@ -207,20 +195,8 @@ def examine_states(
     """
     Run a scene again on its bag and examine every state; memory does not grow with them.
 
-    Parameters
-    ----------
-    bag, scene
-        As for `replay_ticks`.
-    progress
-        Progress callback; receives the number of examined ticks, now and then.
-    stopped
-        Returns whether to stop.
-
-    Raises
-    ------
-    LinkageError
-        The scene cannot be run.
-
+    ``progress`` receives the number of examined ticks, now and then; ``stopped`` returns whether
+    to stop. Raise `LinkageError` if the scene cannot be run.
     """
     # The replay builds equal closures itself: they follow from the scene alone.
     watched = [_Watch(line.scene_linkage, line.closure) for line in Pipeline(scene).linkages]

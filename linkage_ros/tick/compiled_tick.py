@@ -42,22 +42,11 @@ InterpretedTick = Callable[[int, CrankState | None], Any]
 
 
 class CompiledState(NamedTuple):
-    """
-    The state of a compiled linkage at a tick: the reading, and what the full state derives from.
-
-    Attributes
-    ----------
-    crank
-        State of the crank.
-    reading
-        Published values; None where nothing is published.
-    reactions
-        Forces in pins and sliders, each as in `Reaction`; empty where no message holds them.
-
-    """
+    """State of a compiled linkage at a tick: the reading, and the base of the full state."""
 
     crank: CrankState
-    reading: SensorReading | None
+    reading: SensorReading | None  # None where nothing is published
+    # As in `Reaction`, in pins and sliders; empty where no message holds them.
     reactions: tuple[tuple[float, float, float], ...]
 
 
@@ -177,15 +166,8 @@ def compile_linkage_state(
     """
     Return the state of a linkage as a function of the time, in [ns].
 
-    Parameters
-    ----------
-    compiled
-        Its usual tick.
-    apply_sensors
-        Applies further sensor stages; None where there are none.
-    interpret
-        Computes all other ticks.
-
+    ``apply_sensors`` applies further sensor stages; ``interpret`` computes the ticks that
+    ``compiled`` does not.
     """
     lines = [f'reading = new(Reading, {_reading_text(compiled)})']
     if apply_sensors is not None:
@@ -199,22 +181,11 @@ def compile_linkage_state(
 
 def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> Callable[..., Any]:
     """
-    Return a function that adds one linkage to a message of several.
+    Return a function that adds one linkage to a message of several, and returns its state.
 
-    Parameters
-    ----------
-    compiled
-        Its usual tick; its reading is what is published.
-    interpret
-        Computes all other ticks.
-
-    Returns
-    -------
-    contribute
-        A function of the time, in [ns], and of the lists of positions, rates and efforts, which
-        it extends. It returns the state of the linkage. A tick computed by ``interpret`` extends
-        none of the lists.
-
+    The function takes the time, in [ns], and the lists of positions, rates and efforts, which it
+    extends by the reading of ``compiled``. A tick computed by ``interpret`` extends none of the
+    lists.
     """
     groups = {'positions': compiled.joints, 'rates': compiled.rates, 'efforts': compiled.efforts}
     lines = [
@@ -238,19 +209,9 @@ def compile_scene_tick(
     """
     Return the whole tick of a scene with one linkage, as a function of the time, in [ns].
 
-    Parameters
-    ----------
-    compiled
-        The linkage's usual tick; its reading is what is published.
-    writer
-        Serializes the joint states.
-    extras
-        Serialize the other messages, from the reading alone or from a `CompiledState`.
-    tick_type, linkages
-        The type of the result, and the linkages that it refers to.
-    interpret
-        Computes all other ticks.
-
+    ``writer`` serializes the joint states, and ``extras`` the other messages, from the reading
+    alone or from a `CompiledState`. ``interpret`` computes the ticks that ``compiled`` does not.
+    ``tick_type`` and ``linkages`` are the type of the result, and the linkages that it refers to.
     """
     bound: dict[str, Any] = {'Tick': tick_type, 'linkages': linkages, 'interpret': interpret}
     bound |= {f'write{index}': extra.write for index, extra in enumerate(extras)}

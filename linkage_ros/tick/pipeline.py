@@ -140,22 +140,8 @@ class LinkagePipeline:
     """
     The pipeline of one linkage. To reset it, build it again.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    scene_linkage
-        Its linkage, drive and effects.
-    closure
-        The closure of the linkage, if there is one already. It has no state, so resets reuse it.
-    injection
-        The faults of the scene, if any.
-
-    Raises
-    ------
-    FileError
-        Parts of the scene do not fit together, or the linkage does not close.
-
+    A given closure is reused: it has no state. Raise `FileError` if parts of the scene do not fit
+    together, or if the linkage does not close.
     """
 
     def __init__(
@@ -214,7 +200,7 @@ class LinkagePipeline:
         )
         if self._message_faults and not self.topic:
             raise DefinitionError(
-                'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
+                'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
             )
         self._drive_stages = [*wanted.build('drive_stage', self.context).values()]
 
@@ -292,7 +278,7 @@ class LinkagePipeline:
                 )
 
     def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
-        """Generate the tick up to the reading; None where a part of it has no generated form."""
+        """Generate the tick up to the reading; None where a part has no generated form."""
         moved = {effect.name for effect in wanted.effects if effect.stage is not None}
         if not self.closure.by_steps or self._mechanism_faults or self._has_timed_loads:
             return None
@@ -424,7 +410,7 @@ class LinkagePipeline:
         return reading
 
     def complete_state(self, seen: LinkageState | CompiledState | StateTuple) -> LinkageState:
-        """Return the full state of a linkage; the generated tick leaves part of it out."""
+        """Return the full state of a linkage; the generated tick leaves a part out."""
         if isinstance(seen, LinkageState):
             return seen
         crank_numbers, numbers, _ = seen
@@ -575,7 +561,9 @@ class Pipeline:
         topics = sorted({linkage.topic for linkage in self.linkages} - {''})
         if len(topics) > 1:
             raise scene.linkages[0].content.error(
-                'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
+                'drive',
+                f'has the topics {" and ".join(topics)}',
+                'write the same kind of drive for all',
             )
         _refuse_stamps(scene)
         self.topic = topics[0] if topics else ''
@@ -749,7 +737,7 @@ def _refuse_stamps(scene: Scene) -> None:
         if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
             raise scene_linkage.content.error(
                 'effects.delay.stamp',
-                'measured is a stamp of its own, and all linkages share one message',
+                'measured gives a linkage its own stamp, and all linkages share one message',
                 'give all linkages the same delay, or write arrival',
             )
 

@@ -28,11 +28,7 @@ class SampleRouter(Generic[Receiver]):
     """
     Finds the receivers of a message; parses a message only if its joint names are new.
 
-    Parameters
-    ----------
-    required_joints
-        The joints that each receiver needs; a message must name all of them.
-
+    A message must name all joints that its receiver requires.
     """
 
     __slots__ = ('_all', '_ends', '_found', '_wanted')

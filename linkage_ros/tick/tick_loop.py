@@ -36,6 +36,12 @@ if TYPE_CHECKING:
 _STEPS = 5
 """Leading bits kept of a duration: the width of a bin is at most 1/32 of its value."""
 
+_LONGEST_DRAIN = 20_000_000
+"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
+
+_TakenMessage = tuple[bytes, dict[str, Any]]
+TakeMessage = Callable[[], _TakenMessage | None]
+
 
 class DurationHistogram:
     """Histogram of durations, in [ns], of constant size; the bins widen with the duration."""
@@ -111,10 +117,6 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
     )
 
 
-_LONGEST_DRAIN = 20_000_000
-"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
-
-
 class Stall(NamedTuple):
     """A lag that lost ticks."""
 
@@ -175,8 +177,6 @@ class Counts:
     """Of each topic with a wrench."""
 
 
-_TakenMessage = tuple[bytes, dict[str, Any]]
-TakeMessage = Callable[[], _TakenMessage | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event is set: waits, and calls `tick_at` or `tick_samples`."""
 
@@ -187,28 +187,14 @@ def _take_nothing() -> None:
 
 class TickLoop:
     """
-    Runs a pipeline tick by tick.
+    Runs a pipeline tick by tick; a reset builds it again.
 
-    Parameters
-    ----------
-    build
-        Builds the pipeline; a reset calls it again.
-    take_sample
-        Takes the next message for the drives, as bytes and message info; returns None if there is
-        no message. None if the drives have no topic.
-    publish
-        Publishes a serialized JointState.
-    is_own
-        Recognises the node's own messages where they come back on the crank's topic.
-    publish_extras
-        Publish the serialized messages of the auxiliary topics, one function each.
-    publish_change
-        Publishes the begin or end of a fault, and returns the serialized message.
-    depth
-        Most messages that one tick takes: the depth of the queue in front of it.
-    take_wrenches
-        Take the next message of each topic with a wrench, as ``take_sample`` does.
-
+    ``take_sample`` takes the next message for the drives, as bytes and message info; it returns
+    None if there is no message, and is None if the drives have no topic. ``take_wrenches`` do the
+    same for each topic with a wrench. A tick takes ``depth`` messages at most, the depth of the
+    queue. ``is_own`` recognises the node's own messages on the crank's topic. ``publish_extras``
+    has a function for each auxiliary topic; ``publish_change`` publishes the begin or end of a
+    fault, and returns the message.
     """
 
     def __init__(
@@ -254,7 +240,7 @@ class TickLoop:
         self.run_seconds = 0.0
 
     def start(self, pace: Pace) -> None:
-        """Start ticking on a thread of its own."""
+        """Start ticking on its own thread."""
         self._stopping.clear()
         self._start_time = monotonic_ns()
         self._thread = Thread(target=self._guard_pace, args=(pace,), name='tick', daemon=True)
@@ -311,7 +297,7 @@ class TickLoop:
         """
         Take the waiting messages: record, count and offer each to the pipeline.
 
-        A clock moves `_last_time` on to the time when a message is taken. Wrenches come first: a
+        A clock advances `_last_time` to the time when a message is taken. Wrenches come first: a
         tick for a sample has them.
         """
         for which, take in enumerate(self._take_wrenches):
@@ -398,7 +384,7 @@ class TickLoop:
                 break
 
     def _advance_time(self, time: int) -> None:
-        """Move `_last_time` on: a message may be newer than the tick that takes it."""
+        """Advance `_last_time`: a message may be newer than the tick that takes it."""
         if self.injection is not None:
             time = self.injection.tick_time(time)
         if time > self._last_time:
@@ -406,15 +392,10 @@ class TickLoop:
 
     def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """
-        Take the waiting messages, and tick.
+        Take the waiting messages, and tick at the time ``now``, in [ns].
 
-        Parameters
-        ----------
-        now
-            The time of the tick, in [ns].
-        clock
-            Returns the time when a message is taken, in [ns]; None for the time of the tick.
-
+        ``clock`` returns the time when a message is taken, in [ns]; by default it is the time of
+        the tick.
         """
         if self.injection is not None:
             now = self._advance_faults(self.injection, now)

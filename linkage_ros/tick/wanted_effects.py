@@ -116,6 +116,6 @@ def _refuse_solver(scene_linkage: SceneLinkage, forced: bool) -> None:
     if forced and scene_linkage.solver is not None and scene_linkage.solver[0] != 'closed_form':
         raise DefinitionError(
             'solver',
-            f'{scene_linkage.solver[0]} finds no forces, and an effect or the drive asks for them',
+            f'{scene_linkage.solver[0]} computes no forces, and an effect or the drive needs them',
             f'write closed_form, or leave {list_names(FORCE_EFFECTS)} and torque out',
         )

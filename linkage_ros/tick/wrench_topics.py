@@ -34,33 +34,16 @@ _LONGEST = 200
 
 class WrenchTopic:
     """
-    The topic of the wrench on a link.
+    The topic of the wrench on a link; messages change the wrench ``held``.
 
-    Parameters
-    ----------
-    scene_linkage, link
-        The linkage, and its link.
-    drive
-        The drive of the linkage; it learns of each wrench if it has ``load``.
-    held
-        The wrench, which the messages change.
-
-    Attributes
-    ----------
-    key
-        Key of the wrench in the scene.
-    topic
-        Name of the topic.
-    held
-        The wrench.
-
+    The drive learns of each wrench if it has ``load``.
     """
 
     def __init__(
         self, scene_linkage: SceneLinkage, link: str, drive: Any, held: HeldWrench
     ) -> None:
         given = scene_linkage.loads.applied.wrenches[link] if scene_linkage.loads else None
-        self.key = f'loads.wrenches.{link}'
+        self.key = f'loads.wrenches.{link}'  # In the scene
         self.topic = (given and given.topic) or f'wrenches/{scene_linkage.prefix}{link}'
         self.wrench = held
         self._change_load = getattr(drive, 'load', None)
@@ -68,15 +51,9 @@ class WrenchTopic:
 
     def offer_wrench(self, message: bytes, now: int) -> Rejection | None:
         """
-        Take a serialized message, or return why it is rejected; a rejected one changes nothing.
+        Take a serialized WrenchStamped at a time [ns], or return why it is rejected.
 
-        Parameters
-        ----------
-        message
-            A ``geometry_msgs/msg/WrenchStamped`` in CDR.
-        now
-            The time, in [ns].
-
+        A rejected message changes nothing.
         """
         wrench = read_wrench(message)
         if isinstance(wrench, Rejection):
@@ -102,20 +79,9 @@ def make_wrench_topics(
     linkages: Sequence[tuple[SceneLinkage, Any, Mapping[str, HeldWrench]]], drive_topic: str
 ) -> tuple[WrenchTopic, ...]:
     """
-    Return the topics of all wrenches on linkages.
+    Return the topics of all wrenches on linkages, given with their drives and wrenches by link.
 
-    Parameters
-    ----------
-    linkages
-        Each linkage with its drive, and its wrenches by the name of the link.
-    drive_topic
-        Topic of the drives; '' for none.
-
-    Raises
-    ------
-    FileError
-        A name is no topic's or is taken, or there are too many.
-
+    Raise `FileError` if a name is taken or is not a topic's, or if there are too many.
     """
     topics = tuple(
         WrenchTopic(scene_linkage, link, drive, held)
@@ -131,7 +97,7 @@ def make_wrench_topics(
             )
         if not fullmatch(_NAME, name) or len(name) > _LONGEST:
             raise one.refusal(
-                f'{quote(name)} is no ROS topic', 'write a topic, as topic: wrenches/coupler'
+                f'{quote(name)} is not a ROS topic', 'write a topic, as topic: wrenches/coupler'
             )
         name = name.removeprefix('/')
         if name in taken:

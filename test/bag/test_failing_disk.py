@@ -233,7 +233,7 @@ def test_a_disk_that_takes_nothing_ends_a_recording(tmp_path, topics, messages, 
     write(writer, messages[:100])
     writer.flush()
     monkeypatch.setattr('os.pwrite', lambda descriptor, view, offset: 0)
-    with pytest.raises(RecordingError, match=r'ended early: the disk takes nothing; .* check the'):
+    with pytest.raises(RecordingError, match=r'ended early: the disk accepts no data; .* check'):
         write(writer, messages[100:2000])
     assert sum(writer.close().counts) == 100
     assert data_of(tmp_path / 'run', allow_truncated=True) == data(messages[:100])
@@ -262,7 +262,7 @@ def test_metadata_that_the_disk_does_not_take_are_given_up(
     write(writer, messages[:100])
     whole = Path.open
     monkeypatch.setattr('pathlib.Path.open', lambda *args, **named: _Deaf(whole(*args, **named)))
-    with pytest.raises(RecordingError, match='the disk takes nothing'):
+    with pytest.raises(RecordingError, match='the disk accepts no data'):
         writer.close()
     monkeypatch.undo()
     assert 'linkage_ros.unfinished' in custom_data(tmp_path / 'run')

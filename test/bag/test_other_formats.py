@@ -98,7 +98,7 @@ def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path) -> None:
         for _ in range(2 * MOST_UNPACKED // 2**20):
             stream.write(packer.compress(bytes(2**20)))
         stream.write(packer.flush())
-    with pytest.raises(BagError, match='no recording packs so well'):
+    with pytest.raises(BagError, match='no recording packs as densely'):
         read_bag(bomb)
 
 

@@ -109,9 +109,9 @@ def test_a_file_without_an_index_is_read(tmp_path):
     ('content', 'reason'),
     [
         (b'', 'is empty; its recording never began'),
-        (b'rate: 1000\n', "is a text file, and no MCAP file; name a bag's folder, or its .mcap"),
-        (b'SQLite format 3\0', 'is a bag in SQLite (.db3), and no MCAP file'),
-        (MCAP0_MAGIC[:5], 'and no MCAP file'),
+        (b'rate: 1000\n', "is a text file, not an MCAP file; name a bag's folder, or its .mcap"),
+        (b'SQLite format 3\0', 'is a bag in SQLite (.db3), not an MCAP file'),
+        (MCAP0_MAGIC[:5], 'not an MCAP file'),
         (MCAP0_MAGIC, 'has no end'),
         (MCAP0_MAGIC * 2, 'is damaged: '),
         (MCAP0_MAGIC + bytes(100) + MCAP0_MAGIC, 'is damaged: '),
@@ -176,7 +176,7 @@ def test_a_flipped_bit_is_found_where_it_is(folder, messages):
     content[place + 30] ^= 1
     file.write_bytes(content)
     found = []
-    with pytest.raises(BagError, match=r'is damaged: the record at byte .*checksum does not fit'):
+    with pytest.raises(BagError, match=r'is damaged: the record at .*checksum does not match'):
         found.extend(message.data for message in read_bag(folder).messages())
     assert found == [message.data for message in messages[: len(found)]]
     assert 5000 < len(found) <= 6000

@@ -112,8 +112,8 @@ def test_channels_without_end_are_told_in_a_line(tmp_path: Path) -> None:
         ended = told(tmp_path, command, 'a.mcap')
         assert ended.returncode == 2
         assert ended.stderr == (
-            f'linkage {command}: a.mcap: is damaged: describes more than 10,000 channels or '
-            'schemas; linkage recover saves what is whole\n'
+            f'linkage {command}: a.mcap: is damaged: defines more than 10,000 channels or '
+            'schemas; linkage recover saves the whole parts\n'
         )
 
 
@@ -182,7 +182,7 @@ def test_fifty_gigabytes_in_two_megabytes_are_not_unpacked(tmp_path: Path) -> No
     packed(tmp_path / 'a.mcap', 200)
     assert (tmp_path / 'a.mcap').stat().st_size < 6_000_000
     account = facts(tmp_path, 'a.mcap')
-    assert 'no recording packs so well' in account['damage']
+    assert 'no recording packs as densely' in account['damage']
     assert 0 < account['messages'] < 25_000
     assert sum(each['content_bytes'] for each in account['compressions']) > 50 * 10**9
 

@@ -173,7 +173,7 @@ def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> N
     more = (last._replace(log_time=time, publish_time=time),)
     odd = rewritten(bag, tmp_path, read_bag(bag).attachments[RUN_FILE], more)
     lines = list(tried(odd, tmp_path, capsys))
-    assert lines[0].startswith(f'{odd}: holds what was made at {time} ns, beyond ')
+    assert lines[0].startswith(f'{odd}: has a tick at {time} ns, beyond ')
     with pytest.raises(BagError, match='beyond'):
         answer(replay, odd)
 

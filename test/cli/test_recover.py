@@ -77,7 +77,7 @@ def test_a_whole_bag_loses_nothing_and_no_folder_is_used_twice(linkage: Run, bag
         ('nothing', 'nothing: does not exist'),
         ('.', '.: holds no .mcap file'),
         ('empty.mcap', 'nothing that can be saved: empty.mcap is empty'),
-        ('text.mcap', "text.mcap starts with b'no bag a', as no MCAP file does"),
+        ('text.mcap', "text.mcap starts with b'no bag a', unlike an MCAP file"),
     ],
 )
 def test_what_is_no_bag_is_answered_in_a_line(

@@ -343,7 +343,7 @@ def test_a_bag_that_was_begun_in_mid_run(tmp_path, capsys, name):
     if verdict == 'identical':
         assert states['same'] + states['same_but_for_turns'] == states['recorded'] > 100
     answer(replay, bag)
-    assert ('could not be told' in capsys.readouterr().out) == (begun == 'mid-run')
+    assert ('are undecided' in capsys.readouterr().out) == (begun == 'mid-run')
 
 
 def test_whole_turns_before_the_bag_are_no_difference(tmp_path, capsys):
@@ -580,7 +580,7 @@ DIFFERENCES = {
     'too many': (b'', WRITE(1, [1, 2], []), 'withheld then, published now', ''),
     'padding': (
         WRITE(1, [1, 2], []), WRITE(1, [1, 2], []) + b'\0',
-        'bytes that are no number of a joint', '',
+        'bytes outside of the numbers of joints', '',
     ),
     'nonsense': (b'\0\1\0\0', WRITE(1, [1, 2], []), 'a message that cannot be read', ''),
 }  # fmt: skip

@@ -65,8 +65,8 @@ def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
     found, account = told(capsys, ring)
     assert (found, account['verdict']) == (code, verdict)
     why = account['beginning_missing']
-    assert why.startswith(f'its first {gone} messages have made way for newer ones: ')
-    assert why.endswith(f'{lost} cannot come to the same again') == bool(lost)
+    assert why.startswith(f'its first {gone} messages were removed for newer ones: ')
+    assert why.endswith(f'{lost} cannot be reproduced') == bool(lost)
     assert answer(replay, ring) == code
     assert f'\n{why}\n' in capsys.readouterr().out
 

@@ -374,7 +374,7 @@ BAD = {
     ),
     'wrenches': (
         PLAIN, 'effects: {effort: {}}\nloads: {wrenches: {coupler: {}}}\n', FOUR_BAR,
-        'its loads.wrenches come on topics, of which another scene takes no messages; leave them',
+        'its loads.wrenches have topics, and another scene takes no messages from these; leave',
     ),
     'other joints': (
         PLAIN, '', GENERAL.replace('coupler_joint', 'rod').replace('rocker_joint', 'swing'),

@@ -313,7 +313,7 @@ def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
 def test_what_is_no_bag_says_so(tmp_path):
     file = tmp_path / 'crank.csv'
     file.write_text('time, angle\n')
-    for path, said in ((file, 'and no MCAP file'), (tmp_path / 'none', 'does not exist')):
+    for path, said in ((file, 'not an MCAP file'), (tmp_path / 'none', 'does not exist')):
         with pytest.raises(BagError, match=said):
             build(BagParameters(str(path)), one_input())
 
@@ -334,7 +334,7 @@ def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path)
 
 def test_one_instant_cannot_repeat(tmp_path):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5), sample(0, 0.6)))
-    with pytest.raises(DefinitionError, match='of one instant; leave repeat out') as caught:
+    with pytest.raises(DefinitionError, match='have the same time; leave repeat out') as caught:
         build(BagParameters(file, repeat=True), one_input())
     assert caught.value.where == 'drive.bag.repeat'
     fast = build(BagParameters(file, repeat=True, pace='fast'), one_input())

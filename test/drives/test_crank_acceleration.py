@@ -128,5 +128,7 @@ def test_the_effort_behind_a_topic_has_the_inertia_of_a_crank_that_accelerates(d
 
 
 def test_a_low_pass_of_nothing_is_refused():
-    with pytest.raises(FileError, match='cutoff: filters nothing; add acceleration: differenced'):
+    with pytest.raises(
+        FileError, match='cutoff: has nothing to filter; add acceleration: differenced'
+    ):
         pipeline_of('drive: {topic: {cutoff: 5}}\n', PENDULUM)

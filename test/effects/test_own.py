@@ -225,7 +225,7 @@ REFUSED = {
         'import no_such_thing_at_all',
         (
             'cannot be imported: ModuleNotFoundError: "No module named '
-            '\'no_such_thing_at_all\'"; put it right; `python3 -c "import MINE.effect"` says where'
+            '\'no_such_thing_at_all\'"; correct it; `python3 -c "import MINE.effect"` says where'
         ),
     ),
     'it ends the interpreter': ('raise SystemExit(3)', "cannot be imported: SystemExit: '3'"),
@@ -241,12 +241,12 @@ REFUSED = {
     ),
     'a place that is none': (
         HEAD + ADD.replace("'bias'", "'bais'"),
-        "AFTER is 'bais': that is no effect; did you mean 'bias'?",
+        "AFTER is 'bais': that is not an effect; did you mean 'bias'?",
     ),
     'no place': (HEAD + ADD.replace('AFTER', 'BEHIND'), 'does not say AFTER which'),
     'behind the last': (
         HEAD + ADD.replace("'bias'", "'delay'"),
-        "AFTER is 'delay', and delay is the last that reads; set AFTER = 'dropout'",
+        "AFTER is 'delay', and delay is the last sensor; set AFTER = 'dropout'",
     ),
     'before what it starts from': (
         HEAD + YIELD.replace("AFTER = 'pin_forces'", "AFTER = 'velocity'"),
@@ -254,7 +254,7 @@ REFUSED = {
     ),
     'a need that is none': (
         HEAD + YIELD.replace("('pin_forces',)", "('noise',)"),
-        "NEEDS 'noise'; of quantities there are velocity, acceleration, effort, pin_forces",
+        "NEEDS 'noise'; name some of velocity, acceleration, effort, pin_forces",
     ),
     'a message without a topic': (
         HEAD + NO_TOPIC,
@@ -284,15 +284,15 @@ def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
         (
             'nobody_has_this.effect: {}',
             (
-                'effects.nobody_has_this.effect: there is no module nobody_has_this; put the '
-                'folder that it lies in on PYTHONPATH, or source its workspace'
+                'effects.nobody_has_this.effect: there is no module nobody_has_this; add its '
+                'folder to PYTHONPATH, or source its workspace'
             ),
         ),
         (
             'linkage_ros.no_effect: {}',
-            'effects.linkage_ros.no_effect: there is no module linkage_ros.no_effect; put',
+            'effects.linkage_ros.no_effect: there is no module linkage_ros.no_effect; add',
         ),
-        ('.effect: {}', 'effects..effect: is no dotted name of a module; write package.module'),
+        ('.effect: {}', 'effects..effect: is not a dotted module name; write package.module'),
         ('MINE.add: {buy: 1}', "effects.MINE.add.buy: unknown key; did you mean 'by'?"),
         ('MINE.add: {by: 11}', 'effects.MINE.add.by: 11 is out of bounds; write a finite number'),
         ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {…}'),
@@ -368,7 +368,7 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
     assert gone.stderr == (
         f'linkage: bag is trusted: imports {mine}.add, and the name leads to no module\n'
         f'linkage replay: bag: scene.yaml:2: effects.{mine}.add: there is no module {mine}; '
-        'put the folder that it lies in on PYTHONPATH, or source its workspace\n'
+        'add its folder to PYTHONPATH, or source its workspace\n'
     )
     # Of another size too: what Python has compiled it takes again within the same second.
     file.write_text(file.read_text().replace('+ parameters', '- 1.0 * parameters'))

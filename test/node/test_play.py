@@ -472,7 +472,7 @@ def wrong(folder):
 WRONG = [
     # what is typed, and what the answer names
     ('missing', 'missing: does not exist'),
-    ('text.mcap', 'text.mcap: is a text file, and no MCAP file'),
+    ('text.mcap', 'text.mcap: is a text file, not an MCAP file'),
     ('empty.mcap', 'empty.mcap: is empty'),
     ('folder', 'folder: holds no .mcap file'),
     ('silent', 'silent: holds no messages; there is nothing to play'),

@@ -91,7 +91,7 @@ def test_a_killed_worker_loses_no_finished_run(capsys):
     _, said = study.communicate(timeout=PATIENCE)
     assert study.returncode == 2
     assert 'Traceback' not in said
-    assert 'the study: a process of it was killed; run the same command again' in said
+    assert 'the study: one of its processes was killed; run the same command again' in said
     check_goes_on(kept, capsys)
 
 

@@ -217,8 +217,8 @@ def test_a_solver_that_cannot_be_is_refused_by_reader_and_schema(text):
 
 
 BUILT = {
-    'solver: {table: {tolerance: 1.0e-6}}\neffects: {effort: {}}': 'table finds no forces',
-    'solver: {newton: {tolerance: 1.0e-6}}\ndrive: {torque: {}}': 'newton finds no forces',
+    'solver: {table: {tolerance: 1.0e-6}}\neffects: {effort: {}}': 'table computes no forces',
+    'solver: {newton: {tolerance: 1.0e-6}}\ndrive: {torque: {}}': 'newton computes no forces',
     'solver: {table: {tolerance: 1.0e-6, span: [2, 1]}}': 'solver.table.span: 2 to 1 rad is empty',
     'solver: {table: {tolerance: 1.0e-6, span: [0, 1.0e6]}}': 'solver.table: tolerance',
 }

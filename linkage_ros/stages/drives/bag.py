@@ -14,7 +14,7 @@ joints, numbers beyond its bounds, stamps that go back. Absent rates are differe
 lead of a stamp over the clock does not matter, since the first sample counts as taken at the first
 tick.
 
-The order of the messages is that of their log times, whatever that in the file: other writers do
+The messages are ordered by their log times, whatever their order in the file: other writers do
 not keep it. The drive reads the bag when it is built, and again at every reset. A sample takes 8
 bytes for its time and 16 for each input: 86 MB for an hour at 1 kHz, and some 150 MB while the bag
 is read.
@@ -44,13 +44,7 @@ class BagSamples:
     """
     Good samples, in the order of their log times and stamps.
 
-    Parameters
-    ----------
-    use
-        How samples are used, which decides whether they need rates.
-    context
-        Context of the drive.
-
+    ``use`` decides whether they need rates.
     """
 
     __slots__ = (
@@ -127,23 +121,10 @@ class BagSamples:
 
 def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> BagSamples:
     """
-    Return the samples of a bag's crank topic.
+    Return the samples of a topic of a bag, or raise `BagError`.
 
-    Parameters
-    ----------
-    bag
-        The bag.
-    topic
-        The topic; '' for the topic that the run's account in the bag names or, without an account,
-        for the only topic with good samples.
-    use, context
-        As for `BagSamples`.
-
-    Raises
-    ------
-    BagError
-        No topic, or more than one, has good samples; or the bag is damaged.
-
+    If the topic is '', it is the crank topic of the run or, without a run's account in the bag,
+    the only topic with good samples.
     """
     of_type = [each.name for each in bag.topics if each.type == _TYPE]
     if topic and topic not in of_type:
@@ -198,7 +179,7 @@ class BagParameters:
     """The crank samples of a recorded bag, from the first tick on."""
 
     file: str = file("the bag's folder, or its MCAP file")
-    topic: str = text('topic of the samples; absent, that which holds the input joints', '')
+    topic: str = text('topic of the samples; absent, the topic with the input joints', '')
     pace: str = choice(
         'recorded: samples follow each other as recorded; fast: one for every tick, as it is',
         ('recorded', 'fast'),
@@ -230,13 +211,8 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     """
     Read the bag and build the drive.
 
-    Raises
-    ------
-    BagError
-        The bag cannot be read, or no topic, or more than one, has the input joints.
-    DefinitionError
-        It should repeat, but its samples take no time.
-
+    Raise `BagError` if the bag cannot be read, or if no topic, or more than one, has the input
+    joints; raise `DefinitionError` if the samples should repeat, but take no time.
     """
     recorded = parameters.pace == 'recorded'
     use = TopicParameters(
@@ -255,22 +231,8 @@ class RecordedPace(Drive):
     """
     Recorded samples at their times: each as long after the first tick as after the first sample.
 
-    A `TopicDrive` makes the crank state between and after them.
-
-    Parameters
-    ----------
-    samples
-        The samples.
-    use
-        How samples are used.
-    repeat
-        Whether they start again at the end.
-
-    Raises
-    ------
-    DefinitionError
-        They should start again, but take no time.
-
+    A `TopicDrive` makes the crank state between and after them. If they ``repeat``, but take no
+    time, `DefinitionError` is raised.
     """
 
     __slots__ = ('_newest', '_period', '_start', '_topic', 'max_age', 'samples')
@@ -287,7 +249,7 @@ class RecordedPace(Drive):
         length, intervals = samples.offsets[-1], len(samples) - 1
         if repeat and not length:
             raise DefinitionError(
-                'drive.bag.repeat', 'the samples are of one instant', 'leave repeat out'
+                'drive.bag.repeat', 'all samples have the same time', 'leave repeat out'
             )
         self._period = length + length // intervals if repeat else 0
 
@@ -314,17 +276,7 @@ class RecordedPace(Drive):
 
 
 class FastPace(Drive):
-    """
-    Recorded samples one by one: each tick takes the next one as measured, whatever the time.
-
-    Parameters
-    ----------
-    samples
-        The samples.
-    repeat
-        Whether they start again after the last.
-
-    """
+    """Recorded samples one by one: each tick takes the next one as measured, whatever the time."""
 
     __slots__ = ('_next', '_repeat', 'samples')
 

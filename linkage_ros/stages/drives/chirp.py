@@ -35,6 +35,8 @@ from linkage_ros.description import choice, each_part, flag, number
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import as_integers, build_clocked, Curve, LARGEST
 
+_FINEST = 2**60
+
 
 @dataclass(frozen=True, slots=True)
 class Chirp:
@@ -127,9 +129,6 @@ def _linear_sweep(start: float, end: float, length: int) -> _FrequencySweep:
         return start + (end - start) * (time / length), slope
 
     return _FrequencySweep(periods, 2 * length * below * NANOSECONDS, frequency)
-
-
-_FINEST = 2**60
 
 
 def _logarithmic_sweep(start: float, end: float, length: int) -> _FrequencySweep:

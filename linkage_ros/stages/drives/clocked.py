@@ -23,35 +23,29 @@ from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics import Closure, InputSweep
 from linkage_ros.stages.drives.drive import Context, CrankState, Drive
 
+LARGEST = 1e10
+"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
+
+Curve = Callable[[int], tuple[float, float, float]]
+"""
+Value, rate and acceleration of an input at a time since the first tick, in [ns].
+
+In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
+derivative by time of the one before it.
+"""
+
 
 def refuse_beyond(
     closure: Closure, number: int, where: str, start: float, extent: tuple[float, float]
 ) -> None:
     """
-    Refuse a motion of an input that leaves the limits of a joint, where that can be known.
+    Refuse a motion of an input that leaves the limits of a joint, where it can be known.
 
-    It can be known for the limits of the input itself and, with a single input, for those of
+    It can be known for the limits of the input itself and, with a single input, for the limits of
     published joints. A motion that leaves the range through a toggle is not refused: there the
-    loop is open.
-
-    Parameters
-    ----------
-    closure
-        The linkage.
-    number
-        Index of the input.
-    where
-        Key of the motion, for error messages.
-    start
-        Its first value, in [rad] or [m].
-    extent
-        Least and greatest value; infinite for a motion without bound.
-
-    Raises
-    ------
-    DefinitionError
-        A joint leaves its limits; the error names it.
-
+    loop is open. ``number`` is the index of the input, ``where`` the key of the motion, ``start``
+    its first value, and ``extent`` its least and greatest value, in [rad] or [m]; infinite without
+    bound. Raise `DefinitionError`, which names the joint.
     """
     given = closure.linkage.inputs[number]
     low, high = extent
@@ -87,28 +81,8 @@ def refuse_beyond(
             )
 
 
-LARGEST = 1e10
-"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
-
-Curve = Callable[[int], tuple[float, float, float]]
-"""
-Value, rate and acceleration of an input at a time since the first tick, in [ns].
-
-In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
-derivative by time of the one before it.
-"""
-
-
 class ClockedDrive(Drive):
-    """
-    Inputs that follow curves from the first tick on.
-
-    Parameters
-    ----------
-    curves
-        One curve for each input, in the order of the linkage.
-
-    """
+    """Inputs that follow curves, one for each input of the linkage, from the first tick on."""
 
     __slots__ = ('_curve', '_curves', 'start')
 
@@ -154,28 +128,13 @@ def build_clocked(
     context: Context,
 ) -> ClockedDrive:
     """
-    Build a drive from curves.
+    Build a drive from curves; ``where`` is its key.
 
-    Parameters
-    ----------
-    where
-        Key of the drive, for error messages.
-    curve
-        Makes a curve from parameters and their key for error messages.
-    extent
-        Returns the least and the greatest value of a curve, in [rad] or [m]; infinite for a motion
-        without bound.
-    use
-        Parameters of an input, and of those that differ by name in its ``inputs``.
-    context
-        Context of the drive.
-
-    Raises
-    ------
-    DefinitionError
-        Every input has its own parameters, so that the common ones have no effect; or an input
-        leaves the limits of a joint.
-
+    ``curve`` makes a curve from parameters and their key; ``extent`` returns its least and
+    greatest value, in [rad] or [m]; infinite without bound. ``use`` has the parameters of an
+    input, and in its ``inputs`` the parameters that differ, by name. Raise `DefinitionError` if
+    every input has its own parameters, so that the common ones have no effect, or if an input
+    leaves the limits of a joint.
     """
     names = [given.joint for given in context.closure.linkage.inputs]
     inputs = use.inputs

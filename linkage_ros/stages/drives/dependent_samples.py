@@ -24,15 +24,11 @@ if TYPE_CHECKING:
 
 def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure:
     """
-    Return the closure that a joint drives, on the branch of a number; 0 stands for the only one.
+    Return the closure that a joint drives, on the branch of a number; 0 means the only branch.
 
-    Raises
-    ------
-    DefinitionError
-        As `Closure.driven_by`, with the key of the scene.
-
+    Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
-    # Another solver has no branches of its own.
+    # Another solver has no branches.
     closed: Closure = getattr(closure, 'closed', closure)
     try:
         return closed.driven_by(joint, branch=number or None)
@@ -61,17 +57,9 @@ def joint_of(branch: CrankBranch, crank: float, rate: float) -> tuple[float, flo
 
 class DependentSampleReader:
     """
-    Reads samples of a dependent joint from serialized messages, and returns those of the crank.
+    Reads samples of a dependent joint from serialized messages, and returns the crank's samples.
 
     Where the joint turns back, the crank has no rate: it is absent, NaN.
-
-    Parameters
-    ----------
-    branch
-        The branch on which the crank is.
-    joint
-        Name of the joint in messages.
-
     """
 
     __slots__ = ('_branch', '_read')

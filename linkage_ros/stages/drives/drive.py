@@ -52,6 +52,9 @@ DRIVES = {
 LARGEST = 1e10
 """Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
 
+Reader = Callable[[bytes], Any]
+"""Reads a sample, or a Rejection, from a message."""
+
 
 class CrankState(NamedTuple):
     """
@@ -66,7 +69,7 @@ class CrankState(NamedTuple):
     accelerations
         Accelerations in [rad/s²] or [m/s²]; 0 where unknown.
     age
-        Time of the tick minus that of the sample, in [ns].
+        Time of the tick minus time of the sample, in [ns].
 
     """
 
@@ -195,7 +198,7 @@ class Context:
         return tuple(self.prefix + given.joint for given in self.closure.linkage.inputs)
 
     def random(self, effect: str) -> Random:
-        """Return the random generator of an effect, independent of those of other effects."""
+        """Return the random generator of an effect, independent of other effects."""
         return self.generator(self.seed, effect)
 
     @staticmethod
@@ -224,7 +227,3 @@ class Context:
         from linkage_ros.dynamics import Reactions  # local import: only with forces
 
         return Reactions(self.mechanics)
-
-
-Reader = Callable[[bytes], Any]
-"""Reads a sample, or a Rejection, from a message."""

@@ -26,16 +26,8 @@ class MotorEncoder:
     """
     Writes what the encoder of a motor reads.
 
-    Parameters
-    ----------
-    name
-        Name of the motor's joint in messages.
-    counts
-        Counts in a turn of the motor; 0 for an exact reading.
-    motor
-        Returns angle, rate and torque of the motor, in [rad], [rad/s] and [N·m]; None for no
-        torque.
-
+    ``counts`` is the number of counts per turn of the motor; 0 for an exact reading. ``motor``
+    returns angle, rate and torque of the motor, in [rad], [rad/s] and [N·m]; None for no torque.
     """
 
     def __init__(

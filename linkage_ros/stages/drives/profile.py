@@ -37,6 +37,8 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives.clocked import build_clocked, Curve, LARGEST
 
+_Polynomial = tuple[float, float, float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Profile:
@@ -94,11 +96,7 @@ def motion_curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
     """
     Return value, rate and acceleration as a function of time, in [ns].
 
-    Raises
-    ------
-    DefinitionError
-        The table has less than two rows, or times that do not increase.
-
+    Raise `DefinitionError` if the table has less than two rows, or times that do not increase.
     """
     times = _table_times(parameters.table, f'{where}.table')
     values = [value for _, value in parameters.table]
@@ -161,9 +159,6 @@ def _table_times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
                 'write times that increase, by 1 ns at least',
             )
     return times
-
-
-_Polynomial = tuple[float, float, float, float, float]
 
 
 def _cubic_spline(

@@ -38,6 +38,8 @@ from linkage_ros.stages.drives.drive import Context, CrankState, Drive, LARGEST,
 
 TOPIC = 'crank_states'
 
+_Values = tuple[float, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class TopicParameters:
@@ -95,11 +97,7 @@ def reader(parameters: TopicParameters, context: Context) -> Reader:
     """
     Build the reader of the messages.
 
-    Raises
-    ------
-    DefinitionError
-        The joint does not tell the crank.
-
+    Raise `DefinitionError` if the joint does not determine the crank.
     """
     if parameters.joint:
         from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
@@ -116,22 +114,15 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
     """
     Build the drive.
 
-    Raises
-    ------
-    DefinitionError
-        A low-pass has nothing to filter, or a branch has no joint.
-
+    Raise `DefinitionError` if a low-pass has nothing to filter, or if a branch has no joint.
     """
     if parameters.cutoff and parameters.acceleration == 'zero':
         raise DefinitionError(
-            'drive.topic.cutoff', 'filters nothing', 'add acceleration: differenced'
+            'drive.topic.cutoff', 'has nothing to filter', 'add acceleration: differenced'
         )
     if parameters.branch and not parameters.joint:
-        raise DefinitionError('drive.topic.branch', 'is of no joint', 'name it: joint: NAME')
+        raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
     return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
-
-
-_Values = tuple[float, ...]
 
 
 class TopicDrive(Drive):
@@ -139,18 +130,8 @@ class TopicDrive(Drive):
     Drive that keeps the newest good sample only.
 
     The crank's acceleration is 0, as the extrapolation at constant rate implies. If it is
-    estimated, the crank is carried forward with it, rates included.
-
-    Parameters
-    ----------
-    use
-        How samples are used.
-    needs_rate
-        Whether anything besides the extrapolation needs the crank's rate. If nothing does,
-        a rate that is absent counts as 0.
-    inputs
-        Inputs of the linkage; () for inputs that are all revolute.
-
+    estimated, the crank is carried forward with it, rates included. An absent rate counts as 0 if
+    only the extrapolation needs the rate. ``inputs`` may be () if all inputs are revolute.
     """
 
     __slots__ = (
@@ -196,17 +177,7 @@ class TopicDrive(Drive):
         return self._last[0] if self._last else 0
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
-        """
-        Take a sample, or return why it is rejected; a rejected sample changes nothing.
-
-        Parameters
-        ----------
-        sample
-            The sample.
-        now
-            The time, in [ns].
-
-        """
+        """Take a sample at a time [ns], or return why it is rejected; then nothing changes."""
         stamp, angles, rates = sample
         zeros = (0.0,) * len(angles)
         if rates is None:

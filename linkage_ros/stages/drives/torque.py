@@ -118,7 +118,7 @@ class MotorParameters:
 
 @dataclass(frozen=True, slots=True)
 class PlayParameters:
-    """Play between the motor and the crank, each with an inertia of its own."""
+    """Play between the motor and the crank, each with its own inertia."""
 
     width: float = number(
         'by which the motor turns against the crank', unit='rad or m', above=0.0, most=100.0
@@ -200,12 +200,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     """
     Build the drive.
 
-    Raises
-    ------
-    DefinitionError
-        The linkage has several inputs or lacks masses, no motion can start at the given start, or
-        the brake is not specified.
-
+    Raise `DefinitionError` if the linkage has several inputs or lacks masses, no motion can start
+    at the given start, or the brake is not specified.
     """
     _refuse_useless(parameters, context)
     motion = _build_motion(parameters, context)
@@ -394,26 +390,9 @@ class TorqueDrive(Drive):
     A tick integrates a limited time, so that a late tick does not become later still: beyond the
     limit whole steps are skipped, as if the mechanism had stood still.
 
-    Parameters
-    ----------
-    mechanism
-        What moves: `SingleDofMechanism`, or `linkage_ros.dynamics.two_masses.TwoMasses`.
-    start
-        Its state at the first tick.
-    use
-        Step size, and the effort without a valid command.
-    period
-        Time from tick to tick, in [ns]; 0 if it is not known.
-    most
-        Greatest command in either direction, in [N·m] or [N], or of a motor in [A] or [V];
-        commands are clipped to it.
-    motor
-        The motor that is mounted on the mechanism; None if there is none.
-    wrenches
-        The wrenches on the links, which messages change.
-    exerts_effort
-        Whether something asks for the effort.
-
+    The mechanism is a `SingleDofMechanism` or `linkage_ros.dynamics.two_masses.TwoMasses`.
+    ``period`` is the time from tick to tick, in [ns]; 0 if unknown. Commands are clipped to
+    ±``most``, in [N·m] or [N], or for a motor in [A] or [V].
     """
 
     __slots__ = (
@@ -489,17 +468,7 @@ class TorqueDrive(Drive):
         self.stamp = self.lost = self.saturated = 0
 
     def offer(self, command: EffortCommand, now: int) -> Rejection | None:
-        """
-        Take a command from now on, or return why it is rejected; a rejected one changes nothing.
-
-        Parameters
-        ----------
-        command
-            The command.
-        now
-            The time, in [ns].
-
-        """
+        """Take a command at a time [ns], or return why it is rejected; then nothing changes."""
         effort = command.effort
         if not -LARGEST <= effort <= LARGEST:
             if isfinite(effort):
@@ -550,11 +519,8 @@ class TorqueDrive(Drive):
         """
         Return the crank state at a time, in [ns]; for an earlier time, the last state.
 
-        Raises
-        ------
-        LinkageError
-            Motor and crank meet and part too often, and the scene ends the run then.
-
+        Raise `LinkageError` if motor and crank meet and part too often, and the scene ends the run
+        then.
         """
         if self._time < 0:
             self._time = self._begun = now

@@ -31,35 +31,18 @@ Begin = Callable[[float], float]
 
 
 class Continuous:
-    """
-    Unwraps angles; the first value lies in (−π, π].
-
-    Parameters
-    ----------
-    turning
-        Whether each joint is an angle.
-    begins
-        First value of joints that start elsewhere, by joint index.
-
-    Attributes
-    ----------
-    places
-        Indices of the joints that are angles.
-    raw
-        Last joint values before unwrapping; empty before the first.
-    added
-        Whole turns added to each joint, in [rad].
-
-    """
+    """Unwraps angles; the first value lies in (−π, π], unless ``begins`` has one."""
 
     __slots__ = ('_begin', '_turns', 'added', 'places', 'raw')
 
     def __init__(self, turning: Sequence[bool], begins: Mapping[int, Begin] | None = None) -> None:
-        self.places = tuple(i for i, turns in enumerate(turning) if turns)
+        self.places = tuple(
+            i for i, turns in enumerate(turning) if turns
+        )  # Joints that are angles
         self._begin = dict.fromkeys(self.places, wrap_angle) | dict(begins or {})
         self._turns = [0] * len(turning)
-        self.raw: tuple[float, ...] = ()
-        self.added = (_NO_TURN,) * len(turning)
+        self.raw: tuple[float, ...] = ()  # Last joint values before unwrapping
+        self.added = (_NO_TURN,) * len(turning)  # Whole turns, in [rad]
 
     def __call__(self, _now: int, reading: SensorReading) -> SensorReading:
         """Return the reading with unwrapped angles."""
@@ -101,15 +84,7 @@ def first_values(closure: Closure) -> dict[int, Begin]:
 
 
 def wrap_all(turning: Sequence[bool]) -> Sensor:
-    """
-    Build a stage that wraps angles to (−π, π].
-
-    Parameters
-    ----------
-    turning
-        Whether each joint is an angle.
-
-    """
+    """Build a stage that wraps the joints that are angles to (−π, π]."""
     turns = tuple(turning)
 
     def wrap(_now: int, reading: SensorReading) -> SensorReading:

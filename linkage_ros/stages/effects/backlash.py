@@ -89,15 +89,9 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
 
 class Play:
     """
-    The motion of one crank within its play.
+    The motion of one crank within its play, in [rad] or [m].
 
-    Parameters
-    ----------
-    play
-        Width of the play, in [rad] or [m].
-    turns
-        Whether the position is an angle, which may be wrapped.
-
+    ``turns`` is True if the position is an angle, which may be wrapped.
     """
 
     __slots__ = ('_crank', '_half', '_motor', '_turns')
@@ -112,20 +106,10 @@ class Play:
         self, motor: float, rate: float, acceleration: float
     ) -> tuple[float, float, float, float | None]:
         """
-        Return the state of the crank, and the motor's acceleration if it moves alone.
+        Return position, rate and acceleration of the crank, and ``free``.
 
-        Parameters
-        ----------
-        motor, rate, acceleration
-            State of the motor, in [rad] or [m], and per [s] and [s²].
-
-        Returns
-        -------
-        crank, rate, acceleration
-            State of the crank.
-        free
-            Acceleration of the motor while it moves alone; None while it pushes the crank.
-
+        ``free`` is the acceleration of the motor while it moves alone; None while it pushes the
+        crank.
         """
         crank = self._crank
         if crank is None:

@@ -21,7 +21,7 @@ angle at which it passes through 0 upwards (R. M. Kennel, Encoders for simultane
 position and speed in electrical drives with digital control, IEEE Transactions on Industry
 Applications 43, 2007).
 
-bᵥ and bₑ, ``rates`` and ``efforts``, are those of sensors that measure rates, and torques or
+bᵥ and bₑ, ``rates`` and ``efforts``, belong to sensors that measure rates, and torques or
 forces. Accelerations have no bias.
 """
 
@@ -87,15 +87,7 @@ PARAMETERS = BiasParameters
 
 
 def sensor(parameters: BiasParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raises
-    ------
-    DefinitionError
-        There is no error, or a slide has a disc.
-
-    """
+    """Build the sensor; raise `DefinitionError` if there is no error, or if a slide has a disc."""
     if parameters == BiasParameters():
         raise DefinitionError(
             'effects.bias', 'names no joint', 'write joints: {JOINT: 0.01}, or leave it out'

@@ -14,18 +14,18 @@ radial play c, and it lies along the force that it carries (S. W. E. Earles and 
 analysis of a rigid-link mechanism with clearance at a bearing, using Lagrangian mechanics and
 digital computation, 1973; P. Flores, J. Ambrósio, J. C. P. Claro and H. M. Lankarani, Kinematics
 and Dynamics of Multibody Systems with Imperfect Joints, 2008). It is in tension: the centre of the
-hole or pin of ``link`` is displaced from that of ``to`` by::
+hole or pin of ``link`` is displaced from the centre at ``to`` by::
 
     δ = −c·F/|F|              F: the force that ``to`` exerts on ``link``
 
 so a link that hangs in its pin hangs lower by c. In a pin of three links or more, each link is
 displaced in this way from the first one that ``links`` names on the pin.
 
-The force is that of the linkage without play. The displacement of the published joints is computed
-to first order, with fixed inputs; its error is of the order of the square of the play. Contact is
-never lost: where a force reverses, the pin is on the other side at once. The model is
-quasi-static: the rates are those of the linkage without play. A pin whose force is below 1e-12 of
-the largest in the linkage is not displaced.
+The force is computed for the linkage without play. The displacement of the published joints is
+computed to first order, with fixed inputs; its error is of the order of the square of the play.
+Contact is never lost: where a force reverses, the pin is on the other side at once. The model is
+quasi-static: the rates do not contain the play. A pin whose force is below 1e-12 of the largest in
+the linkage is not displaced.
 """
 
 from __future__ import annotations
@@ -60,15 +60,7 @@ PARAMETERS = ClearanceParameters
 
 
 def stage(parameters: ClearanceParameters, context: Context) -> Stage:
-    """
-    Build the stage.
-
-    Raises
-    ------
-    DefinitionError
-        A slider is named.
-
-    """
+    """Build the stage; raise `DefinitionError` if a slider is named."""
     joints = context.closure.structure.joints
     pins = {joint.name for joint in joints if joint.kind == 'R'}
     for name in parameters.pins:

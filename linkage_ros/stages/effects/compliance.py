@@ -17,10 +17,10 @@ included::
     N = ½·(F_Q − F_P)·u
 
 So each end bears half of the loads between the pins: weight, inertia and springs. The force is
-that of the rigid linkage. The displacement of the published joints is computed to first order,
-with fixed inputs: valid for stretches that are small against the links, with an error of the order
-of their square. The model is quasi-static: the stretch adds no vibration, and the rates are those
-of the rigid linkage.
+computed for the rigid linkage. The displacement of the published joints is computed to first
+order, with fixed inputs: valid for stretches that are small against the links, with an error of
+the order of their square. The model is quasi-static: the stretch adds no vibration, and the rates
+belong to the rigid linkage.
 """
 
 from __future__ import annotations
@@ -66,15 +66,7 @@ class _Bar(NamedTuple):
 
 
 def stage(parameters: ComplianceParameters, context: Context) -> Stage:
-    """
-    Build the stage.
-
-    Raises
-    ------
-    DefinitionError
-        A link has not exactly two pins.
-
-    """
+    """Build the stage; raise `DefinitionError` if a link has not exactly two pins."""
     bars = tuple(_make_bar(context, link, k) for link, k in parameters.links.items())
     rigid = (0j,) * len(context.closure.structure.joints)
     shift_of = context.reactions.joint_deflections

@@ -30,7 +30,7 @@ reading arrives once, unchanged, at the first tick that is d later; if several a
 ticks, one at each tick.
 
 With ``stamp: arrival`` the message has the stamp of its tick, as from a driver that does not know
-the delay; with ``measured`` the time of measurement, t − d, or that of the reading.
+the delay; with ``measured`` the time of measurement, t − d, or the stamp of the reading.
 
 The line holds the readings of the last d: 1000 for a second at 1 kHz.
 
@@ -38,11 +38,11 @@ With ``spread``, v, the latency of each reading is random: d + v·u, with u unif
 with the mean 1 if ``distribution`` is exponential (cut off at 20). Then readings are messages from
 the beginning. With ``reorder`` a message may overtake others, as over several paths or by UDP;
 else it arrives with the one before it at the earliest, as over TCP. With the probability
-``duplicates`` a message arrives a second time, after a latency of its own. Of several that arrive
+``duplicates`` a message arrives a second time, after its own latency. Of several that arrive
 between two ticks the last one is published. (On latencies in networked control: J. Nilsson,
 Real-Time Control Systems with Delays, 1998.)
 
-A joint under ``joints`` has a line of its own, with its own latency: see `own_sensors`.
+A joint under ``joints`` has its own line, with its own latency: see `own_sensors`.
 """
 
 from __future__ import annotations
@@ -60,6 +60,9 @@ from linkage_ros.stages.effects.history import History
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 _AUTOMATIC = 'automatic'
+
+_LONGEST = 20.0
+"""Largest exponential latency, in its mean: one of 5e8 is longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +123,8 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
-    Raises
-    ------
-    DefinitionError
-        Readings of random latency are to be interpolated, or to overtake without a spread; or
-        joints that were measured at several times are to have one stamp.
-
+    Raise `DefinitionError` if readings of random latency are to be interpolated, or to overtake
+    without a spread, or if joints that were measured at several times are to have one stamp.
     """
     if parameters.joints is not None:
         from linkage_ros.stages.effects.own_sensors import (
@@ -135,7 +134,7 @@ def sensor(parameters: DelayParameters, context: Context) -> Sensor:
         if parameters.stamp == 'measured':
             raise DefinitionError(
                 'effects.delay.stamp',
-                'measured is one time, and joints with lines of their own have several',
+                'measured is one time, and joints with their own lines have several',
                 'write arrival, or leave joints out',
             )
         return own_sensors('delay', sensor, parameters, context)
@@ -160,20 +159,8 @@ class Delay:
     """
     A delay line.
 
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    mixes
-        Whether readings are interpolated between ticks; else the line carries one per tick.
-    with_rates
-        Whether the interpolation uses the rates too.
-
-    Attributes
-    ----------
-    gap_begins
-        Whether the last reported gap began there.
-
+    If it ``mixes``, it interpolates readings between ticks, with their rates if ``with_rates``;
+    otherwise it carries one reading per tick.
     """
 
     __slots__ = (
@@ -237,22 +224,8 @@ class Delay:
         return None
 
 
-_LONGEST = 20.0
-"""Largest exponential latency, in its mean: one of 5e8 is longer."""
-
-
 class RandomDelay:
-    """
-    A line of messages with random latencies.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        The generator.
-
-    """
+    """A line of messages with random latencies."""
 
     __slots__ = ('_count', '_delay', '_draw', '_duplicates', '_latest', '_measured', '_random',
                  '_reorder', '_way', 'gap_begins')  # fmt: skip

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Effects by name: those of this package, and user-defined modules by their dotted names."""
+"""Effects by name: the package's own, and user-defined modules by their dotted names."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def effect_dependencies(effect: str) -> tuple[str, ...]:
 
 
 def effects_requiring(name: str, named: Collection[str]) -> tuple[str, ...]:
-    """Return those of the named effects that add another one to the scene."""
+    """Return the named effects that add another one to the scene."""
     own = [other for other in named if '.' in other or other in EFFECTS]
     return tuple(other for other in in_order(own) if name in effect_dependencies(other))
 

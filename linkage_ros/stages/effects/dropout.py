@@ -30,7 +30,7 @@ sample to lose.
 ``hold: silent`` publishes nothing for a lost sample; ``repeat`` publishes the last one that
 arrived, with the stamp of the tick, and nothing before the first.
 
-A joint under ``joints`` has a line of its own, with its own losses: see `own_sensors`.
+A joint under ``joints`` has its own line, with its own losses: see `own_sensors`.
 """
 
 from __future__ import annotations
@@ -76,15 +76,7 @@ PARAMETERS = DropoutParameters
 
 
 def sensor(parameters: DropoutParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raises
-    ------
-    DefinitionError
-        Bursts this short cannot lose so many samples.
-
-    """
+    """Build the sensor; raise `DefinitionError` if the bursts are too short for the losses."""
     if parameters.joints is None:
         return Dropout(parameters, context.random('dropout'))
     from linkage_ros.stages.effects.own_sensors import own_sensors  # local import: only for joints
@@ -108,8 +100,8 @@ def _loss_probabilities(loss: float, burst: float) -> tuple[float, float]:
             remedy = f'write {_least_burst(loss)} or more [samples], or a lower probability'
         raise DefinitionError(
             'effects.dropout.burst',
-            f'with a mean of {burst:g} no {loss:g} of all samples can be lost, since between two '
-            'bursts one arrives',
+            f'bursts of {burst:g} on average cannot lose {loss:g} of all samples, since one '
+            'arrives between two bursts',
             remedy,
         )
     return min(loss / (burst * (1.0 - loss)), 1.0), 1.0 - 1.0 / burst
@@ -130,17 +122,7 @@ def _least_burst(loss: float) -> str:
 
 
 class Dropout:
-    """
-    Sensor stage that loses samples.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        Random generator of the losses.
-
-    """
+    """Sensor stage that loses samples."""
 
     __slots__ = ('_begins', '_chance', '_goes_on', '_last', '_random', '_repeat')
 

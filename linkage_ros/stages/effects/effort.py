@@ -14,12 +14,12 @@ With friction that grows with the forces in the joints it comes from these force
 
 It covers the inertia of links and drive, gravity, springs and friction: see
 `linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
-from the drive; that of a topic counts as 0 unless it is estimated.
+from the drive; a topic's acceleration counts as 0 unless it is estimated.
 
 Under the torque drive, the effort that causes a motion is the commanded one. An input at rest
 shows no motion from which it follows: friction and stops bear a part. The drive then exerts its
-command. A brake, or the friction in a motor's gear, holds within a range; of it, the drive exerts
-what is nearest to the effort that the loads alone require.
+command. A brake, or the friction in a motor's gear, holds within a range; the drive exerts the
+effort in it that is nearest to the effort that the loads alone require.
 
 After backlash, a motor that moves within the play pushes nothing. Friction holds the crank, and
 the effort of that drive is for its own inertia only: drive_inertia·φ̈, with φ̈ of the motor.

@@ -39,9 +39,8 @@ estimation from discrete position versus time data, IEEE Transactions on Industr
     v ← v + (1 − e^(−2π·cutoff·Δt))·(d − v)
 
 which is exact for a difference d that is held over Δt. Turns and the step of y at the index mark
-are no motion, and not part of them. ``exact``
-leaves the rates unchanged. A reading without rates gets none. Accelerations, efforts, and joints
-without an encoder are unchanged.
+are not a motion, and not part of the differences. ``exact`` leaves the rates unchanged. A reading
+without rates gets none. Accelerations, efforts, and joints without an encoder are unchanged.
 """
 
 from __future__ import annotations
@@ -100,11 +99,8 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
-    Raises
-    ------
-    DefinitionError
-        An absolute encoder has ``index: false``, or a low-pass has no differences to smooth.
-
+    Raise `DefinitionError` if an absolute encoder has ``index: false``, or if a low-pass has no
+    differences to smooth.
     """
     if parameters.cutoff and parameters.rates == 'exact':
         raise DefinitionError(
@@ -137,17 +133,9 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
 
 class Counter:
     """
-    The counts of one joint.
+    The counts of one joint; ``turns`` is True if the joint is an angle.
 
-    Parameters
-    ----------
-    encoder
-        Parameters of the encoder.
-    turns
-        Whether the joint is an angle.
-    cutoff
-        Of the low-pass of its rate, in [Hz]; 0 for none.
-
+    ``cutoff`` is the frequency of the low-pass of the rate, in [Hz]; 0 for none.
     """
 
     __slots__ = (
@@ -187,7 +175,7 @@ class Counter:
         return encoder.offset + count * span / counts
 
     def read_rate(self, elapsed: int) -> float:
-        """Return the rate that a driver computes, so many [ns] after its last reading."""
+        """Return the rate that a driver computes, a time [ns] after its last reading."""
         if self._read is not None and self._last is not None and elapsed > 0:
             moved = self._last - self._read
             rate = moved * self._span / (self._counts * elapsed * 1e-9)
@@ -206,21 +194,9 @@ class Counter:
 
 class Encoder:
     """
-    The encoders of a linkage.
+    The encoders of a linkage: index and counter of each joint with an encoder.
 
-    Parameters
-    ----------
-    counters
-        Index and counter of each joint with an encoder.
-    differenced
-        Whether the rates are computed from the counts.
-
-    Attributes
-    ----------
-    read_at_ticks
-        Whether the driver reads the counts at every tick; else only when `difference_rates` is
-        called.
-
+    If ``differenced``, the rates are computed from the counts.
     """
 
     __slots__ = ('_counters', '_differenced', '_last', 'read_at_ticks')
@@ -229,7 +205,7 @@ class Encoder:
         self._counters = counters
         self._differenced = differenced
         self._last = 0
-        self.read_at_ticks = True
+        self.read_at_ticks = True  # If False, only `difference_rates` reads the counts
 
     def select_joints(self, places: Sequence[int]) -> Encoder:
         """Return a driver that reads the counts of these joints alone, at its own times."""

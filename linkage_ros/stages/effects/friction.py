@@ -9,7 +9,7 @@
 """
 Friction: resistance of pins and sliders to their motion.
 
-It is no stage of the tick: all that works with forces includes it, namely efforts, pin forces,
+It is not a stage of the tick: all that works with forces includes it, namely efforts, pin forces,
 clearance and compliance, and the torque drive. In a pin::
 
     T = −viscous·ω − (coulomb + (breakaway − coulomb)·exp(−(ω/stribeck)²) + D)·sign(ω)

@@ -40,18 +40,11 @@ _Values = tuple[float, ...]
 
 class History:
     """
-    Readings and gaps of a time span; older ones are deleted.
+    Readings and gaps of a time span, in [ns]; older ones are deleted.
 
-    A gap begins at the first time without a reading, and lasts until the next reading.
-
-    Parameters
-    ----------
-    span
-        Length of the span, in [ns].
-    with_rates
-        Whether the values change at the given rates. A crank that is held between its samples has
-        a rate but stands still.
-
+    A gap begins at the first time without a reading, and lasts until the next reading. With
+    ``with_rates`` the values change at the given rates; a crank that is held between its samples
+    has a rate but stands still.
     """
 
     __slots__ = ('_readings', '_span', '_times', '_with_rates')
@@ -72,16 +65,9 @@ class History:
 
     def add(self, now: int, reading: SensorReading) -> None:
         """
-        Add a reading.
+        Add the reading of a tick at a time, in [ns], never before the last one.
 
-        Parameters
-        ----------
-        now
-            Time of its tick, in [ns]; never before the last one. Of readings at the same time the
-            last one counts.
-        reading
-            The reading.
-
+        Of readings at the same time the last one counts.
         """
         times, readings = self._times, self._readings
         if times and times[-1] == now:
@@ -91,13 +77,9 @@ class History:
 
     def add_gap(self, now: int) -> bool:
         """
-        Add a gap at a time, in [ns].
+        Add a gap at a time, in [ns]; return whether a new gap begins.
 
-        Returns
-        -------
-        begins
-            Whether a new gap begins: not within a gap, nor before the first reading.
-
+        Within a gap, and before the first reading, no new gap begins.
         """
         if not self._times or self._readings[-1] is None:
             return False
@@ -119,13 +101,7 @@ class History:
         """
         Return the newest reading at a time, in [ns]; in a gap the last one before it, once.
 
-        Parameters
-        ----------
-        time
-            The time.
-        since
-            Time of the last request: in a gap only a later reading is returned.
-
+        ``since`` is the time of the last request: in a gap only a later reading is returned.
         """
         at = bisect_right(self._times, time)
         if at and self._readings[at - 1] is not None:

@@ -19,8 +19,8 @@ At the tick t the sensor has measured all joints at one instant, δ earlier::
 1995); 0.3 % of the draws lie beyond J. At the rate v the error of a reading is up to v·J.
 
 Between two ticks x is interpolated as in `history`. An instant before the first tick is replaced
-by the first tick's. If J is longer than a period, an instant may come before that of the previous
-tick. The message keeps the stamp of its tick. Where the linkage has no pose, or had none at the
+by the first tick's. If J is longer than a period, an instant may come before the previous tick's
+instant. The message keeps the stamp of its tick. Where the linkage has no pose, or had none at the
 instant, nothing is read.
 
 All instants are whole nanoseconds.
@@ -57,22 +57,9 @@ def sensor(parameters: JitterParameters, context: Context) -> Jitter:
 
 class Jitter:
     """
-    Sensor stage with varying instants of measurement.
+    Sensor stage with varying instants of measurement; ``random`` draws δ.
 
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    random
-        Random generator of δ.
-    with_rates
-        Whether the interpolation uses the rates too.
-
-    Attributes
-    ----------
-    gap_begins
-        Whether the last reported gap began there.
-
+    With ``with_rates`` the interpolation uses the rates too.
     """
 
     __slots__ = ('_earlier', '_history', 'gap_begins')

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Shapes of a linkage's markers, from those of `linkage_ros.kinematics.shapes`, packed once.
+A linkage's markers, from the shapes of `linkage_ros.kinematics.shapes`, packed once.
 
 The shape of a link has its own frame, at a point of the link and turned with it, so only positions
 and angles change from message to message. Shapes that lie on top in the drawing get a greater z,
@@ -58,6 +58,15 @@ from linkage_ros.messages import (
 
 ARROW_POINTS = 16
 """Number of points of an effort's arrow, with its head."""
+
+_GRAVITY = 9.81
+_SHORTEST = 0.25
+"""Least length of an arrow, in half bars."""
+
+_WIDEST = 1.7 * pi
+"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
+
+Points = Mapping[tuple[str, str], complex]
 
 
 class Key(NamedTuple):
@@ -121,21 +130,11 @@ def marker_shapes(
     lifetimes: tuple[int, int],
 ) -> MarkerShapes:
     """
-    Build the markers of a linkage.
+    Build the markers of a linkage, with their numbers of arrows for forces and efforts.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    width
-        Width of a bar, as a share of the workspace; 0 for a suitable one.
-    trail
-        Number of points in a traced point's trail; 0 for its whole curve instead.
-    forces, efforts
-        Numbers of arrows.
-    lifetimes
-        Lifetimes of moving and of still markers, in [ns].
-
+    ``width`` is the width of a bar, as a share of the workspace; 0 for a suitable one. ``trail``
+    is the number of points in a traced point's trail; 0 for its whole curve instead. ``lifetimes``
+    are the lifetimes of moving and of still markers, in [ns].
     """
     shown = prepare_view(closure, usual_inputs(closure))
     low, high = bounding_corners(all_places(shown))
@@ -281,21 +280,12 @@ def _flat_point(place: complex) -> Place:
     return place.real, place.imag, 0.0
 
 
-_GRAVITY = 9.81
-_SHORTEST = 0.25
-"""Least length of an arrow, in half bars."""
-
-_WIDEST = 1.7 * pi
-"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
-
-Points = Mapping[tuple[str, str], complex]
-
-
 class Arrows:
     """
     Arrows for forces and efforts, each as its points; none where it is too short to be seen.
 
-    They begin where the force acts. Without a given scale, their lengths are::
+    They begin at the ``joints`` where the forces act. The lengths follow ``scale``, in [m/N]; if
+    it is 0, they are::
 
         L = D/8 · ln(1 + F/W)
 
@@ -303,16 +293,6 @@ class Arrows:
     no force is too small or too large to be seen, and an arrow does not depend on earlier ones.
     The effort of a rotating drive is an arc about its pin, at a radius of eight half bars, as long
     as the arrow of its force at that radius.
-
-    Parameters
-    ----------
-    scale
-        Length per force, in [m/N]; 0 for the logarithm.
-    closure, shapes
-        The linkage, and its drawn size.
-    joints
-        Joints at which the forces act.
-
     """
 
     def __init__(

@@ -85,17 +85,7 @@ def writer(parameters: MarkersParameters, context: Context) -> Writer:
 
 
 class Markers:
-    """
-    The markers of a linkage, at their own rate.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-    context
-        Context with the linkage to show.
-
-    """
+    """The markers of a linkage, at their own rate."""
 
     __slots__ = (
         '_arrows', '_closure', '_frame', '_full', '_groups', '_inputs', '_moving', '_near', '_per',

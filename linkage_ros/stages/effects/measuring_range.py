@@ -68,15 +68,7 @@ PARAMETERS = MeasuringRangeParameters
 
 
 def sensor(parameters: MeasuringRangeParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raises
-    ------
-    DefinitionError
-        The limits of a joint cross.
-
-    """
+    """Build the sensor; raise `DefinitionError` if the limits of a joint cross."""
     joints = context.closure.linkage.joints
     for joint, limits in parameters.joints.items():
         if limits.low >= limits.high:

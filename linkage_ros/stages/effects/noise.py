@@ -30,7 +30,7 @@ Over times far below T it is a walk of K = s·√(2/T).
 measure torque or force: rates and efforts do not contain the noise of y, nor do accelerations.
 
 Each joint and each kind of noise has its own generator, which draws once in every tick, with or
-without rates: the noise of one joint does not change that of another.
+without rates: the noise of one joint does not change another joint's noise.
 """
 
 from __future__ import annotations
@@ -103,11 +103,8 @@ def sensor(parameters: NoiseParameters, context: Context) -> Sensor:
     """
     Build the sensor.
 
-    Raises
-    ------
-    DefinitionError
-        Parameters of a joint exclude or lack each other, or a density has no rate.
-
+    Raise `DefinitionError` if parameters of a joint exclude or lack each other, or if a density
+    has no rate.
     """
     for joint, noise in parameters.joints.items():
         _check_noise(f'effects.noise.joints.{joint}', noise, context.rate)
@@ -149,17 +146,7 @@ def _check_noise(key: str, noise: JointNoise, rate: float) -> None:
 
 
 class _Drift:
-    """
-    A Gauss–Markov process of order one.
-
-    Parameters
-    ----------
-    source
-        Index of the joint, standard deviation, and generator.
-    correlation_time
-        T, in [s].
-
-    """
+    """A Gauss–Markov process of order one, with its correlation time T, in [s]."""
 
     __slots__ = ('_deviation', '_last', '_normal', '_time', '_value', 'joint')
 
@@ -181,17 +168,7 @@ class _Drift:
 
 
 class Noise:
-    """
-    Noise of all joints, with the state of each random walk.
-
-    Parameters
-    ----------
-    white, walk, rate_white, effort_white
-        Noise sources, by kind.
-    drifts
-        The drifts.
-
-    """
+    """Noise of all joints, by kind, with the state of each random walk."""
 
     __slots__ = (
         '_drifts', '_effort_white', '_last', '_rate_white', '_walk', '_wandered', '_white',

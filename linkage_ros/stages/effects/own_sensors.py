@@ -7,9 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Own sensors: joints that are read by sensors of their own, beside the one of the other joints.
+Own sensors: joints that have their own sensors, beside the sensor of the other joints.
 
-A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has such a sensor of its own, with
+A joint under ``joints`` of `rate_limit`, `dropout` or `delay` has its own sensor, with
 its own parameters (those that it leaves out have their defaults) and its own random generator. So
 one more such joint changes nothing for the others.
 
@@ -22,7 +22,7 @@ repeated; likewise for accelerations and efforts.
 For the own sensors behind these, a joint is silent where its sensor has no reading: `dropout`
 loses its samples, and not their repetitions.
 
-The stamp is that of the newest reading.
+The stamp is the stamp of the newest reading.
 """
 
 from __future__ import annotations
@@ -45,22 +45,9 @@ def own_sensors(
     effect: str, build: Callable[[Any, Context], Sensor], parameters: Any, context: Context
 ) -> OwnSensors:
     """
-    Build one sensor for each joint under ``joints``, and one for all other joints.
+    Build one sensor of an effect for each joint under ``joints``, and one for all other joints.
 
-    Parameters
-    ----------
-    effect
-        Name of the effect.
-    build
-        Builds a sensor of the effect.
-    parameters, context
-        Its parameters, and the context of the linkage.
-
-    Raises
-    ------
-    DefinitionError
-        No joint is named, or parameters do not fit together.
-
+    Raise `DefinitionError` if no joint is named, or if parameters do not fit together.
     """
     if not parameters.joints:
         raise DefinitionError(
@@ -91,21 +78,11 @@ class PartlyNew(SensorReading):
 
 class OwnSensors:
     """
-    Sensors side by side.
+    Sensors side by side, each with the indices of its joints.
 
-    Parameters
-    ----------
-    groups
-        Indices of joints, and the sensor that reads them.
-
-    Attributes
-    ----------
-    gap, silence
-        As of the sensors; None if they have none.
-    gap_begins
-        Whether the last reported gap began there, or one of the sensors had a reading that was
-        not published: a replay needs these ticks.
-
+    ``gap_begins`` is True if the last reported gap began there, or if one of the sensors had a
+    reading that was not published: a replay needs these ticks. ``gap`` and ``silence`` are the
+    sensors' own; None if they have none.
     """
 
     __slots__ = ('_groups', '_held', '_order', 'gap', 'gap_begins', 'silence')

@@ -9,7 +9,7 @@
 """
 Pin forces: forces between the links of a linkage in their pins and sliders.
 
-They are those of the rigid linkage, by Newton's and Euler's equations of every link; see
+They are computed for the rigid linkage, by Newton's and Euler's equations of every link; see
 `linkage_ros.dynamics.reactions`. One message holds all forces of an instant, hence the type
 ``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` per pin: these would
 be separate topics, to be matched by stamp, each with a frame that no node broadcasts. ``wrench``

@@ -27,7 +27,7 @@ between two samples.
 and with the stamp of the tick, as a driver that polls its sensor. ``silent`` publishes a sample
 once.
 
-A joint under ``joints`` has a sensor of its own, with its own rate, phase and clock error: see
+A joint under ``joints`` has its own sensor, with its own rate, phase and clock error: see
 `own_sensors`.
 """
 
@@ -86,15 +86,7 @@ def sensor(parameters: RateLimitParameters, context: Context) -> Sensor:
 
 
 class RateLimit:
-    """
-    Sample and hold.
-
-    Parameters
-    ----------
-    use
-        Parameters of the effect.
-
-    """
+    """Sample and hold."""
 
     __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_phase', '_repeat', '_unit')
 

@@ -26,8 +26,8 @@ and with one function, whose name gives its place in the tick and which builds i
 ``sensor(parameters, context) -> Callable[[int, SensorReading], SensorReading | None]``
     Between the mechanism and the message: takes the time of the tick, in [ns], and the reading so
     far; returns the reading, or None. It is not called where the linkage has no pose or no crank,
-    unless it has a method ``gap(now) -> SensorReading | None``; such a sensor also says by
-    ``gap_begins`` whether the last gap that it was told of began there.
+    unless it has a method ``gap(now) -> SensorReading | None``; such a sensor also has
+    ``gap_begins``: True if the gap started at the last call of `gap`.
 
 An effect that publishes its own message also has
 
@@ -123,7 +123,7 @@ class MechanismState(NamedTuple):
     position
         The closed loop.
     velocity, acceleration
-        Those of the loop; None if no stage computes them, or at a toggle.
+        Derivatives of the loop's position; None if no stage computes them, or at a toggle.
     efforts
         Of the inputs, in [N·m] or [N]; empty if no stage computes them, or at a toggle.
     reactions
@@ -172,24 +172,12 @@ class SensorReading(NamedTuple):
 
 
 class SensorStage(NamedTuple):
-    """
-    A sensor in its place.
-
-    Attributes
-    ----------
-    read
-        The sensor.
-    gap
-        Called where the linkage has no pose; returns the reading. None if the sensor has no such
-        method.
-    silence
-        Called where a sensor before it has no reading, with whether the reason is a gap; returns
-        the reading. None if the sensor has no such method.
-
-    """
+    """A sensor in its place."""
 
     read: Sensor
+    # Called where the linkage has no pose; returns the reading. None if the sensor has no `gap`.
     gap: Callable[[int], SensorReading | None] | None
+    # Called where a sensor before it has no reading, with True for a gap; returns the reading.
     silence: Callable[[int, bool], SensorReading | None] | None
 
     @classmethod
@@ -199,31 +187,18 @@ class SensorStage(NamedTuple):
 
     @property
     def gap_begins(self) -> bool:
-        """Return whether the last gap that it was told of began there."""
+        """Return whether the gap started at the last call of `gap`."""
         return self.gap is not None and bool(self.read.gap_begins)  # type: ignore[attr-defined]
 
 
 class WriterStage(NamedTuple):
-    """
-    A writer of a message in its place.
-
-    Attributes
-    ----------
-    write
-        Writes the message.
-    no_pose
-        Writes it where the loop has no pose; None where nothing is published then.
-    due
-        Says whether there is anything to write at a time, in [ns]; None for always.
-    of_reading
-        Whether the message is made of the reading alone.
-
-    """
+    """A writer of a message in its place."""
 
     write: Writer
+    # Writes the message where the loop has no pose; None where nothing is published then.
     no_pose: Callable[[int, Position], bytes] | None
-    due: Callable[[int], bool] | None
-    of_reading: bool
+    due: Callable[[int], bool] | None  # At a time, in [ns]; None for always
+    of_reading: bool  # The message is made of the reading alone
 
     @classmethod
     def from_writer(cls, writer: Writer, *, of_reading: bool) -> WriterStage:

@@ -79,15 +79,7 @@ PARAMETERS = ToleranceParameters
 
 
 def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> Linkage:
-    """
-    Return the linkage as manufactured.
-
-    Raises
-    ------
-    DefinitionError
-        It does not close.
-
-    """
+    """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
     deviating = parameters.links or tuple(linkage.links)
     links = {}
     for link, points in linkage.links.items():

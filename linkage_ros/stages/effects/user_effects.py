@@ -60,11 +60,11 @@ def user_module(name: str) -> ModuleType:
     Raises
     ------
     DefinitionError
-        If there is no such module, or it is no effect; ``where`` is its name.
+        If there is no such module, or it is not an effect; ``where`` is its name.
 
     """
     if not all(part.isidentifier() for part in name.split('.')):
-        raise DefinitionError(name, 'is no dotted name of a module', 'write package.module')
+        raise DefinitionError(name, 'is not a dotted module name', 'write package.module')
     try:
         module = import_module(name)
     except ModuleNotFoundError as error:
@@ -73,7 +73,7 @@ def user_module(name: str) -> ModuleType:
         raise DefinitionError(
             name,
             f'there is no module {error.name}',
-            'put the folder that it lies in on PYTHONPATH, or source its workspace',
+            'add its folder to PYTHONPATH, or source its workspace',
         ) from None
     except (Exception, SystemExit) as error:  # noqa: BLE001 (a module of others may do anything)
         raise _failure(name, error) from None
@@ -82,7 +82,7 @@ def user_module(name: str) -> ModuleType:
 
 
 def found_in(name: str) -> str:
-    """Return where Python would find a user-defined effect, without running any of it."""
+    """Return where Python would find a user-defined effect, without running it."""
     package = name.partition('.')[0]
     try:
         # The package alone: searching for a module within it would run the package.
@@ -133,12 +133,12 @@ def _failure(name: str, error: BaseException) -> DefinitionError:
     return DefinitionError(
         name,
         f'cannot be imported: {type(error).__name__}: {quote(str(error))}',
-        f'put it right; `python3 -c "import {name}"` says where',
+        f'correct it; `python3 -c "import {name}"` says where',
     )
 
 
 def _check_module(name: str, module: ModuleType) -> None:
-    """Refuse a module that is no effect."""
+    """Refuse a module that is not an effect."""
     parameters: Any = getattr(module, 'PARAMETERS', None)
     try:
         known = isinstance(parameters, type) and declared_fields(parameters) is not None
@@ -174,12 +174,12 @@ def _check_order(name: str, module: ModuleType) -> None:
         known = f'name one of {list_names(EFFECTS)}'
         said = f'AFTER is {quote(after)}' if after is not None else 'does not say AFTER which'
         remedy = did_you_mean(after, EFFECTS, known) if isinstance(after, str) else known
-        raise DefinitionError(name, f'{said}: that is no effect', remedy)
+        raise DefinitionError(name, f'{said}: that is not an effect', remedy)
     needs = getattr(module, 'NEEDS', ())
     for need in needs:
         if need not in QUANTITIES:
             raise DefinitionError(
-                name, f'NEEDS {quote(need)}', f'of quantities there are {list_names(QUANTITIES)}'
+                name, f'NEEDS {quote(need)}', f'name some of {list_names(QUANTITIES)}'
             )
     last = max((_ORDER.index(need) for need in needs), default=0)
     if last > _ORDER.index(after):
@@ -189,6 +189,6 @@ def _check_order(name: str, module: ModuleType) -> None:
     if hasattr(module, 'sensor') and _ORDER.index(after) > _ORDER.index(_LAST_FOR_SENSORS):
         raise DefinitionError(
             name,
-            f'AFTER is {after!r}, and delay is the last that reads',
+            f'AFTER is {after!r}, and delay is the last sensor',
             f'set AFTER = {_LAST_FOR_SENSORS!r}',
         )
