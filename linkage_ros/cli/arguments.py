@@ -150,7 +150,7 @@ def read_numbers(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if not numbers or not all(map(isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f'{text!r} is no number; write 40, or 40,20')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a number; write 40, or 40,20')
     return numbers
 
 

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded_number(1, 10**9, int),
         default=inf,
         metavar='N',
-        help='end after so many messages',
+        help='end after this number of messages',
     )
     parser.add_argument(
         '--seconds',
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--timeout',
         type=bounded_number(1e-9, 1e9),
         metavar='SECONDS',
-        help='end when no message comes for so long; without it, '
+        help='how long to wait for a message before the end; without it, '
         f'{_TIMEOUT:g} with --count, else never',
     )
     parser.add_argument(

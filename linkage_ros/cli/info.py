@@ -104,7 +104,7 @@ def bag_tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[TerminalT
         for word in ('received', 'dropped', 'let_go')
         if word == 'dropped' or _sum_counters(account, word)
     ]
-    counted = [f'>{word.replace("_", " ")}' for word in words]
+    counted = ['>discarded' if word == 'let_go' else f'>{word}' for word in words]
     heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
     rows = [
         (
@@ -135,7 +135,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['beginning_missing']:
         yield 'beginning', account['beginning_missing']
     if account['damage']:
-        yield 'DAMAGED', f'{account["damage"]}; what lies before is told here'
+        yield 'DAMAGED', f'{account["damage"]}; only what lies before is described'
     if account['recording_failure']:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
@@ -144,11 +144,11 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     )
     if received is not None:
         yield 'received', str(received)
-    unknown = 'not told: no recorder of ours closed the bag'
+    unknown = 'unknown: linkage_ros did not close the bag'
     yield 'dropped', unknown if dropped is None else str(dropped)
     if discarded:
-        yield 'let go', f'{discarded}, with files that made way for newer ones'
-    yield 'versions', ', '.join(_version_texts(account['versions'])) or 'not told'
+        yield 'discarded', f'{discarded}, with files that made way for newer ones'
+    yield 'versions', ', '.join(_version_texts(account['versions'])) or 'unknown'
     scene = account['scene']
     if scene:
         rate = f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'a tick a sample'
@@ -161,7 +161,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
         )
     if account['replay']:
         of, same = account['replay'].values()
-        yield 'run again', f'{same} of {of} joint states come to the same bytes'
+        yield 'run again', f'{same} of {of} joint states give the recorded bytes'
 
 
 def _sum_counters(account: dict[str, Any], word: str) -> int | None:

@@ -42,22 +42,22 @@ from linkage_ros.workbench import find_tool, TOOLS
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
-    'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
+    'demo': 'run the demo scene and its crank, on a separate ROS graph',
     'simulate': 'run a scene as fast as it goes, without ROS, to a bag, CSV or Parquet',
     'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
     'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
     'plot': 'draw the joints of a bag over the angle of its crank',
-    'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
+    'info': 'describe a bag: its content, how well its loops closed, where a toggle was nearest',
     'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
-    'recover': 'make a whole bag of what a damaged or unfinished one still holds',
+    'recover': 'write what a damaged or unfinished bag still holds to a new bag',
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
-    'compare': 'say how far the joints of two runs lie apart over the time, and draw it',
-    'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
-    'accuracy': 'say where the error of a scene comes from, what a digit costs, what to write',
+    'compare': 'show how far the joints of two runs lie apart over time, and draw it',
+    'scene': 'describe a scene; list all effects; print the schemas of the files',
+    'accuracy': 'find where the error of a scene comes from, what a digit costs, what to write',
     'gallery': 'list the linkages and scenes that come with the package; print or copy one',
-    'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
+    'check': 'describe a linkage: mobility, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'view': 'show a linkage in the browser, to drag, drive and edit it; a scene, a node or a bag',
     'draw': 'draw a linkage, and its joints over its range',
@@ -93,7 +93,7 @@ _INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*
 
 def _in_plain_words(found: re.Match[str]) -> str:
     kind = 'whole number' if found[1] or 'int value' in found[0] else 'number'
-    return f'{found[2]} is no {kind}{decimal_comma(found[3])}'
+    return f'{found[2]} is not a {kind}{decimal_comma(found[3])}'
 
 
 class Parser(argparse.ArgumentParser):

@@ -286,7 +286,7 @@ def _versions_text(said: Mapping[str, str]) -> str:
         for key in said
         if key not in words
     ]
-    return ', '.join(texts) or 'versions that it does not tell'
+    return ', '.join(texts) or 'unknown versions'
 
 
 def _place_text(where: Mapping[str, Any], begin: int) -> str:
@@ -298,7 +298,7 @@ def _tick_text(where: Mapping[str, Any], begin: int) -> str:
 
 
 def _number_text(value: float | None) -> str:
-    return 'no number' if value is None else f'{value:.3g}'
+    return 'not a number' if value is None else f'{value:.3g}'
 
 
 # Counterfactual replay: another scene runs over the samples of a bag.
@@ -509,7 +509,7 @@ def _show_proof(account: dict[str, Any]) -> None:
     differ, ticks = account['different_ticks'], account['compared_ticks']
     verdict = account['verdict']
     if verdict == IDENTICAL:
-        text = f'identical: what {ticks} ticks have made comes to the same again'
+        text = f'identical: all {ticks} ticks give the recorded bytes'
     else:
         text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
     print(f'{account["bag"]}: {text}')
@@ -524,7 +524,7 @@ def _show_proof(account: dict[str, Any]) -> None:
         if last < account['ticks'] and last != first['tick']:
             print(f'from tick {last + 1} on all are the same')
     elif first:
-        print(escape_unprintable(f'not told, first: {first_text(first, begin)}'))
+        print(escape_unprintable(f'undecided, first: {first_text(first, begin)}'))
     if account['withheld_ticks']:
         print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
     for line in versions_text(account['versions']):

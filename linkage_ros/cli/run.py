@@ -218,7 +218,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
         rows += [
             (
                 'memory',
-                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.discarded} let go'
+                f'{t.name}: {t.received} received, {t.kept} in memory, {t.discarded} discarded'
                 + (f', {t.dropped} dropped' if t.dropped else ''),
             )
             for t in memory.topics
@@ -229,7 +229,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
             (
                 'recorded',
                 f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped'
-                + (f', {t.discarded} let go with the oldest files' if t.discarded else ''),
+                + (f', {t.discarded} discarded with the oldest files' if t.discarded else ''),
             )
             for t in recording.topics
         ]

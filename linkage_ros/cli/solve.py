@@ -257,7 +257,7 @@ def _joint_value(text: str) -> tuple[str, float]:
     except ValueError:
         number = nan
     if not name or not isfinite(number):
-        raise argparse.ArgumentTypeError(f'{text!r} is no joint with a value; write NAME=40')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a joint with a value; write NAME=40')
     return name, number
 
 

@@ -69,7 +69,7 @@ def _check_regular(status: os.stat_result, file: str | Path) -> None:
         return
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(file))
-    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is no file')
+    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is not a file')
     raise OSError(EINVAL, f'{what}, not a regular file', str(file))
 
 
@@ -128,7 +128,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
         _check_folder(Path(file))
         target = Path(file).resolve()
         if target.exists() and not target.is_file():
-            raise LinkageError(file, 'is there already and is no file', 'name another file')
+            raise LinkageError(file, 'exists and is not a file', 'name another file')
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
         with replace_file(target) as stream:

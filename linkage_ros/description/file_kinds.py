@@ -25,7 +25,7 @@ class FileKind(NamedTuple):
 
 _BAG = FileKind('a bag', 'linkage info, plot and report read bags')
 _EMPTY = FileKind('empty', 'linkage gallery four_bar prints an example')
-BINARY = FileKind('no text file', 'name a scene or a linkage file, which is UTF-8 text')
+BINARY = FileKind('a binary file', 'name a scene or a linkage file, which is UTF-8 text')
 _NOT_UTF_8 = BINARY._replace(is_foreign=False)
 _UTF_16 = FileKind('text in UTF-16', 'save it as UTF-8 text')
 _TEXT = FileKind('a text file', is_foreign=False)

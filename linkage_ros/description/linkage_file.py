@@ -380,7 +380,9 @@ def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]
     for name in limited:
         if name not in joints:
             raise limited.error(
-                name, f'{quote(name)} is no joint of it', f'name one of {list_names(joints)}'
+                name,
+                f'{quote(name)} is not a joint of the linkage',
+                f'name one of {list_names(joints)}',
             )
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], limited.section(name)) for name in limited]

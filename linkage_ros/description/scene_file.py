@@ -323,7 +323,7 @@ def _read_linkages(
             raise entry.error(
                 'prefix' if 'prefix' in entry else '',
                 f'a second linkage publishes {list_names(sorted(twice))}',
-                'give each linkage its own prefix, or its joints names of their own',
+                'give each linkage its own prefix, or its joints other names',
             )
         entry.finish(_LINKAGE_KEYS)
     return members, files
@@ -406,12 +406,14 @@ def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
     """Refuse effects that do not fit to the drive, or to what is published."""
     if 'effort' in effects and not published:
         raise effects.error(
-            'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
+            'effort',
+            'is the effort of the input joint, which is not published',
+            'set publish_input: true, or name pin_forces',
         )
     if drive == 'torque' and 'backlash' in effects:
         raise effects.error(
             'backlash',
-            'is a play without masses, and torque moves masses',
+            'is play without masses, and torque moves masses',
             'write drive.torque.play: {width: …, inertia: …} instead',
         )
 
@@ -429,7 +431,7 @@ def _read_prefix(content: Section, default: str) -> str:
     prefix = content.text('prefix', '') if 'prefix' in content else default
     if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
         raise content.error(
-            'prefix', f'{quote(prefix)} begins no name of a joint', 'use letters, digits and _/.-'
+            'prefix', f'{quote(prefix)} cannot begin a joint name', 'use letters, digits and _/.-'
         )
     return prefix
 
@@ -514,7 +516,7 @@ def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
         raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
     if not named or named[0] not in SOLVERS:
         solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names none', f'write one of {list_names(SOLVERS)}')
+        raise solvers.error('', 'names no solver', f'write one of {list_names(SOLVERS)}')
     (name,) = named
     parameters = import_module(SOLVERS[name]).PARAMETERS
     return name, read_parameters(solvers.section(name), parameters, parts)
@@ -572,7 +574,7 @@ def _read_spring_end(content: Section, key: str) -> tuple[str, str]:
     """Return link and point of a spring's end."""
     link, dot, point = content.text(key).rpartition('.')
     if not dot or not link or not point:
-        raise content.error(key, f'{content.text(key)!r} is no point', 'write LINK.POINT')
+        raise content.error(key, f'{content.text(key)!r} is not a point', 'write LINK.POINT')
     return link, point
 
 
@@ -618,7 +620,9 @@ def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]
     parameters: Any = read_parameters(content.section(kinds[0]), FAULTS[kinds[0]], parts)
     at = content.numbers('at', most=1e9) if 'at' in content else []
     if any(time < 0.0 for time in at):
-        raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')
+        raise content.error(
+            'at', f'{at} has a negative time', 'write seconds after the first tick'
+        )
     seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
     content.finish(_WHEN)
     return Fault(kinds[0], parameters, tuple(at), seconds)

@@ -127,16 +127,16 @@ class Section:
         """Return a boolean."""
         value = self._take_value(key, default, 'true or false')
         if not isinstance(value, bool):
-            raise self.error(key, f'{quote(value)} is not a flag', 'write true or false')
+            raise self.error(key, f'{quote(value)} is not true or false', 'write true or false')
         return value
 
-    def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
+    def text(self, key: str, default: str | None = None, *, expected: str = 'a string') -> str:
         """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
         value = self._take_value(key, default, expected)
         if value == default and default is not None:
             return default
         if not isinstance(value, str) or not value.isprintable() or not value:
-            raise self.error(key, f'{quote(value)} is not a text', 'write a name; quote numbers')
+            raise self.error(key, f'{quote(value)} is not a string', 'write a name; quote numbers')
         return value
 
     def ros_name(self, name: str) -> str:
@@ -144,7 +144,7 @@ class Section:
         if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
             raise self.error(
                 name if name in self._content else '',
-                f'{quote(name)} is no ROS name',
+                f'{quote(name)} is not a ROS name',
                 'use letters, digits and _, a letter first',
             )
         return name
@@ -242,7 +242,7 @@ class Section:
         value = self._take_value(key, None, 'a list of numbers')
         if not _is_list_of_finite(value):
             raise self.error(
-                key, f'{quote(value)} is no list of finite numbers', 'write [0.1, 0.2]'
+                key, f'{quote(value)} is not a list of finite numbers', 'write [0.1, 0.2]'
             )
         found = [self._to_si(key, v, unit) for v in value]
         self._check_most(key, value, found, most, unit)
@@ -261,7 +261,7 @@ class Section:
         row = f'[{", ".join(names)}]'
         table: list[tuple[float, ...]] = []
         if not isinstance(value, list) or not value:
-            raise self.error(key, f'{quote(value)} is no list of rows', f'write [{row}, …]')
+            raise self.error(key, f'{quote(value)} is not a list of rows', f'write [{row}, …]')
         for number, found in enumerate(value, 1):
             if not _is_list_of_finite(found) or len(found) != len(units):
                 raise self.error(
@@ -276,7 +276,7 @@ class Section:
         """Return a list of names; empty if the key is absent."""
         value = self._take_value(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
-            raise self.error(key, f'{quote(value)} is no list of names', 'write [one, other]')
+            raise self.error(key, f'{quote(value)} is not a list of names', 'write [one, other]')
         return list(value)
 
     def remove_key(self, key: str) -> None:

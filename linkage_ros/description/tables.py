@@ -48,7 +48,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
     target = Path(os.path.realpath(file))
     try:
         if target.exists() and not target.is_file():
-            raise LinkageError(str(file), 'exists, and is no file', 'name another file')
+            raise LinkageError(str(file), 'exists and is not a file', 'name another file')
         kind = TABLE_KINDS[file.suffix.lower()]
         with replace_file(target) as stream, kind(stream, heads, whole) as write:
             yield write
@@ -156,7 +156,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
         data = read_regular(file, _LARGEST_FILE)
         text = data[:_LARGEST_FILE].decode('utf-8-sig')
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
-        reason = getattr(error, 'strerror', None) or 'is no text'
+        reason = getattr(error, 'strerror', None) or 'not UTF-8 text'
         raise FileError(file, '', f'cannot be read ({reason})', 'name a CSV file') from None
     if len(data) > _LARGEST_FILE:
         raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'thin it out')
@@ -174,7 +174,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
             raise FileError(
                 file,
                 '',
-                f'line {number}: {quote(delimiter.join(cells))} is no row of {wanted} numbers',
+                f'line {number}: {quote(delimiter.join(cells))} is not a row of {wanted} numbers',
                 'write numbers with commas between them',
             )
         rows.append(row)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _TYPES = {
     'object': 'a mapping',
     'array': 'a list',
-    'string': 'a text',
+    'string': 'a string',
     'number': 'a number',
     'integer': 'a whole number',
     'boolean': 'true or false',
@@ -176,7 +176,7 @@ def _expected_text(error: ValidationError) -> str:
             return f'{least} of them{"" if least == most else " at least"}'
         case _ if rule in _BOUNDS:
             return f'a number{_bounds_text(schema)}'
-    return 'a text on one line'
+    return 'a string on one line'
 
 
 def _bounds_text(schema: Mapping[str, Any]) -> str:

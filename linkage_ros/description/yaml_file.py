@@ -163,7 +163,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
         data = read_regular(file, LARGEST_FILE)
     except IsADirectoryError:
         kind = kind_of_folder(Path(file))
-        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy) from None
+        raise FileError(file, '', f'is {kind.noun}, not a YAML file', kind.remedy) from None
     except OSError as error:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'
@@ -192,7 +192,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
     """
     kind = kind_of_bytes(data)
     if kind.is_foreign:
-        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy)
+        raise FileError(file, '', f'is {kind.noun}, not a YAML file', kind.remedy)
     if len(data) > LARGEST_FILE:
         raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:

@@ -102,7 +102,7 @@ def _create_publisher(node: Node, topic: Topic) -> Publisher:
     """Return a publisher for a topic; raise LinkageError if there can be none."""
     kind = _class_of(topic)
     unfit = LinkageError(
-        quote(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+        quote(topic.name)[1:-1] or "''", 'is not a ROS 2 topic name', 'convert the bag'
     )
     if '\0' in topic.name:  # rclpy would publish on the part before it
         raise unfit
@@ -121,7 +121,7 @@ def _class_of(topic: Topic) -> Any:
     if topic.type_hash and installed and topic.type_hash != installed:
         raise LinkageError(
             topic.name,
-            f'{topic.type} was another when it was recorded',
-            'install its ROS package of that time',
+            f'{topic.type} had another definition when it was recorded',
+            'install the version of its ROS package that the recording used',
         )
     return message_class

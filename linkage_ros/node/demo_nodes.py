@@ -107,7 +107,7 @@ class PDController(DemoNode):
     PARAMETERS = (
         _JOINT,
         NodeParameter('rate', 500.0, 'Commands a second [Hz]', (0.1, 20_000.0)),
-        NodeParameter('target', 2.0, 'Where the joint is to be [rad]', (-1e6, 1e6)),
+        NodeParameter('target', 2.0, 'Target position of the joint [rad]', (-1e6, 1e6)),
         NodeParameter('swing', 0.0, 'Amplitude about the target [rad]', (0.0, 1e6)),
         NodeParameter('period', 5.0, 'Of the swing [s]', (1e-3, 1e6)),
         NodeParameter('kp', 1.0, 'Effort for each unit of error [N·m/rad]', (0.0, 1e9)),

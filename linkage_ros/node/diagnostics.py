@@ -251,7 +251,7 @@ class DiagnosticsSummary:
                 f'Open by {last.gap:.6g} m; reachable: {reachable}'
                 if last is not None
                 and self.window_end.indeterminate == self.window_start.indeterminate
-                else 'The pose cannot be told: two pins coincide, or a link is broken'
+                else 'Pose undefined: two pins coincide, or a link is broken'
             )
         elif self.window_end.limited > self.window_start.limited:
             number, beyond = counts.last_unclosed[Status.LIMITED]
@@ -348,7 +348,7 @@ class DiagnosticsSummary:
         if rejected:
             level, message = WARN, f'{rejected} wrenches rejected'
         elif silent:
-            level, message = STALE, f'No load, for want of messages: {", ".join(silent)}'
+            level, message = STALE, f'No messages, so no load: {", ".join(silent)}'
         return self._make_status('wrenches', level, message, values)
 
     def _recording_status(self) -> DiagnosticStatus:
@@ -366,7 +366,7 @@ class DiagnosticsSummary:
                 values[f'Dropped: {topic.name}'] = topic.dropped
                 values[f'Waiting: {topic.name}'] = topic.waiting
                 if topic.discarded:
-                    values[f'Let go: {topic.name}'] = topic.discarded
+                    values[f'Discarded: {topic.name}'] = topic.discarded
             if any(topic.dropped for topic in topics):
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:
@@ -386,7 +386,7 @@ class DiagnosticsSummary:
         for topic in topics:
             values[f'Received: {topic.name}'] = topic.received
             values[f'In memory: {topic.name}'] = topic.kept
-            values[f'Let go: {topic.name}'] = topic.discarded
+            values[f'Discarded: {topic.name}'] = topic.discarded
             values[f'Dropped: {topic.name}'] = topic.dropped
         values |= {
             'In memory (s)': f'{seconds:.3f}',

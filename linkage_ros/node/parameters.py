@@ -65,9 +65,7 @@ LINKAGE_NODE = (
     NodeParameter(
         'cpu_affinity', [-1], 'Numbers of the processors that may run the tick; -1: all'
     ),
-    NodeParameter(
-        'lock_memory', False, 'Whether the memory of the process stays in that of the machine'
-    ),
+    NodeParameter('lock_memory', False, 'Whether the memory of the process is locked in RAM'),
     NodeParameter(
         'diagnostics_period', 1.0, 'Time between two diagnostics [s]', _PERIOD, changeable=True
     ),

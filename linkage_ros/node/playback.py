@@ -79,7 +79,7 @@ def playback_queue(order: LogTimeOrder, part: PlaybackPart) -> Iterator[QueuedMe
             return
         if newest == part.first:
             raise LinkageError(
-                '--loop', 'all that is played is of one instant', 'play it without --loop'
+                '--loop', 'all messages have the same time', 'play it without --loop'
             )
         base += newest - part.first
 

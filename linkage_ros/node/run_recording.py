@@ -280,9 +280,9 @@ class MemorySummary:
     failure: str  # Reason why the memory has ended early, or lacks messages; '' if it is complete
 
     def __str__(self) -> str:
-        counts = ', '.join(
-            f'{t.name} {t.received} received {t.kept} in memory at the end {t.discarded} let go'
-            + (f' {t.dropped} dropped' if t.dropped else '')
+        counts = '; '.join(
+            f'{t.name} {t.received} received, {t.kept} in memory, {t.discarded} discarded'
+            + (f', {t.dropped} dropped' if t.dropped else '')
             for t in self.topics
         )
         failure = f'{self.failure}; ' if self.failure else ''
@@ -394,7 +394,7 @@ def counts_text(summary: RecordingSummary) -> str:
     """Return the counts of a recording's messages as text."""
     return ', '.join(
         f'{t.name} {t.recorded} recorded {t.dropped} dropped'
-        + (f' {t.discarded} let go' if t.discarded else '')
+        + (f' {t.discarded} discarded' if t.discarded else '')
         for t in summary.topics
     )
 

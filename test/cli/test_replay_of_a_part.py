@@ -158,7 +158,7 @@ def test_info_tells_what_was_let_go(tmp_path, capsys) -> None:
     assert sum(topic['let_go'] for topic in account['topics']) == gone > 100
     assert any(line.split()[:2] == ['beginning', 'its'] for line in text.splitlines())
     assert f'{gone}, with files that made way for newer ones' in text
-    assert '  let go  ' in text
+    assert '  discarded  ' in text
 
 
 def test_info_tells_what_was_received(tmp_path, capsys) -> None:
@@ -178,7 +178,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
     assert [line.split() for line in text.splitlines() if line.startswith('received')] == [
         ['received', '605']
     ]
-    assert 'let go' not in text
+    assert 'discarded' not in text
 
 
 @pytest.mark.parametrize(

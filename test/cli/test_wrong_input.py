@@ -30,7 +30,7 @@ BAD = [
     (['runn'], 'runn'),
     (['run'], 'SCENE'),
     (['run', 'missing.yaml'], 'missing.yaml: cannot be read'),
-    (['run', '.'], '.: is a bag, and no file in YAML'),
+    (['run', '.'], '.: is a bag, not a YAML file'),
     (['run', 'bad.yaml'], "bad.yaml:1: lnkage: unknown key; did you mean 'linkage'?"),
     (['run', 'x.yaml', '--seconds', '-1'], '-1'),
     (['run', 'x.yaml', '--seconds', 'soon'], 'soon'),

@@ -130,8 +130,8 @@ def test_two_snapshots_that_overlap(
     assert success, message
     assert f'recorded to {runs}/bag: ' in message
     # At the second, all has become too old that the first begins with, and not what it ends with.
-    gone = counts('Let go') + 20
-    wait_for(lambda: counts('Let go') > gone, 'what is too old')
+    gone = counts('Discarded') + 20
+    wait_for(lambda: counts('Discarded') > gone, 'what is too old')
     success, message_2 = ask()
     assert success, message_2
     assert f'recorded to {runs}/bag_2: ' in message_2
@@ -155,7 +155,7 @@ def test_two_snapshots_that_overlap(
     assert status.level == OK
     values = {pair.key: pair.value for pair in status.values}
     for topic in TOPICS:
-        words = ('In memory', 'Let go', 'Dropped')
+        words = ('In memory', 'Discarded', 'Dropped')
         parts = [int(values[f'{word}: {topic}']) for word in words]
         assert int(values[f'Received: {topic}']) == sum(parts)
     assert (values['Snapshots written'], values['Snapshots failed']) == ('2', '0')
