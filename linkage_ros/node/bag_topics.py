@@ -49,22 +49,9 @@ def create_publishers(
     node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
 ) -> dict[str, Publisher]:
     """
-    Create a publisher for each topic of a bag.
+    Return a publisher for each topic of a bag, by its name there.
 
-    Parameters
-    ----------
-    node
-        The node.
-    topics
-        The topics.
-    left_out
-        Called with the reason if a topic cannot be published.
-
-    Returns
-    -------
-    publishers : dict of str to Publisher
-        By topic name in the bag.
-
+    ``left_out`` receives the reason if a topic cannot be published.
     """
     publishers = {}
     for topic in topics:

@@ -66,21 +66,7 @@ AnyNode = TypeVar('AnyNode', bound=Node)
 def run_demo_node(
     name: str, make: Callable[[], AnyNode], run: Callable[[AnyNode, Event], None], stop: Event
 ) -> int:
-    """
-    Run a demo node in this process, and return the exit code.
-
-    Parameters
-    ----------
-    name
-        Name of the node in messages.
-    make
-        Creates the node.
-    run
-        Runs the node until the event is set.
-    stop
-        Ends the run.
-
-    """
+    """Run a demo node in this process until the event is set, and return the exit code."""
     leave_out_shared_memory()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

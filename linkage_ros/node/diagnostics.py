@@ -522,15 +522,7 @@ _PATIENCE = 2.0
 
 
 class Warnings:
-    """
-    Warnings, with the time of the last one of each kind.
-
-    Parameters
-    ----------
-    logger
-        Logger of the warnings.
-
-    """
+    """Warnings, with the time of the last one of each kind."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
@@ -545,19 +537,9 @@ class Warnings:
 
     def check_age(self, counts: Counts, crank_topic: str, max_age: int, period: float) -> None:
         """
-        Warn of samples that are too old when they arrive, as where two clocks differ.
+        Warn of samples older than ``max_age`` [ns] when they arrive, as where two clocks differ.
 
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        crank_topic
-            Topic of the crank samples.
-        max_age
-            Age above which a sample gives no crank, in [ns].
-        period
-            Least time between two warnings of this kind, in [s], if it is above 30 s.
-
+        ``period``: least time between two such warnings, in [s], if it is above 30 s.
         """
         if (new := counts.stale - self._stale) <= 0:
             return
@@ -583,26 +565,10 @@ class Warnings:
         """
         Warn if no message arrives, or none with the crank's joints, and nothing is published.
 
-        Messages are taken by ticks. A tick that goes on says nothing on them, and is warned of.
-
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        crank_topic
-            Topic of the crank samples.
-        inputs
-            Names of the joints that a sample must have.
-        period
-            Least time between two warnings of this kind, in [s].
-        interval
-            Time from tick to tick, in [s]; 0 for one tick per message, infinity if a simulation
-            decides.
-        max_age
-            Age of the newest sample above which there is no crank, in [ns]; 0 for never.
-        publishers
-            Returns the names of the other publishers on the topic.
-
+        Messages are taken by ticks: a tick that does not end is warned of instead. ``interval``:
+        time from tick to tick, in [s]; 0 for one tick per message, infinity if a simulation
+        decides. ``max_age``: age of the newest sample above which there is no crank, in [ns]; 0
+        for never. ``publishers`` returns the names of the other publishers on the topic.
         """
         names = list_names(inputs)
         if counts.ignored and counts.ignored == counts.received:
@@ -647,21 +613,7 @@ class Warnings:
     def check_events(
         self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
     ) -> None:
-        """
-        Warn of events since the last warning of their kind.
-
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        closures
-            The linkages.
-        crank_topic
-            Topic of the crank samples.
-        period
-            Least time between two warnings of a kind, in [s].
-
-        """
+        """Warn of events since the last warning of their kind, at most one in a period, in [s]."""
         new = {
             r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]
         }
@@ -710,17 +662,7 @@ class Warnings:
                 )
 
     def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
-        """
-        Warn of rejected wrenches since the last such warning.
-
-        Parameters
-        ----------
-        topics
-            The name of each topic with a wrench, and its counts.
-        period
-            Least time between two warnings about a topic, in [s].
-
-        """
+        """Warn of rejected wrenches since the last warning; the period of a topic is in [s]."""
         for name, counts in topics:
             rejected, before = dict(counts.rejected), self._wrenches_rejected.get(name, {})
             new = {why: n - before.get(why, 0) for why, n in rejected.items()}

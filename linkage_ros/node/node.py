@@ -64,14 +64,8 @@ class DeferredResponse:
     """
     Defers the answer of a service, so that its callback returns before the answer is known.
 
-    A coroutine as callback would do so too, but then rclpy's executor polls it continuously, and
-    each round of the executor costs as much as five ticks.
-
-    Parameters
-    ----------
-    service
-        The service, an rclpy ``Service``; at most one answer can be pending.
-
+    At most one answer can be pending. A coroutine as callback would do so too, but then rclpy's
+    executor polls it continuously, and each round of the executor costs as much as five ticks.
     """
 
     def __init__(self, service: Any) -> None:

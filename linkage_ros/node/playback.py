@@ -58,13 +58,8 @@ def playback_queue(order: LogTimeOrder, part: PlaybackPart) -> Iterator[QueuedMe
     """
     Yield the messages to play.
 
-    Raises
-    ------
-    BagError
-        The bag is damaged; the messages before the damage have been yielded by then.
-    LinkageError
-        The part to loop has no duration.
-
+    BagError if the bag is damaged, after the messages before the damage; LinkageError if the part
+    to loop has no duration.
     """
     base = 0
     while True:
@@ -189,34 +184,8 @@ class Playback:
     """
     Sends messages when they are due, and counts them.
 
-    Parameters
-    ----------
-    first
-        Log time of the start, in [ns].
-    rate
-        Seconds of bag time per second.
-    publish
-        Function that publishes a message, for each topic.
-    steady
-        The clock for due times.
-    ticks
-        Publish the bag's time; None if ``/clock`` is not wanted.
-    progress
-        Progress callback; receives the log time, in [ns], now and then.
-
-    Attributes
-    ----------
-    counts
-        Messages sent, for each topic.
-    late
-        Messages sent later than due by more than `LATE`.
-    latest
-        Greatest delay of a message, in [ns].
-    played
-        Bag time played, in [ns].
-    took
-        Duration of the playback, in [ns].
-
+    ``first``: log time of the start, in [ns]; ``rate``: seconds of bag time per second; ``ticks``
+    publish the bag's time; ``progress`` receives the log time, in [ns], now and then.
     """
 
     def __init__(
@@ -234,8 +203,11 @@ class Playback:
         self._steady = steady
         self._ticks = ticks
         self._progress = progress
-        self.counts = dict.fromkeys(publish, 0)
-        self.late = self.latest = self.played = self.took = 0
+        self.counts = dict.fromkeys(publish, 0)  # Messages sent, for each topic
+        self.late = 0  # Messages sent later than due by more than `LATE`
+        self.latest = 0  # Greatest delay of a message, in [ns]
+        self.played = 0  # Bag time played, in [ns]
+        self.took = 0  # Duration of the playback, in [ns]
 
     def send_messages(self, cues: Iterable[QueuedMessage]) -> None:
         """Send the messages, until there are no more or the clock reports a stop."""

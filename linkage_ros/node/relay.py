@@ -57,11 +57,8 @@ class CommandRelay:
     """
     Turns commands for dependent joints of a scene into commands for their cranks.
 
-    Raises
-    ------
-    DefinitionError
-        If no linkage of the scene names such a joint, or the joint does not tell the crank.
-
+    DefinitionError if no linkage of the scene names such a joint, or if the joint does not
+    determine the crank.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -48,15 +48,7 @@ DESCRIPTION = 'description_topic'
 
 
 class RunRecording:
-    """
-    Starts and stops the bags of a node, or its memory of the last seconds, and reports on them.
-
-    Parameters
-    ----------
-    logger
-        Logger for its messages.
-
-    """
+    """Starts and stops the bags of a node, or its memory of the last seconds; reports on them."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
@@ -81,20 +73,10 @@ class RunRecording:
         """
         Start a bag that describes its own run, or a memory; return the outcome, as one line.
 
-        Parameters
-        ----------
-        scene
-            The scene that runs; the bag gets its files.
-        loop
-            The tick loop, which from now on passes on the messages that it takes and publishes.
-        directory
-            Parent of the bag's folder; '' for the folder that the scene names.
-        topics
-            Returns the topics to record, in the order of their handles, each with its key in the
-            run's account in the bag; topics with the same key form a list.
-        description
-            Robot model message (topic `DESCRIPTION`) that begins each file; empty for none.
-
+        The loop passes on the messages that it takes and publishes. ``directory``: parent of the
+        bag's folder; '' for the scene's own. ``topics`` returns the topics in the order of their
+        handles, each with its key in the run's account; topics with the same key form a list.
+        ``description``: message on topic `DESCRIPTION` that begins each file; empty for none.
         """
         record = scene.record or _DEFAULT
         storage = record.storage
@@ -293,13 +275,7 @@ class RunSnapshots:
     """
     A memory and its snapshots.
 
-    Parameters
-    ----------
-    memory
-        The memory that the tick offers to.
-    new_bag
-        Makes a bag, given whether the memory reaches back to the start of the run.
-
+    ``new_bag`` makes a bag, given whether the memory reaches back to the start of the run.
     """
 
     def __init__(self, memory: SnapshotMemory, new_bag: Callable[[bool], BagWriter]) -> None:
@@ -334,20 +310,10 @@ class RunSnapshots:
 
     def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """
-        Begin to write the memory to a new bag, on another thread.
+        Begin to write the memory to a new bag, on another thread; return why not, or ''.
 
-        Parameters
-        ----------
-        answer
-            Called by `collect_snapshot` with the outcome.
-        wake
-            Called on the writing thread when the outcome is ready.
-
-        Returns
-        -------
-        str
-            Reason why it is not begun, as one line; '' if it is begun.
-
+        `collect_snapshot` calls ``answer`` with the outcome; the writing thread calls ``wake``
+        when it is ready.
         """
         if self._writing is not None:
             return 'a snapshot is being written; ask again when it is: the memory goes on'
