@@ -44,17 +44,9 @@ def add_output(
     parser: argparse._ActionsContainer, suffixes: Collection[str], otherwise: str = ''
 ) -> None:
     """
-    Declare ``-o`` for a file, and ``--force``: see `refuse_existing`.
+    Declare ``-o`` for a file with one of the suffixes, and ``--force``: see `refuse_existing`.
 
-    Parameters
-    ----------
-    parser
-        The parser of the command, or a group of it.
-    suffixes
-        The suffixes that the command can write; any other is refused.
-    otherwise
-        What happens without ``-o``; '' if it is required.
-
+    ``otherwise`` says what happens without ``-o``; '' if it is required.
     """
     kinds = list_names([f'OUTPUT{suffix}' for suffix in suffixes], ' or ')
     parser.add_argument(

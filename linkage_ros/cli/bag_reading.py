@@ -87,13 +87,9 @@ def add_trust(parser: argparse.ArgumentParser) -> None:
 
 def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> Scene:
     """
-    Return the scene that a bag carries; list the modules it imports first, if it may.
+    Return the scene of a bag; print first which modules it imports.
 
-    Raises
-    ------
-    LinkageError
-        See `recorded_scene`.
-
+    Errors are those of `recorded_scene`.
     """
     scene = recorded_scene(bag, settings=settings)
     if not trust_effects or not scene.not_imported:

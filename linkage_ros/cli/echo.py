@@ -106,19 +106,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class _SilenceTimer:
-    """
-    The time without a message: reported once, and too long after a timeout.
-
-    Parameters
-    ----------
-    node
-        The node that listens.
-    topic
-        The topic.
-    timeout
-        Time without a message after which it is too long, in [s].
-
-    """
+    """The time without a message: reported once; too long after ``timeout``, in [s]."""
 
     def __init__(self, node: Node, topic: str, timeout: float) -> None:
         self._node, self._topic, self._timeout = node, topic, timeout

@@ -105,20 +105,9 @@ def survey_columns(
     """
     Collect the columns of the rows (first pass).
 
-    Parameters
-    ----------
-    source
-        The origin of the rows.
-    order
-        Joints that come first, in this order; others follow in the order of the bag.
-    report_progress
-        Called now and then with the number of bytes read; an exception from it ends the pass.
-
-    Raises
-    ------
-    BagError
-        If the bag is damaged, or new joint names keep coming.
-
+    The joints in ``order`` come first; others follow in the order of the bag. ``report_progress``
+    receives the number of bytes read; an exception from it ends the pass. A BagError says that the
+    bag is damaged, or that new joint names keep coming.
     """
     columns: dict[Key, None] = {}
     known: set[tuple[Key, ...]] = set()
@@ -243,26 +232,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> ExportResult:
     """
-    Write a bag's joints to a file; memory does not grow with the bag.
+    Write a bag's joints to a file, or replace it; memory does not grow with the bag.
 
-    Parameters
-    ----------
-    bag_path
-        The bag.
-    file
-        The file; one that exists is replaced.
-    topic
-        The only topic to write; None for the joint states and what was published with them.
-    stop
-        Set by a signal.
-
-    Raises
-    ------
-    StoppedError
-        If the event was set.
-    LinkageError
-        If the bag cannot be read or has nothing to write, or if the file cannot be written.
-
+    A ``topic`` is written alone; None for the joint states and what was published with them.
+    StoppedError if the event was set; LinkageError if the bag cannot be read or has nothing to
+    write, or if the file cannot be written.
     """
     check_kind(file)
     bag = open_bag(bag_path, stop)

@@ -45,17 +45,9 @@ def view_command() -> str:
 
 class PageOfRun:
     """
-    The process that serves the page of a run.
+    The process that serves the page of a run; ``say`` receives its lines, on another thread.
 
-    A page so costs the ticks of the run no more than any other subscriber does.
-
-    Parameters
-    ----------
-    node
-        Full name of the node.
-    say
-        Called, on a thread of its own, with each line that the process writes.
-
+    In a process, a page costs the ticks of the run no more than any other subscriber does.
     """
 
     def __init__(self, node: str, say: Callable[[str], None]) -> None:
