@@ -39,13 +39,7 @@ def open_regular(file: str | Path) -> BinaryIO:
     """
     Open a file for reading.
 
-    Raises
-    ------
-    OSError
-        It cannot be opened, or is no regular file; the message names its type.
-    ValueError
-        Its name contains a NUL.
-
+    OSError if it cannot be opened or is not a regular file; ValueError for a NUL in its name.
     """
     _check_regular(Path(file).stat(), file)
     # The file may have been replaced since the check.
@@ -143,11 +137,7 @@ def replace_file(target: Path) -> Iterator[BinaryIO]:
     """
     Yield a stream for the new content of a file, whatever exists there; do not follow a link.
 
-    Raises
-    ------
-    OSError
-        The file cannot be written; the old file stays, and nothing is left beside it.
-
+    On an OSError the old file stays, and no other file is left.
     """
     temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
     try:

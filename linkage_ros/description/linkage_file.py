@@ -466,25 +466,11 @@ _SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_
 
 def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
     """
-    Return a linkage in each choice of assembly sides in which it closes.
+    Return a linkage in each choice of assembly sides in which it closes; errors as in `load`.
 
-    If the file leaves sides out, those that it writes are kept; else all are chosen.
-
-    Parameters
-    ----------
-    linkage
-        Path of a linkage file, or the name of one that comes with the package.
-
-    Returns
-    -------
-    closures : dict of str to Closure
-        By the text that the file needs for it, such as ``'assembly: {B: left}'``.
-
-    Raises
-    ------
-    FileError
-        As in `load`; or there is no side to choose, or there are too many.
-
+    Keys are texts for the file, such as ``'assembly: {B: left}'``. Sides that the file writes are
+    kept if it leaves others out, else all are chosen. A FileError says that there is no side to
+    choose, or that there are too many.
     """
     file = named_file(linkage, 'linkages')
     return find_closures(linkage_content(file), file.stem)

@@ -62,15 +62,9 @@ Content = float | str | list['Content'] | dict[str, 'Content']
 
 def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
     """
-    Return the text of a linkage file.
+    Return the text of a linkage file; ``comment`` has the paragraphs of the comment at the top.
 
-    Parameters
-    ----------
-    linkage
-        The linkage; its numbers must be finite and its names printable.
-    comment
-        Paragraphs of the comment at the top.
-
+    The numbers must be finite and the names printable.
     """
     lines = list(_comment_lines(comment))
     for key, value in content_of(linkage).items():

@@ -124,15 +124,7 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
-    """
-    Return whether a file holds a scene or a linkage.
-
-    Raises
-    ------
-    FileError
-        It holds neither, or keys of both are mixed.
-
-    """
+    """Return whether a file holds a scene or a linkage; FileError for neither, or both."""
     if not ('linkage' in content or 'linkages' in content):
         if looks_like_linkage(content):
             for key in content:

@@ -31,23 +31,11 @@ _Dumper.add_representer(LinedDict, yaml.SafeDumper.represent_dict)
 
 def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
     """
-    Set keys of a scene; return the scene as text, which a bag then holds.
+    Set keys of a scene, in place; return the scene as text, which a bag then holds.
 
-    Parameters
-    ----------
-    content
-        The scene, which is changed; no key of it may have been taken.
-    settings
-        One ``KEY=VALUE`` each: a dotted key, and a value in YAML. Of several linkages one is
-        named: ``linkages.left.drive.sine.amplitude=0.3``. A part with a dot that is not in the
-        scene yet stands in quotes: ``loads.forces."coupler.P".constant=5``.
-
-    Raises
-    ------
-    FileError
-        A setting is no ``KEY=VALUE``, its key lies within something other than a mapping, or
-        there is no such linkage.
-
+    A setting is ``KEY=VALUE``, a dotted key and a value in YAML. With several linkages the key
+    names one: ``linkages.left.drive.sine.amplitude=0.3``. A new part with a dot stands in quotes:
+    ``loads.forces."coupler.P".constant=5``. A FileError names a wrong setting.
     """
     for setting in settings:
         key, equal, text = setting.partition('=')

@@ -284,15 +284,7 @@ class Section:
         self._taken.add(key)
 
     def finish(self, known: Sequence[str] = ()) -> None:
-        """
-        Refuse the remaining keys.
-
-        Parameters
-        ----------
-        known
-            Further keys that could have been here, for the suggestion.
-
-        """
+        """Refuse the remaining keys; the remedy suggests the read keys and ``known``."""
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))

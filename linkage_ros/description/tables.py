@@ -59,15 +59,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
 
 
 def check_kind(file: Path) -> None:
-    """
-    Check that a table can be written to a file with this name.
-
-    Raises
-    ------
-    LinkageError
-        Its suffix is unknown, or the library for it is not installed or does not run here.
-
-    """
+    """Check the suffix of a file for a table, and that the library for it can be imported."""
     check_output_name(file, TABLE_KINDS)
     if file.suffix.lower() == '.parquet':
         _check_pyarrow()
@@ -137,20 +129,10 @@ _LARGEST_FILE = 10_000_000
 
 def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
     """
-    Read rows of numbers from a CSV file with commas or semicolons, with or without a heading.
+    Read rows of numbers from a CSV file with commas or semicolons.
 
-    Parameters
-    ----------
-    file
-        The file; empty lines, lines that begin with ``#``, and a heading are skipped.
-    columns
-        Allowed numbers of columns; all rows have the same number.
-
-    Raises
-    ------
-    FileError
-        The file is wrong; the error has the line.
-
+    Empty lines, lines that begin with ``#``, and a heading are skipped. All rows have the same
+    number of columns, one of ``columns``. A FileError names the wrong line.
     """
     try:
         data = read_regular(file, _LARGEST_FILE)

@@ -61,17 +61,7 @@ def import_jsonschema() -> ModuleType:
 
 
 def find_violations(content: Section, schema: Schema) -> list[FileError]:
-    """
-    Return the violations in a file, in the order of its lines.
-
-    Parameters
-    ----------
-    content
-        The file.
-    schema
-        Its JSON Schema.
-
-    """
+    """Return the violations of a JSON Schema in a file, in the order of its lines."""
     whole = content.mapping
     validator = import_jsonschema().Draft202012Validator(schema)
     broken: list[ValidationError] = list(validator.iter_errors(whole))
