@@ -50,20 +50,9 @@ def results_of(
     """
     Yield parts and their results, in the order in which they arrive.
 
-    Parameters
-    ----------
-    work
-        Takes a part; it goes to the workers by pickle.
-    parts
-        Takes the number of threads of the workers, and yields parts on demand.
-    address
-        Address of the scheduler.
-
-    Raises
-    ------
-    LinkageError
-        If the scheduler or its workers fail. Errors of the work are raised unchanged.
-
+    ``work`` is sent to the workers by pickle; ``parts`` takes the number of their threads and
+    yields parts on demand. A LinkageError says that the scheduler or its workers failed; errors of
+    the work are raised unchanged.
     """
     with _connect_client(address) as client:
         _check_workers(address, client)
