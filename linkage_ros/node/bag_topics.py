@@ -21,6 +21,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+_MOST_DEPTH = 2**31 - 1  # as DDS counts it
+
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
     """Describe a topic for a bag, as `describe_topic` does, with the QoS of a publisher."""
@@ -40,9 +42,6 @@ def _recorded_qos(profile: QoSProfile) -> QosProfile:
         liveliness_lease_duration=profile.liveliness_lease_duration.nanoseconds or INFINITE,
         avoid_ros_namespace_conventions=bool(profile.avoid_ros_namespace_conventions),
     )
-
-
-_MOST_DEPTH = 2**31 - 1  # as DDS counts it
 
 
 def create_publishers(

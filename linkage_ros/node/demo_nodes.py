@@ -42,6 +42,15 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
+_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
+_SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
+
+AnyNode = TypeVar('AnyNode', bound=Node)
+
+_LOOK = 0.1
+_OLDEST = 0.1
+"""Greatest age of a joint state that is still used, in [s]."""
+
 
 class DemoNode(Node):
     """A node with `PARAMETERS`, which are fixed at its start."""
@@ -55,12 +64,6 @@ class DemoNode(Node):
     def value_of_parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
         return self.get_parameter(name).value
-
-
-_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
-_SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
-
-AnyNode = TypeVar('AnyNode', bound=Node)
 
 
 def run_demo_node(
@@ -80,11 +83,6 @@ def run_demo_node(
         node.destroy_node()
         rclpy.try_shutdown()
     return 0
-
-
-_LOOK = 0.1
-_OLDEST = 0.1
-"""Greatest age of a joint state that is still used, in [s]."""
 
 
 class PDController(DemoNode):

@@ -56,6 +56,44 @@ _NEARNESS = {
 }
 """Attributes of `Closure.singularity_margin` in the diagnostics, with their keys."""
 
+_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
+    Rejection.EMPTY: 'fill name and position',
+    Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
+    Rejection.TWICE: 'name the joint once',
+    Rejection.NOT_FINITE: 'look at the sensor',
+    Rejection.TOO_LARGE: 'the units are rad and m',
+    Rejection.NO_EFFORT: 'fill name and effort',
+    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
+    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
+    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
+    Rejection.STAMP_INVALID: 'stamp the messages with the time',
+    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    Rejection.NO_CRANK: 'linkage check --branches says how far the joint goes on its branch',
+    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
+}
+
+_WRENCH_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
+    Rejection.WRENCH_NOT_FINITE: 'look at the sensor',
+    Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
+}
+
+_STALE_PERIOD = 30.0
+"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
+
+_PATIENCE = 2.0
+"""Time without a warning about a missing crank, in [s]."""
+
+_UNCLOSED = {
+    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
+    Status.INDETERMINATE: (
+        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
+    ),
+    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
+    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
+}
+
 
 @dataclass(frozen=True, slots=True)
 class CountsSnapshot:
@@ -490,37 +528,6 @@ def _linkage_text(line: LinkagePipeline) -> str:
     return f' ({line.scene_linkage.name})' if line.scene_linkage.name else ''
 
 
-_REMEDIES = {
-    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
-    Rejection.EMPTY: 'fill name and position',
-    Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
-    Rejection.TWICE: 'name the joint once',
-    Rejection.NOT_FINITE: 'look at the sensor',
-    Rejection.TOO_LARGE: 'the units are rad and m',
-    Rejection.NO_EFFORT: 'fill name and effort',
-    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
-    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
-    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
-    Rejection.STAMP_INVALID: 'stamp the messages with the time',
-    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
-    Rejection.NO_CRANK: 'linkage check --branches says how far the joint goes on its branch',
-    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
-}
-
-_WRENCH_REMEDIES = {
-    Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
-    Rejection.WRENCH_NOT_FINITE: 'look at the sensor',
-    Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
-}
-
-
-_STALE_PERIOD = 30.0
-"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
-
-_PATIENCE = 2.0
-"""Time without a warning about a missing crank, in [s]."""
-
-
 class Warnings:
     """Warnings, with the time of the last one of each kind."""
 
@@ -695,13 +702,3 @@ class Warnings:
         self._last[kind] = now
         self._logger.warning(line)
         return True
-
-
-_UNCLOSED = {
-    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
-    Status.INDETERMINATE: (
-        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
-    ),
-    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
-    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
-}

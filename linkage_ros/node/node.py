@@ -59,6 +59,15 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
+_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_DIAGNOSTICS_QOS = QoSProfile(depth=1)
+_WATCH_PERIOD = 0.25
+_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
+_TWIN_PATIENCE = 0.5
+"""How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
+
+Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
+
 
 class DeferredResponse:
     """
@@ -90,16 +99,6 @@ class DeferredResponse:
             self._request_header = to
         else:
             self._send(response, to)
-
-
-_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_DIAGNOSTICS_QOS = QoSProfile(depth=1)
-_WATCH_PERIOD = 0.25
-_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
-_TWIN_PATIENCE = 0.5
-"""How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
-
-Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
 
 def _log_errors(transition: Transition) -> Transition:

@@ -33,6 +33,15 @@ _BATCHES = 8
 
 _LOOK = 0.1
 
+LATE = 10_000_000
+"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
+
+_FINE = 20_000_000
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
+
+_LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
+_REPORT_EVERY = 250_000_000
+
 
 class PlaybackPart(NamedTuple):
     """The part of a bag that is played."""
@@ -134,16 +143,6 @@ def read_ahead(
     finally:
         # The reader thread is not joined: skipping to the start of the part may take long.
         ended.set()
-
-
-LATE = 10_000_000
-"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
-
-_FINE = 20_000_000
-"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
-
-_LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
-_REPORT_EVERY = 250_000_000
 
 
 class Steady(Protocol):

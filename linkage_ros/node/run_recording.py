@@ -46,6 +46,9 @@ _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 DESCRIPTION = 'description_topic'
 """Key of the robot model's topic."""
 
+Answer = Callable[[bool, str], None]
+"""Takes whether the call succeeded, and the outcome as one line."""
+
 
 class RunRecording:
     """Starts and stops the bags of a node, or its memory of the last seconds; reports on them."""
@@ -237,10 +240,6 @@ def _new_folder(directory: Path, name: str, scene: str) -> Path:
         number += 1
         folder = directory / f'{name}_{number}'
     return folder
-
-
-Answer = Callable[[bool, str], None]
-"""Takes whether the call succeeded, and the outcome as one line."""
 
 
 @dataclass(frozen=True, slots=True)
