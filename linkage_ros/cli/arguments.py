@@ -29,6 +29,11 @@ LINKAGES = ('.yaml', '.yml')
 
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
 
+_ALL_DIGITS = 1e15
+"""From here on a double has no decimals."""
+
+_IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
+
 
 def add_file(parser: argparse.ArgumentParser) -> None:
     """Declare the linkage file."""
@@ -182,10 +187,6 @@ def read_inputs(
     )
 
 
-_ALL_DIGITS = 1e15
-"""From here on a double has no decimals."""
-
-
 def wrap_angle(angle: float) -> float:
     """Return an angle without its full turns, in (−π, π] rad."""
     rest = remainder(angle, tau)
@@ -235,8 +236,6 @@ class AngleUnit(NamedTuple):
         """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
         return self.format_angle(value) if turning else f'{value + 0.0:.6g} m'
 
-
-_IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
 
 DEGREES, RADIANS = AngleUnit('°'), AngleUnit('rad')
 

@@ -52,6 +52,8 @@ from linkage_ros.signals import heed_signals, StoppedError
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
 
+_GAP = 'what depends on one that is not there may differ'
+
 
 def open_bag(path: Path, stop: Event) -> Bag:
     """
@@ -135,9 +137,6 @@ def describe_gaps(bag: Bag) -> Iterator[str]:
     recovered = bag.custom.get(RECOVERED, '')
     if recovered and not recovered.endswith(NOTHING_LOST):
         yield f'recovered {recovered}: {_GAP}'
-
-
-_GAP = 'what depends on one that is not there may differ'
 
 
 class BagReading:

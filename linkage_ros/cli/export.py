@@ -65,6 +65,10 @@ _FIRST_OF_PINS = QUANTITIES.index(FORCE_X)
 Row = list[float | int | None]
 ProgressCallback = Callable[[int], None]
 
+_MIB = 2**20
+
+EXAMPLE = 'linkage export my_bag -o my_bag.csv'
+
 
 class ExportSource(NamedTuple):
     """The origin of the rows."""
@@ -199,11 +203,6 @@ def _read_ticks(
             tick = None
     if tick is not None:
         yield tick
-
-
-_MIB = 2**20
-
-EXAMPLE = 'linkage export my_bag -o my_bag.csv'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

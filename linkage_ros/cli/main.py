@@ -72,12 +72,6 @@ COMMANDS = {
 }
 """Each subcommand and its description."""
 
-
-def module_of(command: str) -> str:
-    """Return the module name of a subcommand: a tool's, or one in this folder."""
-    return TOOLS.get(command, f'linkage_ros.cli.{command}')
-
-
 EXIT_CODES = {
     0: 'success',
     1: 'a run failed or was stopped, or no result is what was asked for',
@@ -86,9 +80,13 @@ EXIT_CODES = {
 }
 """The exit codes of all commands."""
 
-
 # What argparse says of a value that its type does not read.
 _INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
+
+
+def module_of(command: str) -> str:
+    """Return the module name of a subcommand: a tool's, or one in this folder."""
+    return TOOLS.get(command, f'linkage_ros.cli.{command}')
 
 
 def _in_plain_words(found: re.Match[str]) -> str:

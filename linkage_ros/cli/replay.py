@@ -71,6 +71,10 @@ from linkage_ros.replay import (
 )
 from linkage_ros.signals import heed_signals
 
+EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
+
+EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
+
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
     """Return the unit of a quantity of a joint."""
@@ -403,11 +407,6 @@ def _side_by_side(
         now = dict(zip(names.extras, event.tick.extras, strict=False))
         now[run.joint_states_topic] = event.tick.message
     return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
-
-
-EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
-
-EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -48,6 +48,8 @@ _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
 _MOST_SHOWN = 24
 """Maximum number of joints that fit on a screen."""
 
+EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
+
 
 class JointRow(NamedTuple):
     """A joint as the display shows it; its rate is '' if it is unknown."""
@@ -241,9 +243,6 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
     return TerminalTable('', ('', ''), rows)
-
-
-EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -66,6 +66,21 @@ _WHERE = {
 _MOST_NAMES = 4
 _LONGEST = 60
 
+REGISTRIES: Mapping[str, Mapping[str, Any]] = {
+    'drive': DRIVES,
+    'effect': EFFECTS,
+    'fault': FAULTS,
+    'solver': SOLVERS,
+}
+"""Everything that a scene can name, by kind."""
+
+_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
+
+SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
+"""Functions that make the JSON Schema of each kind of file."""
+
+EXAMPLE = 'linkage scene worn_press --set rate=500'
+
 
 def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
     """Yield the tables of a scene that has been built."""
@@ -279,16 +294,6 @@ def _shorten_list(names: list[str]) -> str:
 
 # Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds.
 
-REGISTRIES: Mapping[str, Mapping[str, Any]] = {
-    'drive': DRIVES,
-    'effect': EFFECTS,
-    'fault': FAULTS,
-    'solver': SOLVERS,
-}
-"""Everything that a scene can name, by kind."""
-
-_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
-
 
 def parameters_of(what: str, name: str) -> Any:
     """Return the parameter type of a drive, effect, fault or solver."""
@@ -308,12 +313,6 @@ def table_of(what: str, name: str) -> TerminalTable:
         if rows
         else TerminalTable(title, ('',), [('no parameters',)])
     )
-
-
-SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
-"""Functions that make the JSON Schema of each kind of file."""
-
-EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

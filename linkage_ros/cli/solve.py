@@ -54,6 +54,8 @@ FORMATS = {'.csv': 'csv', '.json': 'json', '.txt': 'table'}
 _ORDERS = ('', ' rate', ' acceleration')
 _PER = ('', '/s', '/s²')
 
+EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
+
 
 class ResultColumn(NamedTuple):
     """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
@@ -63,9 +65,6 @@ class ResultColumn(NamedTuple):
 
     def __str__(self) -> str:
         return f'{self.name} [{self.unit}]' if self.unit else self.name
-
-
-EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
