@@ -14,6 +14,13 @@ from pathlib import Path
 import re
 from typing import NamedTuple
 
+_ELEMENT = re.compile(r'\s*(?:<[?!][^>]*>\s*|<!--.*?-->\s*)*<([A-Za-z][\w.-]*)', re.DOTALL)
+_LINKAGE_KEY = re.compile(r'^(?:links|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
+_SCENE_KEY = re.compile(r'^(?:linkages?|drive|effects)\s*:', re.MULTILINE)
+_CONTROL = re.compile(rb'[\0-\x08\x0e-\x1a\x1c-\x1f]')
+_READ = 4096
+"""Number of bytes that determine the kind."""
+
 
 class FileKind(NamedTuple):
     """A kind of file."""
@@ -53,12 +60,6 @@ _ELEMENTS = {
     'html': FileKind('a web page'),
     'svg': FileKind('a picture'),
 }
-_ELEMENT = re.compile(r'\s*(?:<[?!][^>]*>\s*|<!--.*?-->\s*)*<([A-Za-z][\w.-]*)', re.DOTALL)
-_LINKAGE_KEY = re.compile(r'^(?:links|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
-_SCENE_KEY = re.compile(r'^(?:linkages?|drive|effects)\s*:', re.MULTILINE)
-_CONTROL = re.compile(rb'[\0-\x08\x0e-\x1a\x1c-\x1f]')
-_READ = 4096
-"""Number of bytes that tell the kind."""
 
 
 def kind_of_folder(folder: Path) -> FileKind:

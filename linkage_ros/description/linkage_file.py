@@ -71,6 +71,9 @@ HEAVIEST = 1e12
 STRONGEST = 1e12
 """Bound on efforts, in [N·m] or [N]."""
 
+_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
+"""The input of every shorthand."""
+
 
 def looks_like_linkage(content: Section) -> bool:
     """Return whether a file of unknown kind has the keys of a linkage."""
@@ -410,10 +413,6 @@ def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
             'angles': dict(pose.angles),
         }
     return written_out
-
-
-_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
-"""The input of every shorthand."""
 
 
 def _four_bar(content: Section) -> dict[str, Any]:

@@ -66,6 +66,21 @@ _WHEN = ('at', 'seconds')
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
+_LINKAGE_KEYS = (
+    'prefix',
+    'publish_input',
+    'drive',
+    'effects',
+    'loads',
+    'solver',
+    'accuracy',
+    'beyond_limits',
+)
+"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
+
+_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
+"""Keys of a scene beside the linkages."""
+
 
 @dataclass(frozen=True)
 class _SceneSource:
@@ -319,22 +334,6 @@ def _read_linkages(
             )
         entry.finish(_LINKAGE_KEYS)
     return members, files
-
-
-_LINKAGE_KEYS = (
-    'prefix',
-    'publish_input',
-    'drive',
-    'effects',
-    'loads',
-    'solver',
-    'accuracy',
-    'beyond_limits',
-)
-"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
-
-_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
-"""Keys of a scene beside the linkages."""
 
 
 def _read_scene_linkage(

@@ -19,6 +19,9 @@ from linkage_ros.description.yaml_file import BoundedLoader, parse_yaml
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 import yaml
 
+_PART = re.compile(r'"[^"]+"|[^".]+')
+"""A part of a key; in quotes it may contain dots."""
+
 
 class _Dumper(yaml.SafeDumper):
     """A dumper that quotes what our reader would not take for a text."""
@@ -54,10 +57,6 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         within[last] = _parse_value(setting, text)
     head = ''.join(f'# --set {setting}\n' for setting in settings)
     return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
-
-
-_PART = re.compile(r'"[^"]+"|[^".]+')
-"""A part of a key; in quotes it may contain dots."""
 
 
 def _next_part(within: Any, parts: list[str]) -> str:

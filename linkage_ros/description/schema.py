@@ -80,6 +80,12 @@ _NAMED = (
     'comes with the package'
 )
 
+_either_slider: Schema = {
+    'if': {'required': ['slider']},
+    'then': {'properties': {'parent': False, 'child': False}},
+    'else': {'required': ['parent', 'child']},
+}
+
 
 def as_text(schema: Schema) -> str:
     """Return a schema as the text of its file."""
@@ -564,13 +570,6 @@ def _limits_of(*joints: str) -> dict[str, Schema]:
             {name: mapping_schema('Limits of the joint.', _limits_schemas()) for name in joints},
         ),
     }
-
-
-_either_slider: Schema = {
-    'if': {'required': ['slider']},
-    'then': {'properties': {'parent': False, 'child': False}},
-    'else': {'required': ['parent', 'child']},
-}
 
 
 def _slider_schema() -> Schema:

@@ -19,6 +19,8 @@ from typing import Any, cast
 from linkage_ros.description.units import unit_of, Units
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 
+SI = Units()
+
 
 class LinedDict(dict[str, Any]):
     """A mapping with the line of each of its keys."""
@@ -28,9 +30,6 @@ class LinedDict(dict[str, Any]):
     def __init__(self) -> None:
         super().__init__()
         self.lines: dict[str, int] = {}
-
-
-SI = Units()
 
 
 class Section:

@@ -35,6 +35,9 @@ Write = Callable[[Sequence[Row]], None]
 
 _CELLS = 2**20  # a block of this size takes about 40 MB
 
+_MOST = 1000  # rows that `numbers_of` reads
+_LARGEST_FILE = 10_000_000  # bytes that it reads
+
 
 @contextmanager
 def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
@@ -122,9 +125,6 @@ TABLE_KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
 ] = {'.csv': _open_csv, '.parquet': _open_parquet}
 """Writer for each suffix of a file."""
-
-_MOST = 1000
-_LARGEST_FILE = 10_000_000
 
 
 def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:

@@ -34,6 +34,24 @@ DEEPEST = 100
 
 _LONGEST_INTEGER = 100
 
+_INDENT = 'give the keys of one mapping the same number of spaces'
+_IN_PLAIN_WORDS = (
+    ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
+    ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
+    ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
+    (
+        "could not find expected ':'",
+        'has a key without a colon',
+        'write key: value',
+    ),
+    ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
+    ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
+)
+"""A part of what PyYAML says of a line; what is wrong, and the remedy."""
+
+LARGEST_FILE = 1_000_000
+"""Most bytes of a file."""
+
 
 class BoundedLoader(yaml.SafeLoader):
     """
@@ -122,24 +140,6 @@ for _tag, _pattern, _first in (
     BoundedLoader.add_implicit_resolver(
         f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
     )
-
-_INDENT = 'give the keys of one mapping the same number of spaces'
-_IN_PLAIN_WORDS = (
-    ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
-    ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
-    ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
-    (
-        "could not find expected ':'",
-        'has a key without a colon',
-        'write key: value',
-    ),
-    ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
-    ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
-)
-"""A part of what PyYAML says of a line; what is wrong, and the remedy."""
-
-LARGEST_FILE = 1_000_000
-"""Most bytes of a file."""
 
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
