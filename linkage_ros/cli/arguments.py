@@ -68,7 +68,9 @@ def add_output(
 def add_force(parser: argparse._ActionsContainer) -> None:
     """Declare ``--force``."""
     parser.add_argument(
-        '--force', action='store_true', help='overwrite what exists; without it that is refused'
+        '--force',
+        action='store_true',
+        help='overwrite an existing file or bag, which is refused otherwise',
     )
 
 
@@ -84,7 +86,7 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
 
 
 def output_or(arguments: argparse.Namespace, default: Path) -> Path:
-    """Return the file to write: that of ``-o``, or a default one, of which the same holds."""
+    """Return the file to write: ``-o``, or a default, which must be new without ``--force``."""
     if arguments.output is not None:
         return Path(arguments.output)
     check_new(default, force=arguments.force)

@@ -7,10 +7,10 @@
 # language governing permissions and limitations under the License.
 
 """
-Print the messages of a topic as YAML, or their rate, to Ctrl-C.
+Print the messages of a topic as YAML, or their rate, until Ctrl-C.
 
-It is for installations without ros2 topic echo and ros2 topic hz. Values are those of the message:
-in SI units and radians. Exit code 1: no message came, or fewer than --count.
+It is for installations without ros2 topic echo and ros2 topic hz. Values are unchanged: SI units
+and radians. Exit code 1: no message came, or fewer than --count.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded_number(1e-9, 1e9),
         default=inf,
-        help='how long; without it, to Ctrl-C',
+        help='duration; without it, until Ctrl-C',
     )
     parser.add_argument(
         '--timeout',
@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f'{_TIMEOUT:g} with --count, else never',
     )
     parser.add_argument(
-        '--rate', action='store_true', help='print once a second how often messages come'
+        '--rate', action='store_true', help='print the rate of messages once a second'
     )
 
 
@@ -185,14 +185,14 @@ def _receive_messages(
         _compatible_qos(node, topic),
         raw=arguments.rate,
     )
-    told = monotonic()
+    last_report = monotonic()
     while not stop.is_set() and monotonic() < end and seen < arguments.count:
         rclpy.spin_once(node, timeout_sec=min(_LOOK, max(0.0, end - monotonic())))
         if silence.too_long():
             break
         now = monotonic()
-        if arguments.rate and now - told >= 1.0:
-            told = now
+        if arguments.rate and now - last_report >= 1.0:
+            last_report = now
             if len(arrivals) > 1:
                 print(f'{topic}: {rate_text(arrivals)}', flush=True)
             # The next rate counts from the last message of this one.

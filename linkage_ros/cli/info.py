@@ -7,11 +7,11 @@
 # language governing permissions and limitations under the License.
 
 """
-Say what a bag holds and how its run went.
+Describe a bag and its run.
 
-Of a bag of ours the scene in it is run once more, state by state: how well every loop closed, and
-where the linkage came nearest to a toggle. Of another the rest is told. Ctrl-C ends the reading;
-what was read until then is told.
+For a bag of linkage_ros the scene in it is run once more, state by state: how well every loop
+closed, and where the linkage came nearest to a toggle. A foreign bag is described without these.
+Ctrl-C ends the reading; the part read until then is described.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['beginning_missing']:
         yield 'beginning', account['beginning_missing']
     if account['damage']:
-        yield 'DAMAGED', f'{account["damage"]}; only what lies before is described'
+        yield 'DAMAGED', f'{account["damage"]}; only the part before it is described'
     if account['recording_failure']:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
@@ -147,7 +147,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     unknown = 'unknown: linkage_ros did not close the bag'
     yield 'dropped', unknown if dropped is None else str(dropped)
     if discarded:
-        yield 'discarded', f'{discarded}, with files that made way for newer ones'
+        yield 'discarded', f'{discarded}, in files that newer ones replaced'
     yield 'versions', ', '.join(_version_texts(account['versions'])) or 'unknown'
     scene = account['scene']
     if scene:
@@ -157,7 +157,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['scene_missing']:
         yield (
             'missing' if not scene else 'not run again',
-            f'{account["scene_missing"]}; so neither residual nor nearness to a toggle is known',
+            f'{account["scene_missing"]}; residual and nearness to a toggle are unknown',
         )
     if account['replay']:
         of, same = account['replay'].values()

@@ -43,7 +43,7 @@ from linkage_ros.workbench import find_tool, TOOLS
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene and its crank, on a separate ROS graph',
-    'simulate': 'run a scene as fast as it goes, without ROS, to a bag, CSV or Parquet',
+    'simulate': 'run a scene as fast as possible, without ROS, to a bag, CSV or Parquet',
     'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
     'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
@@ -74,8 +74,8 @@ COMMANDS = {
 
 EXIT_CODES = {
     0: 'success',
-    1: 'a run failed or was stopped, or no result is what was asked for',
-    2: 'wrong input; one line names it, the place and the remedy',
+    1: 'a run failed or was stopped, or no result meets the request',
+    2: 'wrong input; one line names place, reason and remedy',
     3: 'something is lost (recover, replay) or differs (replay)',
 }
 """The exit codes of all commands."""
@@ -143,7 +143,9 @@ def top_parser() -> Parser:
         epilog='linkage COMMAND --help says more.\n\nexample:\n  linkage check jansen_leg',
     )
     parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
-    parser.add_argument('command', choices=COMMANDS, metavar='COMMAND', help='one of those above')
+    parser.add_argument(
+        'command', choices=COMMANDS, metavar='COMMAND', help='one of the commands above'
+    )
     return parser
 
 
@@ -166,7 +168,7 @@ def main(arguments: list[str] | None = None) -> int:
                 finally:
                     sys.stdout.flush()  # here, where an error can be reported
         except (StoppedError, Exception) as error:
-            # A library may make an error of its own of what the signal raised within it.
+            # A library may convert an error that the signal raised within it.
             stopped = isinstance(error, StoppedError) or has_raised()
             if isinstance(error, BrokenPipeError) or not stopped:
                 raise

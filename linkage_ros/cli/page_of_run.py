@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The page of a run: `linkage view --node` in a process of its own, which ends with the run.
+The page of a run: `linkage view --node` in a separate process, which ends with the run.
 
 As a program, this module is that process. It ends by SIGTERM as soon as its standard input is
 closed: that happens even where the run is killed.

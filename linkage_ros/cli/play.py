@@ -9,8 +9,8 @@
 """
 Publish a bag on the graph, at its own pace or another, to its end or Ctrl-C.
 
-Types, qualities of service and bytes are those that were recorded, in the order of the log times.
-What cannot be published is left out, and said.
+Types, qualities of service and bytes are as recorded, in the order of the log times. Topics that
+cannot be published are left out and named.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _say_truncated(bag: Bag) -> None:
         if is_in_use(file):
             raise BagError(file, 'is being written', 'end its recording first')
     print(
-        f'linkage play: {bag.path}: unfinished: its recording was killed; what it holds is played',
+        f'linkage play: {bag.path}: unfinished: its recording was killed; its content is played',
         file=sys.stderr,
     )
 

@@ -9,14 +9,14 @@
 """
 Run the scene of a bag once more over its samples, and compare.
 
-Every joint state, and what else was published, is made anew and held against the recorded bytes.
-Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its metadata promise;
-1: it could not be told, was stopped, or the bag is damaged and what lies before the damage is the
-same.
+Every joint state, and every other published message, is computed again and compared with the
+recorded bytes. Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its
+metadata promise; 1: undecided, stopped, or the bag is damaged and the part before the damage is
+the same.
 
-With --scene another scene is run, with --set that of the bag with other values; its joints are
-compared with the recorded ones. -o writes it to a new bag, which replays by itself. Then a
-difference is no failure.
+--scene runs another scene, --set the scene of the bag with other values; its joints are compared
+with the recorded ones. -o writes it to a new bag, which replays by itself. Then a difference
+is not a failure.
 """
 
 from __future__ import annotations
@@ -467,7 +467,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def _other_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
-    """Return the scene of --scene, or that of the bag, with the keys of --set."""
+    """Return the scene of --scene, or of the bag, with the keys of --set."""
     if arguments.scene is not None:
         return load_scene(arguments.scene, arguments.set)
     return scene_of(bag, trust_effects=arguments.trust_effects, settings=arguments.set)
@@ -558,13 +558,13 @@ def _show_counterfactual(account: dict[str, Any]) -> None:
 def _find_shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
-        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
+        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; its content was replayed'
     if account['missing']:
         yield (
             f'{account["bag"]}: {account["missing"]:,} messages that its metadata.yaml promises '
             'are not there; the others were replayed'
         )
     if account['damage']:
-        yield f'{account["damage"]}; what lies before was replayed'
+        yield f'{account["damage"]}; the part before it was replayed'
     if account['stopped']:
         yield 'stopped; the rest of the bag was not replayed'

@@ -207,7 +207,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
     ]
     if counts.suppressed:
         rows.append(
-            ('withheld', f'{counts.suppressed} readings, by what the scene does to sensors')
+            ('withheld', f'{counts.suppressed} readings, by the sensor effects of the scene')
         )
     if node.crank_topic:
         rows.append(('samples', loop.sample_counts_text))
@@ -247,7 +247,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage is moved')
+    parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage gets a drive')
     add_run_arguments(parser)
     add_ros_arguments(parser, 'remappings, parameters, QoS')
 
@@ -259,17 +259,19 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded_number(1e-9, 1e9),
         default=inf,
-        help='how long; without it, until Ctrl-C',
+        help='duration; without it, until Ctrl-C',
     )
-    parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
-    parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
+    parser.add_argument('--runs', default='', metavar='FOLDER', help='parent folder of the bags')
+    parser.add_argument(
+        '--plain', action='store_true', help='one line per second, no live display'
+    )
     parser.add_argument(
         '--view', action='store_true', help='serve a page of the run, as linkage view --node does'
     )
     parser.add_argument(
         '--prove',
         action='store_true',
-        help='at the end replay the whole bag, not only as much of it as takes 2 s',
+        help='replay the whole bag at the end; without it, as much as takes 2 s',
     )
     add_radians(parser)
 

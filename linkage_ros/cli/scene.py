@@ -7,10 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Say what a scene consists of, or all that is wrong with it; or what scenes can name.
+Describe a scene, or list its errors; or list what scenes can name.
 
-Where the library jsonschema is installed, everything that is wrong with the files is said at once;
-elsewhere the first thing.
+If the library jsonschema is installed, all errors of the files are listed; else the first one.
 """
 
 from __future__ import annotations

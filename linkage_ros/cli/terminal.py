@@ -176,7 +176,7 @@ def _rich_table(table: TerminalTable) -> object:
     from rich.text import Text
 
     heads = _column_heads(table)
-    # As Text: rich would read brackets, such as those of a unit, as markup.
+    # As Text: rich would read brackets, as in units, as markup.
     drawn = Drawn(
         title=Text(table.title, style='bold') if table.title else None,
         title_justify='left',

@@ -346,7 +346,7 @@ def test_of_a_damaged_bag_what_lies_before_is_told(
     assert 'is damaged' in account['damage']
     assert 1000 < account['messages'] < 3500
     assert answer(info, damaged) == 0
-    assert 'only what lies before is described' in capsys.readouterr().out
+    assert 'only the part before it is described' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

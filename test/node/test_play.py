@@ -439,7 +439,7 @@ def test_a_killed_recording_is_played_as_far_as_it_goes(tmp_path, bag, play):
     assert '/joints: 100\n' in said
     assert (
         complaints == f'linkage play: {bag}: unfinished: its recording was killed; '
-        'what it holds is played\n'
+        'its content is played\n'
     )
 
 

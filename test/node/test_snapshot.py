@@ -190,7 +190,7 @@ def test_linkage_run_says_what_became_of_the_memory(tmp_path, domain, write_scen
     rows = [line.split(maxsplit=1) for line in done.stdout.splitlines() if line]
     (line,) = [text for name, text in rows if name == 'memory' and '/joint_states' in text]
     words = line.replace(',', '').split()
-    received, kept, gone = (int(words[number]) for number in (1, 3, 9))
+    received, kept, gone = (int(words[number]) for number in (1, 3, 6))
     assert received == kept + gone
     assert 0 < kept < received
     assert ['snapshots', NOTHING] in rows
