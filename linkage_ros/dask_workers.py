@@ -116,7 +116,7 @@ def _check_scheduler(address: str) -> None:
 
 
 def _check_workers(address: str, client: Any) -> None:
-    """Refuse workers without this package or with another version of it."""
+    """Refuse workers without this package or with another version."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except asyncio.TimeoutError:
@@ -152,7 +152,7 @@ def _future_result(address: str, future: Future[Result]) -> Result:
     except import_distributed().KilledWorker as error:
         raise LinkageError(
             address,
-            f'{error.allowed_failures + 1} workers died at the same task, one after the other',
+            f'{error.allowed_failures + 1} workers died one after another at the same task',
             'look into their logs: memory is the usual reason',
         ) from error
     except (CancelledError, import_distributed().comm.CommClosedError) as error:

@@ -402,7 +402,7 @@ def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]
 
 
 def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
-    """Return an expanded shorthand with the pose that it gives; a drawn one tells the side."""
+    """Return an expanded shorthand with its pose; a drawn pose determines the side."""
     if 'pose' in content:
         pose = _read_pose(content.section('pose'), [_DRIVEN_CRANK])
         if pose.is_drawn and 'assembly' not in content:

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Notes on a scene: values that are allowed, but look like those of another unit.
+Notes on a scene: values that are allowed, but look like values in another unit.
 
 A note has the form of an error; whoever reads the scene shows it and goes on.
 """

@@ -71,7 +71,7 @@ def _next_part(within: Any, parts: list[str]) -> str:
 
 
 def _inner_value(setting: str, within: Any, part: str) -> Any:
-    """Return what a key of a mapping holds, or the linkage of a name in a list of them."""
+    """Return what a key of a mapping holds, or the linkage of a name in a list."""
     if isinstance(within, list):
         names = _linkage_names(within)
         if part not in names:

@@ -73,8 +73,8 @@ class Section:
 
     def locate_error(self, error: DefinitionError) -> FileError:
         """Return an error of this content as one of its file, in the file's units."""
-        told = self.units.convert_quantities
-        return self.error(error.where, told(error.reason), told(error.remedy))
+        convert = self.units.convert_quantities
+        return self.error(error.where, convert(error.reason), convert(error.remedy))
 
     def number(
         self,
@@ -130,7 +130,7 @@ class Section:
         return value
 
     def text(self, key: str, default: str | None = None, *, expected: str = 'a string') -> str:
-        """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
+        """Return a string that is not empty, or the default; ``expected`` is its meaning."""
         value = self._take_value(key, default, expected)
         if value == default and default is not None:
             return default
@@ -159,7 +159,7 @@ class Section:
 
     def choose_words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
         """
-        Return a word of each group: of those that the file names, else the group's first.
+        Return a word of each group: one that the file names, else the group's first.
 
         The file names one word, or a list of words of different groups.
         """

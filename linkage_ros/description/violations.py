@@ -208,7 +208,7 @@ def _dotted_path(path: _Path) -> str:
 
 
 def _line_number(content: Any, path: _Path) -> int:
-    """Return the line of a key, or that of the last existing key on its path."""
+    """Return the line of a key, or of the last existing key on its path."""
     line = 0
     for part in path:
         if isinstance(content, LinedDict) and isinstance(part, str):

@@ -47,7 +47,7 @@ _IN_PLAIN_WORDS = (
     ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
     ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
 )
-"""A part of what PyYAML says of a line; what is wrong, and the remedy."""
+"""A part of PyYAML's message; reason and remedy."""
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a file."""
@@ -91,7 +91,7 @@ class BoundedLoader(yaml.SafeLoader):
 
 def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
     """
-    Parse a YAML text of so many values at most.
+    Parse a YAML text with a bounded number of values.
 
     The text of a ValueError, one line, says whether it is not YAML, or which limit it exceeds.
     """

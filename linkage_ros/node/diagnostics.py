@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-What the node reports on itself: ``diagnostic_msgs/DiagnosticArray`` once a period, and warnings.
+Reports of the node: ``diagnostic_msgs/DiagnosticArray`` once a period, and warnings.
 
 Warnings in the log are limited in rate, each kind by itself. The limit is not rclpy's throttle:
 there a suppressed log line costs 150 µs.
@@ -652,8 +652,8 @@ class Warnings:
             kind, count = f'chatter {line.scene_linkage.name}', line.drive.chatter_count
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
-                told = f'{describe_chatter(count - before)}{_linkage_text(line)}'
-                before = count if self.warn(kind, told, period) else before
+                text = f'{describe_chatter(count - before)}{_linkage_text(line)}'
+                before = count if self.warn(kind, text, period) else before
             self._chattered[kind] = before
 
     def check_jumps(self, linkages: Sequence[LinkagePipeline], crank_topic: str) -> None:

@@ -9,7 +9,7 @@
 """
 The node: crank samples in, joint states of the dependent joints out.
 
-A lifecycle node. The tick runs on a thread of its own (`tick_loop`). This module runs on the
+A lifecycle node. The tick runs on a separate thread (`tick_loop`). This module runs on the
 executor: transitions, services, parameters, diagnostics, and all logging.
 """
 

@@ -213,10 +213,10 @@ class Playback:
         steady, counts = self._steady, self.counts
         begun: int | None = None
         last_base = number = 0
-        tick = tell = inf
+        tick = next_report = inf
         for base, log_time, topic, data in cues:
             if begun is None:
-                begun = tell = steady.now()
+                begun = next_report = steady.now()
                 tick = begun if self._ticks else inf
             offset = base + log_time - self._first
             due = begun + round(offset / self._rate)
@@ -238,9 +238,9 @@ class Playback:
             self.latest = max(self.latest, now - due)
             self.played, self.took = offset, now - begun
             last_base = base
-            if now >= tell:
+            if now >= next_report:
                 self._progress(log_time)
-                tell = now + _REPORT_EVERY
+                next_report = now + _REPORT_EVERY
         if self._ticks and begun is not None:
             # So that nodes on simulated time also reach the end of the bag.
             self._ticks.publish(self._first + self.played - last_base)

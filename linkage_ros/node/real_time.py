@@ -150,7 +150,7 @@ def leave_out_shared_memory() -> None:
 
 def stay_on_this_machine() -> None:
     """
-    Keep discovery within the machine, without shared memory where the user has said nothing of it.
+    Keep discovery within the machine, without shared memory unless the user configures it.
 
     Call it before `rclpy.init`; it holds for this process and its children. Clients with the
     discovery range LOCALHOST are found all the same.
