@@ -153,7 +153,7 @@ def _future_result(address: str, future: Future[Result]) -> Result:
         raise LinkageError(
             address,
             f'{error.allowed_failures + 1} workers died one after another at the same task',
-            'look into their logs: memory is the usual reason',
+            'read their logs: memory is the usual reason',
         ) from error
     except (CancelledError, import_distributed().comm.CommClosedError) as error:
         raise _lost_error(address) from error

@@ -71,7 +71,7 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
         raise FileError(named, '', 'is not a file', f'did you mean {path.stem!r}?')
     if named and (named != path.stem or exists):
         return path
-    reason = 'is neither a file nor a name of what comes with the package'
+    reason = 'is neither a file nor the name of a shipped file'
     raise FileError(
         named or "''",
         '',

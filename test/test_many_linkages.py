@@ -233,7 +233,7 @@ def test_a_hundred_of_them(load):
         ),
         (
             'linkage: four_bar.yaml\nlinkages: [{name: a, linkage: four_bar.yaml}]',
-            'linkage: stands beside linkages; write one of the two',
+            'linkage: cannot be combined with linkages; write one of the two',
         ),
         ('linkages: [{name: a, linkage: four_bar.yaml, rate: 5}]', 'rate: unknown key'),
         (

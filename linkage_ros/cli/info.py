@@ -151,7 +151,9 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield 'versions', ', '.join(_version_texts(account['versions'])) or 'unknown'
     scene = account['scene']
     if scene:
-        rate = f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'a tick a sample'
+        rate = (
+            f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'one tick per sample'
+        )
         faults = f', faults {", ".join(scene["faults"])}' if scene['faults'] else ''
         yield 'scene', f'{scene["name"]}, {rate}, seed {scene["seed"]}{faults}'
     if account['scene_missing']:
@@ -243,7 +245,7 @@ def _version_texts(versions: dict[str, Any]) -> Iterator[str]:
 def _qos_text(topic: dict[str, Any]) -> str:
     """Return a quality of service in one word; two for transient local."""
     if not topic['qos_understood']:
-        return 'not understood, taken as reliable'
+        return 'unknown, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
     return escape_unprintable(topic['reliability']).replace('_', ' ') + latched
 

@@ -140,7 +140,7 @@ def top_parser() -> Parser:
         prog='linkage',
         description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}\n\nexit codes:\n{codes}',
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog='linkage COMMAND --help says more.\n\nexample:\n  linkage check jansen_leg',
+        epilog='linkage COMMAND --help shows more.\n\nexample:\n  linkage check jansen_leg',
     )
     parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
     parser.add_argument(

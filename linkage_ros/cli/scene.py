@@ -88,13 +88,13 @@ def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Termi
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
         )
-        heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
+        heads = ('>', 'stage', 'where', 'what it does', 'in this scene', '')
         yield TerminalTable(
             f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
         )
     if scene.faults:
         yield TerminalTable(
-            'Faults', ('name', 'kind', 'as said here', 'by itself'), list(_fault_rows(scene))
+            'Faults', ('name', 'kind', 'in this scene', 'injected'), list(_fault_rows(scene))
         )
     yield TerminalTable('Topics', ('', 'topic', 'message', ''), list(_topic_rows(scene, pipeline)))
 
@@ -176,7 +176,7 @@ def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
             stage.where,
             first_docstring_line(type(stage.parameters)),
             _parameters_text(stage.parameters),
-            f'brought in by {", ".join(stage.needed_by)}' if stage.needed_by else '',
+            f'needed by {", ".join(stage.needed_by)}' if stage.needed_by else '',
         )
 
 

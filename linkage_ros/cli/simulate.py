@@ -217,7 +217,7 @@ def _run_study(
     with closing(FinishedRuns(output, study, runs)) as finished:
         found = finished.outcomes
         if found:
-            _print_note(f'goes on after {len(found)} of {len(runs)} runs, of {finished.file}')
+            _print_note(f'continues after {len(found)} of {len(runs)} runs, of {finished.file}')
         waiting = [part for part in enumerate(runs) if part[0] not in found]
         workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
         try:
@@ -229,7 +229,7 @@ def _run_study(
                         raise StoppedError
         except StoppedError:
             kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
-            _print_note(f'stopped; {kept}; the same command goes on' if found else 'stopped')
+            _print_note(f'stopped; {kept}; the same command continues' if found else 'stopped')
             return 1
         return _write_results(arguments, scene, runs, finished, pictures)
 

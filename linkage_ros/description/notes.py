@@ -106,6 +106,6 @@ def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
         x, y = scene_linkage.loads.gravity
         yield DefinitionError(
             'loads.gravity',
-            f'[{x:g}, {y:g}] m/s² is hardly any',
+            f'[{x:g}, {y:g}] m/s² is very small',
             'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]',
         )

@@ -311,7 +311,7 @@ def _read_linkages(
         )
         return [scene_linkage], {LINKAGE_FILE: data}
     if 'linkage' in content:
-        raise content.error('linkage', 'stands beside linkages', 'write one of the two')
+        raise content.error('linkage', 'cannot be combined with linkages', 'write one of the two')
     entries = content.sections('linkages')
     if len(entries) > _MOST_LINKAGES:
         raise content.error(
@@ -492,7 +492,7 @@ def _read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
     if 'accuracy' not in where:
         return {'solver': _read_solver(where, parts) if 'solver' in where else None}
     if 'solver' in where:
-        raise where.error('accuracy', 'stands beside solver', 'write one of the two')
+        raise where.error('accuracy', 'cannot be combined with solver', 'write one of the two')
     bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
     return {'accuracy': where.number('accuracy', unit='rad and m', **bounds)}
 
@@ -634,7 +634,7 @@ def _read_storage(content: Section) -> StorageParameters:
         )
     if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
         raise content.error(
-            'keep_files', 'there is one file only', f'write {" or ".join(SPLITS)} too'
+            'keep_files', 'the bag has only one file', f'write {" or ".join(SPLITS)} too'
         )
     return storage
 

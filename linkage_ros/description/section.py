@@ -233,7 +233,7 @@ class Section:
                 raise self.error(key, f'{quote(item)} is not a mapping', 'write {…}')
             found.append(Section(self.file, path, item, self._line_of(key), self.units))
         if not found:
-            raise self.error(key, 'the list is empty', 'name one at least')
+            raise self.error(key, 'the list is empty', 'name at least one')
         return found
 
     def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:

@@ -141,7 +141,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
         reason = getattr(error, 'strerror', None) or 'not UTF-8 text'
         raise FileError(file, '', f'cannot be read ({reason})', 'name a CSV file') from None
     if len(data) > _LARGEST_FILE:
-        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'thin it out')
+        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'write fewer rows')
     delimiter = ';' if ';' in text else ','
     rows: list[tuple[float, ...]] = []
     for number, cells in _split_lines(file, text, delimiter):
@@ -161,7 +161,7 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
             )
         rows.append(row)
         if len(rows) > _MOST:
-            raise FileError(file, '', f'has more than {_MOST} rows', 'thin it out')
+            raise FileError(file, '', f'has more than {_MOST} rows', 'write fewer rows')
     if not rows:
         raise FileError(file, '', 'holds no numbers', 'write rows of numbers with commas')
     return rows

@@ -117,18 +117,18 @@ def _describe_error(error: ValidationError, whole: Schema) -> Iterator[_Problem]
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
         case 'maxProperties':
             others = f'leave all but {wanted} out'
-            yield path, f'{list_names(value)} stand beside each other', others
+            yield path, f'{list_names(value)} cannot be combined', others
         case 'minProperties':
-            yield path, 'is empty', 'name one at least'
+            yield path, 'is empty', 'name at least one'
         case 'oneOf':
             kinds = [kind['required'][0] for kind in wanted]
             named = [kind for kind in kinds if kind in value]
             yield path, *kinds_of_fault(str(path[-1]), named)
         case 'not':
             one, other = wanted['required']
-            yield (*path, other), f'stands beside {one}', 'write one of the two'
+            yield (*path, other), f'cannot be combined with {one}', 'write one of the two'
         case None:
-            yield path, 'does not go with the keys beside it', 'leave it out'
+            yield path, 'cannot be combined with the other keys', 'leave it out'
         case _:
             meaning = schema.get('description', '')
             expected = f'write {_expected_text(error)}{meaning and f" ({meaning})"}'

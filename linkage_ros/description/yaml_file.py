@@ -37,8 +37,8 @@ _LONGEST_INTEGER = 100
 _INDENT = 'give the keys of one mapping the same number of spaces'
 _IN_PLAIN_WORDS = (
     ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
-    ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
-    ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
+    ('expected <block end>', 'is not indented like the lines above it', _INDENT),
+    ('mapping values are not allowed', 'has a misplaced colon', _INDENT),
     (
         "could not find expected ':'",
         'has a key without a colon',
@@ -219,7 +219,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
         text = str(error).splitlines()[0]
         raise FileError(file, '', f'is not valid YAML ({text})', 'correct the file') from None
     except RecursionError:
-        raise FileError(file, '', 'is nested too deeply', 'write it flatter') from None
+        raise FileError(file, '', 'is nested too deeply', 'use fewer levels') from None
     finally:
         if loader is not None:
             loader.dispose()
@@ -250,7 +250,7 @@ class _StrictLoader(BoundedLoader):
             if key in mapping:
                 first = mapping.lines[key]
                 raise FileError(
-                    self.file, key, f'stands twice (first in line {first})', 'remove one', line
+                    self.file, key, f'is a duplicate (first in line {first})', 'remove one', line
                 )
             mapping[key] = self.construct_object(value_node, deep=True)
             mapping.lines[key] = line

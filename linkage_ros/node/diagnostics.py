@@ -61,7 +61,7 @@ _REMEDIES = {
     Rejection.EMPTY: 'fill name and position',
     Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
     Rejection.TWICE: 'name the joint once',
-    Rejection.NOT_FINITE: 'look at the sensor',
+    Rejection.NOT_FINITE: 'check the sensor',
     Rejection.TOO_LARGE: 'the units are rad and m',
     Rejection.NO_EFFORT: 'fill name and effort',
     Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
@@ -69,13 +69,13 @@ _REMEDIES = {
     Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
-    Rejection.NO_CRANK: 'linkage check --branches says how far the joint goes on its branch',
+    Rejection.NO_CRANK: 'linkage check --branches shows the range of the joint on its branch',
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
 }
 
 _WRENCH_REMEDIES = {
     Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
-    Rejection.WRENCH_NOT_FINITE: 'look at the sensor',
+    Rejection.WRENCH_NOT_FINITE: 'check the sensor',
     Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
 }
 
@@ -251,7 +251,7 @@ class DiagnosticsSummary:
         if not self.crank_topic:
             message = 'Driven by the scene'
         elif counts.ignored and counts.ignored == counts.received:
-            level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
+            level, message = STALE if max_age else WARN, 'No crank yet: messages lack its joint'
         elif self.window_end.stale > self.window_start.stale and age * NANOSECONDS > max_age:
             level, message = STALE, f'Samples arrive, but are {age:.1f} s old by their stamps'
         elif max_age and age * NANOSECONDS > max_age:
@@ -640,7 +640,7 @@ class Warnings:
                     ticks=ticks,
                     gap=position.gap,
                     reachable=describe_ranges(closure.input_ranges),
-                    published='published all the same' if position.joints else 'nothing published',
+                    published='published anyway' if position.joints else 'nothing published',
                     beyond=closure.limit_exceeded(position),
                 )
                 if self.warn(status.value, line, period):
@@ -691,7 +691,7 @@ class Warnings:
             else f'the operating system woke the node {seconds:.3f} s late'
         )
         where = 'at once' if stalls == 1 else f'in {stalls} stalls, the last'
-        remedy = 'lower the rate' if often else 'the rate holds otherwise'
+        remedy = 'lower the rate' if often else 'the rate is kept otherwise'
         return f'{lost} ticks lost {where}: {what}; {remedy}'
 
     def warn(self, kind: str, line: str, period: float) -> bool:

@@ -350,7 +350,7 @@ class LinkageNode(LifecycleNode):
         if self.loop is None or not self.loop.is_running:
             return _fill_response(response, False, 'not active: nothing to reset')
         self.loop.reset_requested = True
-        return _fill_response(response, True, 'crank and turns are forgotten before the next tick')
+        return _fill_response(response, True, 'crank and turns are reset before the next tick')
 
     def _on_inject(
         self, name: str, request: SetBool.Request, response: SetBool.Response

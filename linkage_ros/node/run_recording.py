@@ -267,7 +267,7 @@ class MemorySummary:
             for t in self.topics
         )
         failure = f'{self.failure}; ' if self.failure else ''
-        return f'{failure}nothing is kept any more, {self.snapshots}: {counts}'
+        return f'{failure}the memory has ended, {self.snapshots}: {counts}'
 
 
 class RunSnapshots:
@@ -303,7 +303,7 @@ class RunSnapshots:
     def count_text(self) -> str:
         """Return the number of snapshots as text."""
         if not self.written and not self.failed:
-            return 'no snapshot was asked for: nothing was written'
+            return 'no snapshot was requested: nothing was written'
         written = f'{self.written} snapshot{"s" * (self.written != 1)} written'
         return written + (f', {self.failed} failed' if self.failed else '')
 
@@ -315,13 +315,15 @@ class RunSnapshots:
         when it is ready.
         """
         if self._writing is not None:
-            return 'a snapshot is being written; ask again when it is: the memory goes on'
+            return (
+                'a snapshot is being written; call again when it has ended; the memory continues'
+            )
         try:
             kept = self.memory.take_content()
         except RecordingError as error:
             return str(error)
         if not kept.blocks:
-            return 'nothing is in memory yet; ask again when there are messages'
+            return 'nothing is in memory yet; call again when there are messages'
         self._answer = answer
         self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.is_complete), wake)
         return ''
@@ -378,10 +380,10 @@ def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCoun
 
 def _make_outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
     if isinstance(result, RecordingError):
-        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory goes on')
+        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory continues')
     counts = counts_text(result)
     if result.failure:
-        line = f'snapshot incomplete: {result.failure}: {counts}; the memory goes on'
+        line = f'snapshot incomplete: {result.failure}: {counts}; the memory continues'
         return SnapshotOutcome(result, result.failure, line)
     line = f'the last {seconds:.3f} s recorded to {result.folder}: {counts}'
     return SnapshotOutcome(result, '', line)

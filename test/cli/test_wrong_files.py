@@ -141,7 +141,7 @@ WRITTEN_WRONGLY = {
     'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is indented otherwise'),
     'links: {ground: {O: [0, 0]\njoints: {}\n': (2, ''),
     'links:\n  ground: {O: [0, 0}\n': (2, 'has a [ that does not end'),
-    'links\n  ground: {}\n': (2, 'has a colon where none can be'),
+    'links\n  ground: {}\n': (2, 'has a misplaced colon'),
     'links: ground\n': (1, 'write links: {ground: {}}'),
     'links:\njoints: {}\n': (1, 'is empty; write links: {…}'),
     'links: {ground: {O: [0, 0, 0.5]}}\n': (1, 'a planar linkage has no z'),

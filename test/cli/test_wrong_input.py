@@ -239,7 +239,7 @@ REFUSED = [
     (f'links: {{ground: {{{POINTS}}}}}\n', 'check', 'links: have 10001 points'),
     (f'four_bar: {{a: {LONG}, b: 1, c: 1, d: 1}}\n', 'check', 'is not a number'),
     (f'links: {LONG}\n', 'check', 'is not a mapping'),
-    (f'{LONG}: 1\n', 'scene', 'has a colon where none can be'),
+    (f'{LONG}: 1\n', 'scene', 'has a misplaced colon'),
     (f'linkage: {LONG}\n', 'scene', 'is not a file'),
     (f'{LONG}\n', 'check', 'holds'),
     ((ATTACKS / 'pins_in_one_place.yaml').read_text(), 'check', "'E' lies 4.94e-324 m from 'J'"),

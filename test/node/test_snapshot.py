@@ -37,7 +37,7 @@ OK, ERROR = b'\0', b'\2'
 INCOMPLETE = 1
 NODE = '/linkage_node'
 TOPICS = {'/crank_states', '/joint_states', '/diagnostics'}
-NOTHING = 'no snapshot was asked for: nothing was written'
+NOTHING = 'no snapshot was requested: nothing was written'
 
 
 def scene_text(directory, seconds, more='', rate=200):
@@ -223,7 +223,7 @@ def test_a_full_disk_is_said_and_the_next_attempt_succeeds(
     assert message.startswith(
         f'no snapshot: {small_disk}/bag: cannot be recorded to: No space left on device; '
     )
-    assert message.endswith('; the memory goes on')
+    assert message.endswith('; the memory continues')
     assert 'No space left' in graph.wait_for_level('recording', ERROR).message
     assert [path.name for path in small_disk.iterdir()] == ['other']
     (small_disk / 'other').unlink()
@@ -337,7 +337,7 @@ def test_the_services_begin_and_end_the_memory_too(
     assert ask('start_recording') == (False, f'already {keeping}')
     success, message = ask('stop_recording')
     assert success
-    assert f'nothing is kept any more, {NOTHING}: ' in message
+    assert f'the memory has ended, {NOTHING}: ' in message
     success, message = ask()
     assert not success
     assert message.startswith('nothing is kept in memory; ')

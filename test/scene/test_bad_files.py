@@ -31,10 +31,10 @@ BOMB = b'a: &a [1, 1]\n' + b''.join(
 SCENES = {
     'unknown key': (b'rtae: 5', ":2: rtae: unknown key; did you mean 'rate'?"),
     'unlike any key': (b'x: 5', ':2: x: unknown key; known: accuracy, angles, beyond_limits, '),
-    'key twice': (b'rate: 1\nrate: 2', ':3: rate: stands twice (first in line 2); remove one'),
+    'key twice': (b'rate: 1\nrate: 2', ':3: rate: is a duplicate (first in line 2); remove one'),
     'key twice, deep': (
         b'drive: {topic: {max_age: 1, max_age: 2}}',
-        ':2: max_age: stands twice (first in line 2); remove one',
+        ':2: max_age: is a duplicate (first in line 2); remove one',
     ),
     'text for a number': (b'rate: fast', ":2: rate: 'fast' is not a number; write a number"),
     'flag for a number': (b'rate: true', ':2: rate: True is not a number; write a number'),
@@ -109,7 +109,7 @@ SCENES = {
     ),
     'ring of one file': (
         b'record: {keep_files: 2, split_bytes: 0}',
-        ':2: record.keep_files: there is one file only; write split_bytes or split_seconds too',
+        ':2: record.keep_files: the bag has only one file; write split_bytes or split_seconds too',
     ),
     'memory of a moment': (
         b'record: {snapshot_seconds: 0.05}',
@@ -154,7 +154,7 @@ SCENES = {
     'tagged list': (b'rate: !!int [1]', ':2: is not valid YAML (expected a scalar node'),
     'tagged text': (b'drive: !!map [a, b]', ':2: is not valid YAML (expected a mapping);'),
     'tag that does not fit': (b'rate: !!int fast', ': is not valid YAML (invalid literal for int'),
-    'deep nesting': (b'rate: ' + b'[' * 3000, ': is nested too deeply; write it flatter'),
+    'deep nesting': (b'rate: ' + b'[' * 3000, ': is nested too deeply; use fewer levels'),
     'NUL': (b'rate: \0', ': is a binary file, not a YAML file; name a scene or'),
     'NUL in a key': (b'"ra\\0te": 1', ":2: the key 'ra\\x00te' is not a name; write a name"),
     'half a surrogate': (b'"\\ud800": 1', ":2: the key '\\ud800' is not a name; write a name"),
