@@ -104,7 +104,7 @@ def frames(value):
             given['publish_frequency'] = float(text)
         except ValueError:
             where = f'publish_frequency {quote(text)}'
-            raise LinkageError(where, 'is no number', f'write 1 to {FASTEST:g}') from None
+            raise LinkageError(where, 'is not a number', f'write 1 to {FASTEST:g}') from None
     return given
 
 
@@ -112,7 +112,9 @@ def flag(value, name):
     """Return the value of an argument that is true or false."""
     text = value[name].lower()
     if text not in FLAGS:
-        raise LinkageError(name, f'{quote(value[name])} is not a flag', 'write true or false')
+        raise LinkageError(
+            name, f'{quote(value[name])} is not true or false', 'write true or false'
+        )
     return FLAGS[text]
 
 

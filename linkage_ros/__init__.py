@@ -9,7 +9,7 @@
 """
 Planar linkages for ROS 2: crank angle in, dependent joints out, run logged.
 
-What stands here is the public API. None of it needs ROS.
+This is the public API. It does not need ROS.
 
 Load a linkage, by the path of its file or by the name of one that comes with the package, and
 close its loops at a value of its input. Angles are in [rad], lengths in [m]:
@@ -47,7 +47,7 @@ Arrays solve many states at once; there is a row for each joint:
 >>> batch.positions.shape
 (2, 3)
 
-A scene adds what drives the linkage, and what its sensors make of it; `Pipeline` ticks it. Times
+A scene adds the drive of the linkage and its sensor effects; `Pipeline` ticks it. Times
 are whole nanoseconds, and a message is what the node would publish:
 
 >>> pipeline = lr.Pipeline(lr.load_scene('two_fingers'))

@@ -50,20 +50,9 @@ def results_of(
     """
     Yield parts and their results, in the order in which they arrive.
 
-    Parameters
-    ----------
-    work
-        Takes a part; it goes to the workers by pickle.
-    parts
-        Takes the number of threads of the workers, and yields parts on demand.
-    address
-        Address of the scheduler.
-
-    Raises
-    ------
-    LinkageError
-        If the scheduler or its workers fail. Errors of the work are raised unchanged.
-
+    ``work`` is sent to the workers by pickle; ``parts`` takes the number of their threads and
+    yields parts on demand. A LinkageError says that the scheduler or its workers failed; errors of
+    the work are raised unchanged.
     """
     with _connect_client(address) as client:
         _check_workers(address, client)
@@ -127,7 +116,7 @@ def _check_scheduler(address: str) -> None:
 
 
 def _check_workers(address: str, client: Any) -> None:
-    """Refuse workers without this package or with another version of it."""
+    """Refuse workers without this package or with another version."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except asyncio.TimeoutError:
@@ -163,8 +152,8 @@ def _future_result(address: str, future: Future[Result]) -> Result:
     except import_distributed().KilledWorker as error:
         raise LinkageError(
             address,
-            f'{error.allowed_failures + 1} workers died at the same task, one after the other',
-            'look into their logs: memory is the usual reason',
+            f'{error.allowed_failures + 1} workers died one after another at the same task',
+            'read their logs: memory is the usual reason',
         ) from error
     except (CancelledError, import_distributed().comm.CommClosedError) as error:
         raise _lost_error(address) from error

@@ -55,7 +55,7 @@ _DOMAINS = range(1, 102)
 @contextmanager
 def held_domain() -> Iterator[int]:
     """Hold a ROS domain that no other process here holds; a LinkageError if all are held."""
-    # From a place of its own, since other programs take the first ones.
+    # Not from the first domain, which other programs take.
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
         with _lock_domain(domain) as held:
@@ -69,7 +69,7 @@ def held_domain() -> Iterator[int]:
 
 @contextmanager
 def _lock_domain(domain: int) -> Iterator[bool]:
-    """Lock the file of a domain; tell whether it could be locked."""
+    """Lock the file of a domain; return whether it could be locked."""
     with ExitStack() as opened:
         try:
             file = opened.enter_context(

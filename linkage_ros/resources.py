@@ -55,22 +55,8 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
     Return the path of a file given by its path, or by the name of a shipped file.
 
     A text without folder and suffix is a name first: a file ``demo`` is ``./demo`` beside the
-    scene that is shipped.
-
-    Parameters
-    ----------
-    named
-        A path; or the name of a shipped file, without folder and suffix.
-    folders
-        Folders of such files under ``config/``; the first that has the name decides.
-
-    Raises
-    ------
-    FileError
-        If it is neither.
-    TypeError
-        If ``named`` cannot be a path.
-
+    shipped scene. Of several ``folders`` under ``config/`` the first that has the name decides.
+    FileError if there is no such file or name; TypeError if ``named`` cannot be a path.
     """
     known = {name: folder for folder in reversed(folders) for name in _yaml_names(folder)}
     try:
@@ -85,7 +71,7 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
         raise FileError(named, '', 'is not a file', f'did you mean {path.stem!r}?')
     if named and (named != path.stem or exists):
         return path
-    reason = 'is neither a file nor a name of what comes with the package'
+    reason = 'is neither a file nor the name of a shipped file'
     raise FileError(
         named or "''",
         '',

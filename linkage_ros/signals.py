@@ -29,16 +29,6 @@ from threading import Event
 from time import monotonic
 from typing import Any, NoReturn
 
-
-class StoppedError(BaseException):
-    """
-    A signal asked a command to end before it had a result to show.
-
-    It can be raised anywhere. It derives from BaseException, so that no ``except Exception`` takes
-    it for a defect of the code that it interrupts.
-    """
-
-
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 _LONGEST_END = 10
@@ -49,6 +39,15 @@ _LONGEST_UNWINDING = 2.0
 
 _LONGEST_GOODBYE = 1.0
 """Time limit for a stopped command to end, in [s]."""
+
+
+class StoppedError(BaseException):
+    """
+    A signal asked a command to end before it had a result to show.
+
+    It can be raised anywhere. It derives from BaseException, so that no ``except Exception`` takes
+    it for a defect of the code that it interrupts.
+    """
 
 
 class Stop(Event):

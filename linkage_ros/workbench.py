@@ -20,7 +20,7 @@ from types import ModuleType
 from linkage_ros.errors import LinkageError
 
 TOOLS = {
-    # Commands; those of the other half are in linkage_ros.cli, each by its own name.
+    # Commands; linkage_ros.cli has the commands of the other half, each by its name.
     'accuracy': 'linkage_ros.tools.study.accuracy_command',
     'view': 'linkage_ros.tools.view.view_command',
     'report': 'linkage_ros.tools.view.report_command',

@@ -301,7 +301,7 @@ REFUSED_DRIVES = {
     ],
     'bag': [
         ('{}', "the key 'file' is missing"),
-        ('{file: 3}', 'file: 3 is not a text'),
+        ('{file: 3}', 'file: 3 is not a string'),
         ('{file: b, topc: x}', "topc: unknown key; did you mean 'topic'?"),
         ('{file: b, pace: slow}', "pace: 'slow' is not a choice; write recorded or fast"),
         ('{file: b, max_age: 0}', 'max_age: 0 is out of bounds'),
@@ -311,8 +311,8 @@ REFUSED_DRIVES = {
 REFUSED_FAULTS = [
     ('mine', '{silense: {}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
     ('mine', '{}', 'faults.mine: names no kind of fault; write mine: {freeze: '),
-    ('my own', '{silence: {}}', "faults.my own: 'my own' is no ROS name; use letters"),
-    ('1st', '{silence: {}}', "faults.1st: '1st' is no ROS name; use letters"),
+    ('my own', '{silence: {}}', "faults.my own: 'my own' is not a ROS name; use letters"),
+    ('1st', '{silence: {}}', "faults.1st: '1st' is not a ROS name; use letters"),
     (
         'mine',
         '{silence: {}, freeze: {}}',
@@ -321,7 +321,7 @@ REFUSED_FAULTS = [
     ('mine', '{stuck: {joint: rokker_joint}}', "faults.mine…did you mean 'rocker_joint'?"),
     ('mine', '{stuck: {}}', "faults.mine.stuck: the key 'joint' is missing"),
     ('mine', '{broken_link: {link: ground}}', "faults.mine…there is no link 'ground'"),
-    ('mine', '{silence: {}, at: [-1], seconds: 1}', 'faults.mine…begins before the first tick'),
+    ('mine', '{silence: {}, at: [-1], seconds: 1}', 'faults.mine…has a negative time'),
     ('mine', '{silence: {}, at: [1]}', "faults.mine…the key 'seconds' is missing"),
     ('mine', '{silence: {}, at: [1], seconds: 0}', 'faults.mine…out of bounds'),
     ('mine', '{time_jump: {by: 1e9}}', 'faults.mine…out of bounds'),

@@ -224,7 +224,7 @@ def test_a_hundred_of_them(load):
     [
         ('linkages: []', 'linkages: the list is empty'),
         ('linkages: [{linkage: four_bar.yaml}]', "the key 'name' is missing"),
-        ('linkages: [{name: a/b, linkage: four_bar.yaml}]', "'a/b' is no ROS name"),
+        ('linkages: [{name: a/b, linkage: four_bar.yaml}]', "'a/b' is not a ROS name"),
         ('linkages: [{name: a}]', "the key 'linkage' is missing"),
         ('linkages: [{name: a, linkage: none.yaml}]', 'is not a file'),
         (
@@ -233,7 +233,7 @@ def test_a_hundred_of_them(load):
         ),
         (
             'linkage: four_bar.yaml\nlinkages: [{name: a, linkage: four_bar.yaml}]',
-            'linkage: stands beside linkages; write one of the two',
+            'linkage: cannot be combined with linkages; write one of the two',
         ),
         ('linkages: [{name: a, linkage: four_bar.yaml, rate: 5}]', 'rate: unknown key'),
         (
@@ -360,7 +360,7 @@ def test_a_prefix_is_as_it_is_written(load, kind):
             'prefix: a second linkage publishes left_coupler_joint, left_rocker_joint; give each',
         ),
         (TWO + "prefix: ''\n", 'a second linkage publishes coupler_joint, rocker_joint; give'),
-        (TWO + "prefix: 'a b'\n", "prefix: 'a b' begins no name of a joint; use letters"),
+        (TWO + "prefix: 'a b'\n", "prefix: 'a b' cannot begin a joint name; use letters"),
     ],
 )
 def test_a_prefix_that_does_not_tell_joints_apart_is_refused(load, text, said):

@@ -55,7 +55,7 @@ fsync fails, and the data written since the last successful fsync turns into zer
 leave it. Permanently means that all later calls that can have this error fail too.
 
 The requirements: no exception other than RecordingError; the recorder ends; its error is one line
-with folder, reason and remedy; for each topic, received = recorded + dropped + let go; messages
+with folder, reason and remedy; for each topic, received = recorded + dropped + discarded; messages
 counted as recorded are in the bag byte for byte and in order, by our reader, and by rosbags if the
 bag is complete; `linkage recover` loses no counted message; `metadata.yaml` is valid and names
 existing files; no other file is left behind. A fault that does not harm the messages, such as a

@@ -60,7 +60,7 @@ class Recorded:
     refused: str = ''  # The error that kept it from beginning; '' for none
     escaped: str = ''  # An exception other than RecordingError; '' for none
     offered: int = 0  # Number of messages offered
-    # Received, recorded, dropped, let go and waiting, of each topic.
+    # Received, recorded, dropped, discarded and waiting, of each topic.
     counts: list[tuple[int, int, int, int, int]] = field(default_factory=list)
     failure: str | None = None  # The error that ended it early; None for none
     longest_offer: int = 0  # The longest duration of `Recorder.offer` [ns]

@@ -27,7 +27,7 @@ Counts = dict[str, dict[str, int]]
 
 
 def counts_of(folder: Path) -> Counts:
-    """Return the counts in the bag's last file: received, recorded, dropped, let go; by topic."""
+    """Return received, recorded, dropped and discarded by topic, from the bag's last file."""
     with read_bag(folder).files[-1].open('rb') as stream:
         metadata = {each.name: each.metadata for each in make_reader(stream).iter_metadata()}
     return {kind: json.loads(text) for kind, text in metadata.get(STATS_RECORD, {}).items()}

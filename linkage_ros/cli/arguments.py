@@ -29,6 +29,11 @@ LINKAGES = ('.yaml', '.yml')
 
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
 
+_ALL_DIGITS = 1e15
+"""From here on a double has no decimals."""
+
+_IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
+
 
 def add_file(parser: argparse.ArgumentParser) -> None:
     """Declare the linkage file."""
@@ -44,17 +49,9 @@ def add_output(
     parser: argparse._ActionsContainer, suffixes: Collection[str], otherwise: str = ''
 ) -> None:
     """
-    Declare ``-o`` for a file, and ``--force``: see `refuse_existing`.
+    Declare ``-o`` for a file with one of the suffixes, and ``--force``: see `refuse_existing`.
 
-    Parameters
-    ----------
-    parser
-        The parser of the command, or a group of it.
-    suffixes
-        The suffixes that the command can write; any other is refused.
-    otherwise
-        What happens without ``-o``; '' if it is required.
-
+    ``otherwise`` says what happens without ``-o``; '' if it is required.
     """
     kinds = list_names([f'OUTPUT{suffix}' for suffix in suffixes], ' or ')
     parser.add_argument(
@@ -71,7 +68,9 @@ def add_output(
 def add_force(parser: argparse._ActionsContainer) -> None:
     """Declare ``--force``."""
     parser.add_argument(
-        '--force', action='store_true', help='overwrite what exists; without it that is refused'
+        '--force',
+        action='store_true',
+        help='overwrite an existing file or bag, which is refused otherwise',
     )
 
 
@@ -87,7 +86,7 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
 
 
 def output_or(arguments: argparse.Namespace, default: Path) -> Path:
-    """Return the file to write: that of ``-o``, or a default one, of which the same holds."""
+    """Return the file to write: ``-o``, or a default, which must be new without ``--force``."""
     if arguments.output is not None:
         return Path(arguments.output)
     check_new(default, force=arguments.force)
@@ -150,7 +149,7 @@ def read_numbers(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if not numbers or not all(map(isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f'{text!r} is no number; write 40, or 40,20')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a number; write 40, or 40,20')
     return numbers
 
 
@@ -188,10 +187,6 @@ def read_inputs(
         radians(value) if in_degrees and not driven.slider else value
         for value, driven in zip(typed, given, strict=True)
     )
-
-
-_ALL_DIGITS = 1e15
-"""From here on a double has no decimals."""
 
 
 def wrap_angle(angle: float) -> float:
@@ -243,8 +238,6 @@ class AngleUnit(NamedTuple):
         """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
         return self.format_angle(value) if turning else f'{value + 0.0:.6g} m'
 
-
-_IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
 
 DEGREES, RADIANS = AngleUnit('°'), AngleUnit('rad')
 

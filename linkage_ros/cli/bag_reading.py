@@ -52,6 +52,8 @@ from linkage_ros.signals import heed_signals, StoppedError
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
 
+_GAP = 'what depends on a missing one may differ'
+
 
 def open_bag(path: Path, stop: Event) -> Bag:
     """
@@ -80,20 +82,16 @@ def add_trust(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--trust-effects',
         action='store_true',
-        help='import the modules that the scene of the bag names as effects, which runs their '
-        'code; it is said which',
+        help='import the modules that the scene of the bag names as effects, and list them; this '
+        'runs their code',
     )
 
 
 def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> Scene:
     """
-    Return the scene that a bag carries; list the modules it imports first, if it may.
+    Return the scene of a bag; print first which modules it imports.
 
-    Raises
-    ------
-    LinkageError
-        See `recorded_scene`.
-
+    Errors are those of `recorded_scene`.
     """
     scene = recorded_scene(bag, settings=settings)
     if not trust_effects or not scene.not_imported:
@@ -102,7 +100,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
 
     for name in scene.not_imported:
         where = found_in(name)
-        line = f'linkage: {bag.path} is trusted: imports {name}, and the name leads to {where}'
+        line = f'linkage: {bag.path} is trusted: imports {name} from {where}'
         print(escape_unprintable(line), file=sys.stderr, flush=True)
     return recorded_scene(bag, trust_effects=True, settings=settings)
 
@@ -135,13 +133,10 @@ def describe_gaps(bag: Bag) -> Iterator[str]:
         count for topic, count in counts_in(bag.custom, 'dropped').items() if topic != diagnostics
     )
     if dropped:
-        yield f'{dropped} messages had to be dropped when it was recorded: {_GAP}'
+        yield f'{dropped} messages were dropped during the recording: {_GAP}'
     recovered = bag.custom.get(RECOVERED, '')
     if recovered and not recovered.endswith(NOTHING_LOST):
         yield f'recovered {recovered}: {_GAP}'
-
-
-_GAP = 'what depends on one that is not there may differ'
 
 
 class BagReading:

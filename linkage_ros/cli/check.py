@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Say what a linkage is: freedom, order of solution, four-bars, ranges, toggles, transmission."""
+"""Describe a linkage: mobility, order of solution, four-bars, ranges, toggles, transmission."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--branches',
         action='store_true',
-        help='add the branches of each dependent joint: the cranks on which it moves one way',
+        help='add the branches of each dependent joint: crank intervals in which it moves one way',
     )
     add_radians(parser)
 
@@ -437,7 +437,7 @@ def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> Termin
         )
         for one in account['conditioning']
     ]
-    return TerminalTable('Conditioning over the range, of what is iterated', heads, rows)
+    return TerminalTable('Conditioning over the range, of iterated links', heads, rows)
 
 
 def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
@@ -501,7 +501,7 @@ def _linkage_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tu
 
 def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
     if account['ranges'] is None:
-        yield 'range', 'no single one: it depends on every input'
+        yield 'range', 'not a single one: it depends on every input'
         if account['unwrapped']:
             yield 'turns', 'they count: send unwrapped angles, a turn leads to another assembly'
         return
@@ -509,7 +509,7 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
     for interval in account['ranges']:
         turns = round((interval['high'] - interval['low']) / tau)
         if not interval['whole']:
-            each = '; each turn has poses of its own' if turning and not interval['turns'] else ''
+            each = '; each turn has different poses' if turning and not interval['turns'] else ''
             followed = any(interval['limited']) or not each
             ends = '' if followed else ', and was not followed farther'
             yield 'range', f'{_range_text(interval, turning, angles)}{each}{ends}'

@@ -7,11 +7,11 @@
 # language governing permissions and limitations under the License.
 
 """
-Run a scene that comes with the package: the node in this process, what it needs beside it.
+Run a scene that comes with the package: the node in this process, its companions in others.
 
-A crank from a topic, or a controller of its effort, is in a process of its own. Nothing leaves the
-machine, and no other ROS graph on it is heard: discovery stays local, in a domain of its own. At
-the end the bag is drawn, where the scene records one.
+Companions are a crank on a topic, or a controller of its effort. Nothing leaves the machine, and
+no other ROS graph on it is heard: discovery is local, in a separate domain. If the scene records a
+bag, the command draws it at the end.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'name', nargs='?', default='demo', metavar='SCENE', help='a shipped scene (default: demo)'
     )
-    parser.add_argument('--list', action='store_true', help='the scenes that there are')
+    parser.add_argument('--list', action='store_true', help='list the shipped scenes')
     add_run_arguments(parser)
     parser.set_defaults(seconds=None)
 
@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 @contextmanager
 def _run_companions(scene: Scene, seconds: float) -> Iterator[None]:
-    """Run the companions of the scene's drives in processes of their own."""
+    """Run the companions of the scene's drives in separate processes."""
     processes = [
         subprocess.Popen(
             command,

@@ -7,10 +7,10 @@
 # language governing permissions and limitations under the License.
 
 """
-Print the messages of a topic as YAML, or their rate, to Ctrl-C.
+Print the messages of a topic as YAML, or their rate, until Ctrl-C.
 
-It is for installations without ros2 topic echo and ros2 topic hz. Values are those of the message:
-in SI units and radians. Exit code 1: no message came, or fewer than --count.
+It is for installations without ros2 topic echo and ros2 topic hz. Values are unchanged: SI units
+and radians. Exit code 1: no message came, or fewer than --count.
 """
 
 from __future__ import annotations
@@ -70,23 +70,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded_number(1, 10**9, int),
         default=inf,
         metavar='N',
-        help='end after so many messages',
+        help='end after this number of messages',
     )
     parser.add_argument(
         '--seconds',
         type=bounded_number(1e-9, 1e9),
         default=inf,
-        help='how long; without it, to Ctrl-C',
+        help='duration; without it, until Ctrl-C',
     )
     parser.add_argument(
         '--timeout',
         type=bounded_number(1e-9, 1e9),
         metavar='SECONDS',
-        help='end when no message comes for so long; without it, '
+        help='how long to wait for a message before the end; without it, '
         f'{_TIMEOUT:g} with --count, else never',
     )
     parser.add_argument(
-        '--rate', action='store_true', help='print once a second how often messages come'
+        '--rate', action='store_true', help='print the rate of messages once a second'
     )
 
 
@@ -106,19 +106,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class _SilenceTimer:
-    """
-    The time without a message: reported once, and too long after a timeout.
-
-    Parameters
-    ----------
-    node
-        The node that listens.
-    topic
-        The topic.
-    timeout
-        Time without a message after which it is too long, in [s].
-
-    """
+    """The time without a message: reported once; too long after ``timeout``, in [s]."""
 
     def __init__(self, node: Node, topic: str, timeout: float) -> None:
         self._node, self._topic, self._timeout = node, topic, timeout
@@ -197,14 +185,14 @@ def _receive_messages(
         _compatible_qos(node, topic),
         raw=arguments.rate,
     )
-    told = monotonic()
+    last_report = monotonic()
     while not stop.is_set() and monotonic() < end and seen < arguments.count:
         rclpy.spin_once(node, timeout_sec=min(_LOOK, max(0.0, end - monotonic())))
         if silence.too_long():
             break
         now = monotonic()
-        if arguments.rate and now - told >= 1.0:
-            told = now
+        if arguments.rate and now - last_report >= 1.0:
+            last_report = now
             if len(arrivals) > 1:
                 print(f'{topic}: {rate_text(arrivals)}', flush=True)
             # The next rate counts from the last message of this one.

@@ -7,12 +7,12 @@
 # language governing permissions and limitations under the License.
 
 """
-Write what a bag holds of its joints to a CSV or Parquet file, a row for each tick.
+Write the joints of a bag to a CSV or Parquet file, a row for each tick.
 
 A row has the joint states and, where they were recorded, the accelerations of ~/motion and the
-forces of ~/pin_forces. The crank's samples come at instants of their own: they are a table of
-their own, by --topic. So is any other topic of joint states, trajectories of one point, or
-wrenches. Of a foreign bag the only topic of joint states is written.
+forces of ~/pin_forces. The crank's samples have other times: --topic writes them to a separate
+table, as any other topic of joint states, trajectories of one point, or wrenches. From a foreign
+bag the only topic of joint states is written.
 """
 
 from __future__ import annotations
@@ -65,6 +65,10 @@ _FIRST_OF_PINS = QUANTITIES.index(FORCE_X)
 Row = list[float | int | None]
 ProgressCallback = Callable[[int], None]
 
+_MIB = 2**20
+
+EXAMPLE = 'linkage export my_bag -o my_bag.csv'
+
 
 class ExportSource(NamedTuple):
     """The origin of the rows."""
@@ -72,7 +76,7 @@ class ExportSource(NamedTuple):
     bag: Bag  # The bag
     types: Mapping[str, str]  # The topics, each with its type
     closing: Collection[str]  # Topics whose messages end the row of a tick
-    # For each topic that also carries other messages, the test that selects those of the rows.
+    # For each topic that also carries other messages, the test that selects messages of the rows.
     wanted: Mapping[str, Callable[[bytes], bool]]
     # Names of dependent joints, which nobody can command; see `MessageValues`.
     dependent: Collection[str] = ()
@@ -82,7 +86,7 @@ class ExportResult(NamedTuple):
     """
     Result of the first pass: columns beyond the first four, and number of rows.
 
-    Messages in the rows are counted by topic, those that are left out by topic and reason.
+    Messages in the rows are counted by topic; messages left out by topic and reason.
     """
 
     keys: tuple[Key, ...]
@@ -105,20 +109,9 @@ def survey_columns(
     """
     Collect the columns of the rows (first pass).
 
-    Parameters
-    ----------
-    source
-        The origin of the rows.
-    order
-        Joints that come first, in this order; others follow in the order of the bag.
-    report_progress
-        Called now and then with the number of bytes read; an exception from it ends the pass.
-
-    Raises
-    ------
-    BagError
-        If the bag is damaged, or new joint names keep coming.
-
+    The joints in ``order`` come first; others follow in the order of the bag. ``report_progress``
+    receives the number of bytes read; an exception from it ends the pass. A BagError says that the
+    bag is damaged, or that new joint names keep coming.
     """
     columns: dict[Key, None] = {}
     known: set[tuple[Key, ...]] = set()
@@ -212,16 +205,11 @@ def _read_ticks(
         yield tick
 
 
-_MIB = 2**20
-
-EXAMPLE = 'linkage export my_bag -o my_bag.csv'
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bag(parser)
     add_output(parser, TABLE_KINDS)
-    parser.add_argument('--topic', help='a topic to write alone, a row for each message')
+    parser.add_argument('--topic', help='the only topic to write, a row for each message')
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -243,31 +231,16 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> ExportResult:
     """
-    Write a bag's joints to a file; memory does not grow with the bag.
+    Write a bag's joints to a file, or replace it; memory does not grow with the bag.
 
-    Parameters
-    ----------
-    bag_path
-        The bag.
-    file
-        The file; one that exists is replaced.
-    topic
-        The only topic to write; None for the joint states and what was published with them.
-    stop
-        Set by a signal.
-
-    Raises
-    ------
-    StoppedError
-        If the event was set.
-    LinkageError
-        If the bag cannot be read or has nothing to write, or if the file cannot be written.
-
+    A ``topic`` is written alone; None for the joint states and what was published with them.
+    StoppedError if the event was set; LinkageError if the bag cannot be read or has nothing to
+    write, or if the file cannot be written.
     """
     check_kind(file)
     bag = open_bag(bag_path, stop)
     if bag.truncated:
-        unfinished = f'unfinished: {unfinished_text(bag)}; what it holds is taken'
+        unfinished = f'unfinished: {unfinished_text(bag)}; its content is exported'
         print(f'linkage export: {bag_path}: {unfinished}', file=sys.stderr)
     scene = _scene_or_none(bag)
     source = _choose_topics(bag, scene, topic)
@@ -314,7 +287,7 @@ def _scene_or_none(bag: Bag) -> Scene | None:
 
 
 def _choose_topics(bag: Bag, scene: Scene | None, topic: str | None) -> ExportSource:
-    """Return the topics to write: those asked for, or those that the bag names."""
+    """Return the topics to write: as asked for, or as the bag names them."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)

@@ -9,8 +9,8 @@
 """
 List the linkages and scenes that come with the package; print one, or copy it.
 
-Their names stand for them in all commands: linkage check jansen_leg. With -o the file is copied,
-and with a scene the linkage files that it names, into the same folder.
+All commands take these names: linkage check jansen_leg. With -o the file is copied, and with a
+scene the linkage files that it names, into the same folder.
 """
 
 from __future__ import annotations

@@ -7,11 +7,11 @@
 # language governing permissions and limitations under the License.
 
 """
-Say what a bag holds and how its run went.
+Describe a bag and its run.
 
-Of a bag of ours the scene in it is run once more, state by state: how well every loop closed, and
-where the linkage came nearest to a toggle. Of another the rest is told. Ctrl-C ends the reading;
-what was read until then is told.
+For a bag of linkage_ros the scene in it is run once more, state by state: how well every loop
+closed, and where the linkage came nearest to a toggle. A foreign bag is described without these.
+Ctrl-C ends the reading; the part read until then is described.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def bag_tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[TerminalT
         for word in ('received', 'dropped', 'let_go')
         if word == 'dropped' or _sum_counters(account, word)
     ]
-    counted = [f'>{word.replace("_", " ")}' for word in words]
+    counted = ['>discarded' if word == 'let_go' else f'>{word}' for word in words]
     heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
     rows = [
         (
@@ -135,7 +135,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['beginning_missing']:
         yield 'beginning', account['beginning_missing']
     if account['damage']:
-        yield 'DAMAGED', f'{account["damage"]}; what lies before is told here'
+        yield 'DAMAGED', f'{account["damage"]}; only the part before it is described'
     if account['recording_failure']:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
@@ -144,24 +144,26 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     )
     if received is not None:
         yield 'received', str(received)
-    unknown = 'not told: no recorder of ours closed the bag'
+    unknown = 'unknown: linkage_ros did not close the bag'
     yield 'dropped', unknown if dropped is None else str(dropped)
     if discarded:
-        yield 'let go', f'{discarded}, with files that made way for newer ones'
-    yield 'versions', ', '.join(_version_texts(account['versions'])) or 'not told'
+        yield 'discarded', f'{discarded}, in files that newer ones replaced'
+    yield 'versions', ', '.join(_version_texts(account['versions'])) or 'unknown'
     scene = account['scene']
     if scene:
-        rate = f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'a tick a sample'
+        rate = (
+            f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'one tick per sample'
+        )
         faults = f', faults {", ".join(scene["faults"])}' if scene['faults'] else ''
         yield 'scene', f'{scene["name"]}, {rate}, seed {scene["seed"]}{faults}'
     if account['scene_missing']:
         yield (
             'missing' if not scene else 'not run again',
-            f'{account["scene_missing"]}; so neither residual nor nearness to a toggle is known',
+            f'{account["scene_missing"]}; residual and nearness to a toggle are unknown',
         )
     if account['replay']:
         of, same = account['replay'].values()
-        yield 'run again', f'{same} of {of} joint states come to the same bytes'
+        yield 'run again', f'{same} of {of} joint states give the recorded bytes'
 
 
 def _sum_counters(account: dict[str, Any], word: str) -> int | None:
@@ -243,7 +245,7 @@ def _version_texts(versions: dict[str, Any]) -> Iterator[str]:
 def _qos_text(topic: dict[str, Any]) -> str:
     """Return a quality of service in one word; two for transient local."""
     if not topic['qos_understood']:
-        return 'not understood, taken as reliable'
+        return 'unknown, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
     return escape_unprintable(topic['reliability']).replace('_', ' ') + latched
 

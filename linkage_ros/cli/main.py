@@ -42,22 +42,22 @@ from linkage_ros.workbench import find_tool, TOOLS
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
-    'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
-    'simulate': 'run a scene as fast as it goes, without ROS, to a bag, CSV or Parquet',
+    'demo': 'run the demo scene and its crank, on a separate ROS graph',
+    'simulate': 'run a scene as fast as possible, without ROS, to a bag, CSV or Parquet',
     'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
     'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
     'plot': 'draw the joints of a bag over the angle of its crank',
-    'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
+    'info': 'describe a bag: its content, how well its loops closed, where a toggle was nearest',
     'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
-    'recover': 'make a whole bag of what a damaged or unfinished one still holds',
+    'recover': 'write what a damaged or unfinished bag still holds to a new bag',
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
-    'compare': 'say how far the joints of two runs lie apart over the time, and draw it',
-    'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
-    'accuracy': 'say where the error of a scene comes from, what a digit costs, what to write',
+    'compare': 'show how far the joints of two runs lie apart over time, and draw it',
+    'scene': 'describe a scene; list all effects; print the schemas of the files',
+    'accuracy': 'find where the error of a scene comes from, what a digit costs, what to write',
     'gallery': 'list the linkages and scenes that come with the package; print or copy one',
-    'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
+    'check': 'describe a linkage: mobility, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'view': 'show a linkage in the browser, to drag, drive and edit it; a scene, a node or a bag',
     'draw': 'draw a linkage, and its joints over its range',
@@ -72,28 +72,26 @@ COMMANDS = {
 }
 """Each subcommand and its description."""
 
+EXIT_CODES = {
+    0: 'success',
+    1: 'a run failed or was stopped, or no result meets the request',
+    2: 'wrong input; one line names place, reason and remedy',
+    3: 'something is lost (recover, replay) or differs (replay)',
+}
+"""The exit codes of all commands."""
+
+# What argparse says of a value that its type does not read.
+_INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
+
 
 def module_of(command: str) -> str:
     """Return the module name of a subcommand: a tool's, or one in this folder."""
     return TOOLS.get(command, f'linkage_ros.cli.{command}')
 
 
-EXIT_CODES = {
-    0: 'success',
-    1: 'a run failed or was stopped, or no result is what was asked for',
-    2: 'wrong input; one line names it, the place and the remedy',
-    3: 'something is lost (recover, replay) or differs (replay)',
-}
-"""The exit codes of all commands."""
-
-
-# What argparse says of a value that its type does not read.
-_INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
-
-
 def _in_plain_words(found: re.Match[str]) -> str:
     kind = 'whole number' if found[1] or 'int value' in found[0] else 'number'
-    return f'{found[2]} is no {kind}{decimal_comma(found[3])}'
+    return f'{found[2]} is not a {kind}{decimal_comma(found[3])}'
 
 
 class Parser(argparse.ArgumentParser):
@@ -142,10 +140,12 @@ def top_parser() -> Parser:
         prog='linkage',
         description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}\n\nexit codes:\n{codes}',
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog='linkage COMMAND --help says more.\n\nexample:\n  linkage check jansen_leg',
+        epilog='linkage COMMAND --help shows more.\n\nexample:\n  linkage check jansen_leg',
     )
     parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
-    parser.add_argument('command', choices=COMMANDS, metavar='COMMAND', help='one of those above')
+    parser.add_argument(
+        'command', choices=COMMANDS, metavar='COMMAND', help='one of the commands above'
+    )
     return parser
 
 
@@ -168,7 +168,7 @@ def main(arguments: list[str] | None = None) -> int:
                 finally:
                     sys.stdout.flush()  # here, where an error can be reported
         except (StoppedError, Exception) as error:
-            # A library may make an error of its own of what the signal raised within it.
+            # A library may convert an error that the signal raised within it.
             stopped = isinstance(error, StoppedError) or has_raised()
             if isinstance(error, BrokenPipeError) or not stopped:
                 raise

@@ -104,20 +104,9 @@ def names_for(source: ReplaySource, scene: Scene, counterfactual: Counterfactual
 
 class ReplayBag:
     """
-    A bag that is being written.
+    A bag that is being written, to a new folder.
 
-    Parameters
-    ----------
-    folder
-        Folder of the new bag; an existing one is never overwritten.
-    source, scene, counterfactual, names
-        Its content.
-
-    Raises
-    ------
-    LinkageError
-        If it cannot be created, or the definition of a message is not installed.
-
+    LinkageError if it cannot be created, or the definition of a message is not installed.
     """
 
     def __init__(

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The page of a run: `linkage view --node` in a process of its own, which ends with the run.
+The page of a run: `linkage view --node` in a separate process, which ends with the run.
 
 As a program, this module is that process. It ends by SIGTERM as soon as its standard input is
 closed: that happens even where the run is killed.
@@ -45,17 +45,9 @@ def view_command() -> str:
 
 class PageOfRun:
     """
-    The process that serves the page of a run.
+    The process that serves the page of a run; ``say`` receives its lines, on another thread.
 
-    A page so costs the ticks of the run no more than any other subscriber does.
-
-    Parameters
-    ----------
-    node
-        Full name of the node.
-    say
-        Called, on a thread of its own, with each line that the process writes.
-
+    In a process, a page costs the ticks of the run no more than any other subscriber does.
     """
 
     def __init__(self, node: str, say: Callable[[str], None]) -> None:

@@ -9,8 +9,8 @@
 """
 Publish a bag on the graph, at its own pace or another, to its end or Ctrl-C.
 
-Types, qualities of service and bytes are those that were recorded, in the order of the log times.
-What cannot be published is left out, and said.
+Types, qualities of service and bytes are as recorded, in the order of the log times. Topics that
+cannot be published are left out and named.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=_CLOCK_RATE,
         default=0.0,
         metavar='HZ',
-        help=f"publish the bag's time on {CLOCK}, so often a second; without a number 40",
+        help=f"publish the bag's time on {CLOCK} at this rate [Hz]; without a number 40",
     )
     parser.add_argument(
         '--topics', nargs='+', metavar='TOPIC', help='play these only; without it, all'
@@ -72,13 +72,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded_number(0.0, 1e9),
         default=0.0,
         metavar='SECONDS',
-        help="begin so much of the bag's time after its beginning",
+        help='skip this time at the beginning of the bag',
     )
     parser.add_argument(
         '--seconds',
         type=bounded_number(1e-9, 1e9),
         default=inf,
-        help="end after so much of the bag's time; without it, at its end",
+        help="how long to play, in the bag's time; without it, to its end",
     )
     parser.add_argument('--loop', action='store_true', help='begin again at the end')
     parser.add_argument(
@@ -86,7 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded_number(0.0, 1e6),
         default=0.0,
         metavar='SECONDS',
-        help='wait until somebody listens to one of the topics, for so long at most',
+        help='how long to wait at most for a subscriber to one of the topics',
     )
     add_ros_arguments(parser, 'remappings: -r OLD:=NEW')
 
@@ -138,7 +138,7 @@ def _say_truncated(bag: Bag) -> None:
         if is_in_use(file):
             raise BagError(file, 'is being written', 'end its recording first')
     print(
-        f'linkage play: {bag.path}: unfinished: its recording was killed; what it holds is played',
+        f'linkage play: {bag.path}: unfinished: its recording was killed; its content is played',
         file=sys.stderr,
     )
 

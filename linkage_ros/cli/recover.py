@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Make a whole bag of what a damaged or unfinished one still holds, and say what is lost."""
+"""Write what a damaged or unfinished bag still holds to a new bag, and list what is lost."""
 
 from __future__ import annotations
 

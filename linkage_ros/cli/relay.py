@@ -29,13 +29,13 @@ EXAMPLE = 'linkage relay four_bar --joint rocker_joint --branch 1 --seconds 5'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
-    parser.add_argument('--joint', default='', metavar='NAME', help='the joint that is commanded')
+    parser.add_argument('--joint', default='', metavar='NAME', help='the commanded joint')
     parser.add_argument(
         '--branch',
         type=bounded_number(0, 10_000, int),
         default=0,
         metavar='N',
-        help='its branch, as linkage check --branches lists them; needed if there are several',
+        help='its branch, as in linkage check --branches; required if there are several',
     )
     add_set(parser)
     parser.add_argument(
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=bounded_number(0.0, 1e9),
         default=0.0,
         metavar='SECONDS',
-        help='how long; until a signal if not given',
+        help='duration; without it, until a signal',
     )
     add_ros_arguments(parser, 'remappings: -r OLD:=NEW')
 

@@ -9,14 +9,14 @@
 """
 Run the scene of a bag once more over its samples, and compare.
 
-Every joint state, and what else was published, is made anew and held against the recorded bytes.
-Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its metadata promise;
-1: it could not be told, was stopped, or the bag is damaged and what lies before the damage is the
-same.
+Every joint state, and every other published message, is computed again and compared with the
+recorded bytes. Exit code 0: all are the same; 3: some differ, or the bag lacks messages that its
+metadata promise; 1: undecided, stopped, or the bag is damaged and the part before the damage is
+the same.
 
-With --scene another scene is run, with --set that of the bag with other values; its joints are
-compared with the recorded ones. -o writes it to a new bag, which replays by itself. Then a
-difference is no failure.
+--scene runs another scene, --set the scene of the bag with other values; its joints are compared
+with the recorded ones. -o writes it to a new bag, which replays by itself. Then a difference
+is not a failure.
 """
 
 from __future__ import annotations
@@ -70,6 +70,10 @@ from linkage_ros.replay import (
     versions_here,
 )
 from linkage_ros.signals import heed_signals
+
+EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
+
+EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
@@ -286,7 +290,7 @@ def _versions_text(said: Mapping[str, str]) -> str:
         for key in said
         if key not in words
     ]
-    return ', '.join(texts) or 'versions that it does not tell'
+    return ', '.join(texts) or 'unknown versions'
 
 
 def _place_text(where: Mapping[str, Any], begin: int) -> str:
@@ -298,7 +302,7 @@ def _tick_text(where: Mapping[str, Any], begin: int) -> str:
 
 
 def _number_text(value: float | None) -> str:
-    return 'no number' if value is None else f'{value:.3g}'
+    return 'not a number' if value is None else f'{value:.3g}'
 
 
 # Counterfactual replay: another scene runs over the samples of a bag.
@@ -405,11 +409,6 @@ def _side_by_side(
     return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
 
 
-EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
-
-EXAMPLE = 'linkage replay my_bag --set angles=wrapped'
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bag(parser)
@@ -468,7 +467,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def _other_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
-    """Return the scene of --scene, or that of the bag, with the keys of --set."""
+    """Return the scene of --scene, or of the bag, with the keys of --set."""
     if arguments.scene is not None:
         return load_scene(arguments.scene, arguments.set)
     return scene_of(bag, trust_effects=arguments.trust_effects, settings=arguments.set)
@@ -509,7 +508,7 @@ def _show_proof(account: dict[str, Any]) -> None:
     differ, ticks = account['different_ticks'], account['compared_ticks']
     verdict = account['verdict']
     if verdict == IDENTICAL:
-        text = f'identical: what {ticks} ticks have made comes to the same again'
+        text = f'identical: all {ticks} ticks give the recorded bytes'
     else:
         text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
     print(f'{account["bag"]}: {text}')
@@ -524,7 +523,7 @@ def _show_proof(account: dict[str, Any]) -> None:
         if last < account['ticks'] and last != first['tick']:
             print(f'from tick {last + 1} on all are the same')
     elif first:
-        print(escape_unprintable(f'not told, first: {first_text(first, begin)}'))
+        print(escape_unprintable(f'undecided, first: {first_text(first, begin)}'))
     if account['withheld_ticks']:
         print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
     for line in versions_text(account['versions']):
@@ -559,13 +558,13 @@ def _show_counterfactual(account: dict[str, Any]) -> None:
 def _find_shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
-        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
+        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; its content was replayed'
     if account['missing']:
         yield (
             f'{account["bag"]}: {account["missing"]:,} messages that its metadata.yaml promises '
             'are not there; the others were replayed'
         )
     if account['damage']:
-        yield f'{account["damage"]}; what lies before was replayed'
+        yield f'{account["damage"]}; the part before it was replayed'
     if account['stopped']:
         yield 'stopped; the rest of the bag was not replayed'

@@ -48,6 +48,8 @@ _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
 _MOST_SHOWN = 24
 """Maximum number of joints that fit on a screen."""
 
+EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
+
 
 class JointRow(NamedTuple):
     """A joint as the display shows it; its rate is '' if it is unknown."""
@@ -205,7 +207,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
     ]
     if counts.suppressed:
         rows.append(
-            ('withheld', f'{counts.suppressed} readings, by what the scene does to sensors')
+            ('withheld', f'{counts.suppressed} readings, by the sensor effects of the scene')
         )
     if node.crank_topic:
         rows.append(('samples', loop.sample_counts_text))
@@ -218,7 +220,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
         rows += [
             (
                 'memory',
-                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.discarded} let go'
+                f'{t.name}: {t.received} received, {t.kept} in memory, {t.discarded} discarded'
                 + (f', {t.dropped} dropped' if t.dropped else ''),
             )
             for t in memory.topics
@@ -229,7 +231,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
             (
                 'recorded',
                 f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped'
-                + (f', {t.discarded} let go with the oldest files' if t.discarded else ''),
+                + (f', {t.discarded} discarded with the oldest files' if t.discarded else ''),
             )
             for t in recording.topics
         ]
@@ -243,12 +245,9 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
     return TerminalTable('', ('', ''), rows)
 
 
-EXAMPLE = 'linkage run worn_press --seconds 5 --set rate=500'
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage is moved')
+    parser.add_argument('scene', metavar='SCENE', help=f'{SCENE_HELP}; a linkage gets a drive')
     add_run_arguments(parser)
     add_ros_arguments(parser, 'remappings, parameters, QoS')
 
@@ -260,17 +259,19 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
         '--seconds',
         type=bounded_number(1e-9, 1e9),
         default=inf,
-        help='how long; without it, until Ctrl-C',
+        help='duration; without it, until Ctrl-C',
     )
-    parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
-    parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
+    parser.add_argument('--runs', default='', metavar='FOLDER', help='parent folder of the bags')
+    parser.add_argument(
+        '--plain', action='store_true', help='one line per second, no live display'
+    )
     parser.add_argument(
         '--view', action='store_true', help='serve a page of the run, as linkage view --node does'
     )
     parser.add_argument(
         '--prove',
         action='store_true',
-        help='at the end replay the whole bag, not only as much of it as takes 2 s',
+        help='replay the whole bag at the end; without it, as much as takes 2 s',
     )
     add_radians(parser)
 

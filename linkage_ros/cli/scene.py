@@ -7,10 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Say what a scene consists of, or all that is wrong with it; or what scenes can name.
+Describe a scene, or list its errors; or list what scenes can name.
 
-Where the library jsonschema is installed, everything that is wrong with the files is said at once;
-elsewhere the first thing.
+If the library jsonschema is installed, all errors of the files are listed; else the first one.
 """
 
 from __future__ import annotations
@@ -66,6 +65,21 @@ _WHERE = {
 _MOST_NAMES = 4
 _LONGEST = 60
 
+REGISTRIES: Mapping[str, Mapping[str, Any]] = {
+    'drive': DRIVES,
+    'effect': EFFECTS,
+    'fault': FAULTS,
+    'solver': SOLVERS,
+}
+"""Everything that a scene can name, by kind."""
+
+_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
+
+SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
+"""Functions that make the JSON Schema of each kind of file."""
+
+EXAMPLE = 'linkage scene worn_press --set rate=500'
+
 
 def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
     """Yield the tables of a scene that has been built."""
@@ -74,13 +88,13 @@ def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Termi
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
         )
-        heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
+        heads = ('>', 'stage', 'where', 'what it does', 'in this scene', '')
         yield TerminalTable(
             f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
         )
     if scene.faults:
         yield TerminalTable(
-            'Faults', ('name', 'kind', 'as said here', 'by itself'), list(_fault_rows(scene))
+            'Faults', ('name', 'kind', 'in this scene', 'injected'), list(_fault_rows(scene))
         )
     yield TerminalTable('Topics', ('', 'topic', 'message', ''), list(_topic_rows(scene, pipeline)))
 
@@ -162,7 +176,7 @@ def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
             stage.where,
             first_docstring_line(type(stage.parameters)),
             _parameters_text(stage.parameters),
-            f'brought in by {", ".join(stage.needed_by)}' if stage.needed_by else '',
+            f'needed by {", ".join(stage.needed_by)}' if stage.needed_by else '',
         )
 
 
@@ -279,16 +293,6 @@ def _shorten_list(names: list[str]) -> str:
 
 # Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds.
 
-REGISTRIES: Mapping[str, Mapping[str, Any]] = {
-    'drive': DRIVES,
-    'effect': EFFECTS,
-    'fault': FAULTS,
-    'solver': SOLVERS,
-}
-"""Everything that a scene can name, by kind."""
-
-_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
-
 
 def parameters_of(what: str, name: str) -> Any:
     """Return the parameter type of a drive, effect, fault or solver."""
@@ -308,12 +312,6 @@ def table_of(what: str, name: str) -> TerminalTable:
         if rows
         else TerminalTable(title, ('',), [('no parameters',)])
     )
-
-
-SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
-"""Functions that make the JSON Schema of each kind of file."""
-
-EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

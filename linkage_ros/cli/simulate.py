@@ -7,11 +7,11 @@
 # language governing permissions and limitations under the License.
 
 """
-Run a scene as fast as it goes, without ROS: once, into a bag or a table, or many times as a study.
+Run a scene as fast as possible, without ROS: once, to a bag or a table, or often, as a study.
 
 A study runs the scene with other seeds and other values of its keys. It writes a table with a row
-for each run, and a picture of the spread over the time. A study that was ended goes on when it is
-called again with the same scene and options: OUTPUT.part holds its finished runs until then.
+for each run, and a picture of the spread over time. A stopped study continues when it is called
+again with the same scene and options: OUTPUT.part holds its finished runs until then.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_read_output,
         required=True,
         metavar='FOLDER|OUTPUT',
-        help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; of a '
+        help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; for a '
         'study a table of its runs, or a picture of the spread, OUTPUT.png, .svg or .pdf',
     )
     add_force(parser)
@@ -99,8 +99,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='KEY=VALUES',
-        help='run with each value of a key of the scene: KEY=LOW:HIGH:N or KEY=a,b,c; of several '
-        'all combinations',
+        help='run with each value of a key of the scene: KEY=LOW:HIGH:N or KEY=a,b,c; several '
+        'keys give all combinations',
     )
     study.add_argument(
         '--picture', type=Path, metavar='OUTPUT', help='the picture, beside a table'
@@ -109,9 +109,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--workers',
         type=bounded_number(1, 1024, int),
         metavar='N',
-        help='processes (default: one a processor)',
+        help='processes (default: one per processor)',
     )
-    study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler whose workers run')
+    study.add_argument('--dask', metavar='ADDRESS', default='', help='scheduler of the workers')
 
 
 def _read_output(text: str) -> Path:
@@ -217,7 +217,7 @@ def _run_study(
     with closing(FinishedRuns(output, study, runs)) as finished:
         found = finished.outcomes
         if found:
-            _print_note(f'goes on after {len(found)} of {len(runs)} runs, of {finished.file}')
+            _print_note(f'continues after {len(found)} of {len(runs)} runs, of {finished.file}')
         waiting = [part for part in enumerate(runs) if part[0] not in found]
         workers = max(1, min(arguments.workers or cpu_count() or 1, len(waiting)))
         try:
@@ -229,7 +229,7 @@ def _run_study(
                         raise StoppedError
         except StoppedError:
             kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
-            _print_note(f'stopped; {kept}; the same command goes on' if found else 'stopped')
+            _print_note(f'stopped; {kept}; the same command continues' if found else 'stopped')
             return 1
         return _write_results(arguments, scene, runs, finished, pictures)
 

@@ -54,6 +54,8 @@ FORMATS = {'.csv': 'csv', '.json': 'json', '.txt': 'table'}
 _ORDERS = ('', ' rate', ' acceleration')
 _PER = ('', '/s', '/s²')
 
+EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
+
 
 class ResultColumn(NamedTuple):
     """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
@@ -63,9 +65,6 @@ class ResultColumn(NamedTuple):
 
     def __str__(self) -> str:
         return f'{self.name} [{self.unit}]' if self.unit else self.name
-
-
-EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,25 +78,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar='NAME=VALUE',
         help='solve for every input at which a dependent joint, or a coordinate of a traced point '
-        'such as P.x, has a value; --rate and --acceleration are then those of the joint; may be '
-        'repeated; of a linkage with several inputs as many joints, which become its inputs',
+        'such as P.x, has a value; --rate and --acceleration are then for the joint; may be '
+        'repeated; with several inputs, name as many joints, which become the inputs',
     )
     parser.add_argument(
-        '--sweep', action='store_true', help='solve over the range; the default where no --at is'
+        '--sweep', action='store_true', help='solve over the range; the default without --at'
     )
     parser.add_argument(
         '--from',
         dest='first',
         type=bounded_number(-_MOST, _MOST),
         metavar='VALUE',
-        help='where a sweep begins',
+        help='first input of a sweep',
     )
     parser.add_argument(
         '--to',
         dest='last',
         type=bounded_number(-_MOST, _MOST),
         metavar='VALUE',
-        help='where a sweep ends',
+        help='last input of a sweep',
     )
     parser.add_argument(
         '--steps',
@@ -121,7 +120,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--points', action='store_true', help='add the traced points, in the frame of the ground'
     )
     parser.add_argument(
-        '--format', choices=('table', 'csv', 'json'), help='of what is printed (default: table)'
+        '--format',
+        choices=('table', 'csv', 'json'),
+        help='format of the printed result (default: table)',
     )
     add_output(parser, FORMATS, 'the result is printed')
 
@@ -131,8 +132,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.format and arguments.output is not None:
         raise LinkageError(
             f'--format {arguments.format}',
-            'is for what is printed, and -o names a file',
-            'leave it out: the suffix of the file says its format',
+            'is for a printed result, and -o names a file',
+            'leave it out: the suffix of the file selects its format',
         )
     closure = load(arguments.file)
     if arguments.joint:
@@ -194,8 +195,8 @@ def _exchanged_table(
     groups = assur_groups(inverse.linkage).groups
     links = [link for group in groups if isinstance(group, Iterated) for link in group.links]
     if links:
-        told = f'{list_names(links)} are solved by iteration, from the pose of the file'
-        print(f'linkage solve: note: with {list_names(names)} as inputs {told}', file=sys.stderr)
+        text = f'{list_names(links)} are solved by iteration, from the pose of the file'
+        print(f'linkage solve: note: with {list_names(names)} as inputs {text}', file=sys.stderr)
     return _forward_table(inverse, argparse.Namespace(**vars(arguments) | {'at': [typed]}))
 
 
@@ -257,7 +258,7 @@ def _joint_value(text: str) -> tuple[str, float]:
     except ValueError:
         number = nan
     if not name or not isfinite(number):
-        raise argparse.ArgumentTypeError(f'{text!r} is no joint with a value; write NAME=40')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a joint with a value; write NAME=40')
     return name, number
 
 
@@ -270,9 +271,9 @@ def _show_reach(closure: Closure, typed: Sequence[tuple[float, ...]], angles: An
                 [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
                 for one in ranges
             ]
-            told = ' and '.join(f'from {low} to {high}' for low, high in ends)
+            text = ' and '.join(f'from {low} to {high}' for low, high in ends)
             name = closure.linkage.inputs[0].joint
-            print(f'linkage solve: note: {name} closes {told}', file=sys.stderr)
+            print(f'linkage solve: note: {name} closes {text}', file=sys.stderr)
             return
 
 

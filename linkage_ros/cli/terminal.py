@@ -32,6 +32,12 @@ _NARROWEST = 16
 _BORDER = 3
 """Characters that the frame of a table adds to each column."""
 
+ProgressCallback = Callable[[int, int], None]
+"""Takes the amount done and the total."""
+
+FIRST_LINE, _EVERY = 2.0, 30.0
+"""Seconds until the first line, and between two."""
+
 
 class TerminalTable(NamedTuple):
     """A table."""
@@ -170,7 +176,7 @@ def _rich_table(table: TerminalTable) -> object:
     from rich.text import Text
 
     heads = _column_heads(table)
-    # As Text: rich would read brackets, such as those of a unit, as markup.
+    # As Text: rich would read brackets, as in units, as markup.
     drawn = Drawn(
         title=Text(table.title, style='bold') if table.title else None,
         title_justify='left',
@@ -186,12 +192,6 @@ def _rich_table(table: TerminalTable) -> object:
 
 
 # Progress of a long task: a bar drawn by rich on a terminal, else a line now and then.
-
-ProgressCallback = Callable[[int, int], None]
-"""Takes the amount done and the total."""
-
-FIRST_LINE, _EVERY = 2.0, 30.0
-"""Seconds until the first line, and between two."""
 
 
 @contextmanager

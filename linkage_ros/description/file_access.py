@@ -39,13 +39,7 @@ def open_regular(file: str | Path) -> BinaryIO:
     """
     Open a file for reading.
 
-    Raises
-    ------
-    OSError
-        It cannot be opened, or is no regular file; the message names its type.
-    ValueError
-        Its name contains a NUL.
-
+    OSError if it cannot be opened or is not a regular file; ValueError for a NUL in its name.
     """
     _check_regular(Path(file).stat(), file)
     # The file may have been replaced since the check.
@@ -69,7 +63,7 @@ def _check_regular(status: os.stat_result, file: str | Path) -> None:
         return
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(file))
-    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is no file')
+    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is not a file')
     raise OSError(EINVAL, f'{what}, not a regular file', str(file))
 
 
@@ -128,7 +122,7 @@ def atomic_write(file: str | Path, data: bytes) -> None:
         _check_folder(Path(file))
         target = Path(file).resolve()
         if target.exists() and not target.is_file():
-            raise LinkageError(file, 'is there already and is no file', 'name another file')
+            raise LinkageError(file, 'exists and is not a file', 'name another file')
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
         with replace_file(target) as stream:
@@ -143,11 +137,7 @@ def replace_file(target: Path) -> Iterator[BinaryIO]:
     """
     Yield a stream for the new content of a file, whatever exists there; do not follow a link.
 
-    Raises
-    ------
-    OSError
-        The file cannot be written; the old file stays, and nothing is left beside it.
-
+    On an OSError the old file stays, and no other file is left.
     """
     temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
     try:

@@ -14,6 +14,13 @@ from pathlib import Path
 import re
 from typing import NamedTuple
 
+_ELEMENT = re.compile(r'\s*(?:<[?!][^>]*>\s*|<!--.*?-->\s*)*<([A-Za-z][\w.-]*)', re.DOTALL)
+_LINKAGE_KEY = re.compile(r'^(?:links|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
+_SCENE_KEY = re.compile(r'^(?:linkages?|drive|effects)\s*:', re.MULTILINE)
+_CONTROL = re.compile(rb'[\0-\x08\x0e-\x1a\x1c-\x1f]')
+_READ = 4096
+"""Number of bytes that determine the kind."""
+
 
 class FileKind(NamedTuple):
     """A kind of file."""
@@ -25,7 +32,7 @@ class FileKind(NamedTuple):
 
 _BAG = FileKind('a bag', 'linkage info, plot and report read bags')
 _EMPTY = FileKind('empty', 'linkage gallery four_bar prints an example')
-BINARY = FileKind('no text file', 'name a scene or a linkage file, which is UTF-8 text')
+BINARY = FileKind('a binary file', 'name a scene or a linkage file, which is UTF-8 text')
 _NOT_UTF_8 = BINARY._replace(is_foreign=False)
 _UTF_16 = FileKind('text in UTF-16', 'save it as UTF-8 text')
 _TEXT = FileKind('a text file', is_foreign=False)
@@ -53,12 +60,6 @@ _ELEMENTS = {
     'html': FileKind('a web page'),
     'svg': FileKind('a picture'),
 }
-_ELEMENT = re.compile(r'\s*(?:<[?!][^>]*>\s*|<!--.*?-->\s*)*<([A-Za-z][\w.-]*)', re.DOTALL)
-_LINKAGE_KEY = re.compile(r'^(?:links|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
-_SCENE_KEY = re.compile(r'^(?:linkages?|drive|effects)\s*:', re.MULTILINE)
-_CONTROL = re.compile(rb'[\0-\x08\x0e-\x1a\x1c-\x1f]')
-_READ = 4096
-"""Number of bytes that tell the kind."""
 
 
 def kind_of_folder(folder: Path) -> FileKind:

@@ -71,6 +71,9 @@ HEAVIEST = 1e12
 STRONGEST = 1e12
 """Bound on efforts, in [N·m] or [N]."""
 
+_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
+"""The input of every shorthand."""
+
 
 def looks_like_linkage(content: Section) -> bool:
     """Return whether a file of unknown kind has the keys of a linkage."""
@@ -380,7 +383,9 @@ def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]
     for name in limited:
         if name not in joints:
             raise limited.error(
-                name, f'{quote(name)} is no joint of it', f'name one of {list_names(joints)}'
+                name,
+                f'{quote(name)} is not a joint of the linkage',
+                f'name one of {list_names(joints)}',
             )
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], limited.section(name)) for name in limited]
@@ -397,7 +402,7 @@ def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]
 
 
 def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
-    """Return an expanded shorthand with the pose that it gives; a drawn one tells the side."""
+    """Return an expanded shorthand with its pose; a drawn pose determines the side."""
     if 'pose' in content:
         pose = _read_pose(content.section('pose'), [_DRIVEN_CRANK])
         if pose.is_drawn and 'assembly' not in content:
@@ -408,10 +413,6 @@ def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
             'angles': dict(pose.angles),
         }
     return written_out
-
-
-_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
-"""The input of every shorthand."""
 
 
 def _four_bar(content: Section) -> dict[str, Any]:
@@ -464,25 +465,11 @@ _SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_
 
 def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
     """
-    Return a linkage in each choice of assembly sides in which it closes.
+    Return a linkage in each choice of assembly sides in which it closes; errors as in `load`.
 
-    If the file leaves sides out, those that it writes are kept; else all are chosen.
-
-    Parameters
-    ----------
-    linkage
-        Path of a linkage file, or the name of one that comes with the package.
-
-    Returns
-    -------
-    closures : dict of str to Closure
-        By the text that the file needs for it, such as ``'assembly: {B: left}'``.
-
-    Raises
-    ------
-    FileError
-        As in `load`; or there is no side to choose, or there are too many.
-
+    Keys are texts for the file, such as ``'assembly: {B: left}'``. Sides that the file writes are
+    kept if it leaves others out, else all are chosen. A FileError says that there is no side to
+    choose, or that there are too many.
     """
     file = named_file(linkage, 'linkages')
     return find_closures(linkage_content(file), file.stem)

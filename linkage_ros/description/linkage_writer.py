@@ -59,18 +59,24 @@ _WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
 
 Content = float | str | list['Content'] | dict[str, 'Content']
 
+_IN_ROWS = ('links', 'sliders', 'joints', 'ratios', 'masses')
+"""Keys whose parts have a line each, even if short."""
+
+_PART = 0.96
+"""Fraction of its range through which an input swings: many ranges end at a toggle."""
+
+_PERIOD = 4.0
+"""Period of the swing, in [s]."""
+
+_SAME = 1e-9
+"""Distance beyond the end of a range that still counts as the end, in [rad] or of a length."""
+
 
 def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
     """
-    Return the text of a linkage file.
+    Return the text of a linkage file; ``comment`` has the paragraphs of the comment at the top.
 
-    Parameters
-    ----------
-    linkage
-        The linkage; its numbers must be finite and its names printable.
-    comment
-        Paragraphs of the comment at the top.
-
+    The numbers must be finite and the names printable.
     """
     lines = list(_comment_lines(comment))
     for key, value in content_of(linkage).items():
@@ -100,10 +106,6 @@ def number_text(value: float) -> str:
     mantissa, e, exponent = written.partition('e')
     # YAML 1.1 requires a decimal point in a number with an exponent.
     return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
-
-
-_IN_ROWS = ('links', 'sliders', 'joints', 'ratios', 'masses')
-"""Keys whose parts have a line each, even if short."""
 
 
 def content_of(linkage: Linkage) -> dict[str, Content]:
@@ -239,16 +241,6 @@ def _name_text(name: str) -> str:
     if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
         return name
     return json.dumps(name, ensure_ascii=False)  # its escapes are valid in YAML
-
-
-_PART = 0.96
-"""Fraction of its range through which an input swings: many ranges end at a toggle."""
-
-_PERIOD = 4.0
-"""Period of the swing, in [s]."""
-
-_SAME = 1e-9
-"""Distance beyond the end of a range that still counts as the end, in [rad] or of a length."""
 
 
 def scene_text_for(closure: Closure, file: str) -> str:

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Notes on a scene: values that are allowed, but look like those of another unit.
+Notes on a scene: values that are allowed, but look like values in another unit.
 
 A note has the form of an error; whoever reads the scene shows it and goes on.
 """
@@ -106,6 +106,6 @@ def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
         x, y = scene_linkage.loads.gravity
         yield DefinitionError(
             'loads.gravity',
-            f'[{x:g}, {y:g}] m/s² is hardly any',
+            f'[{x:g}, {y:g}] m/s² is very small',
             'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]',
         )

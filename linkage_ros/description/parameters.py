@@ -46,7 +46,7 @@ KINDS = {
 """Kinds of parts that a parameter can name, and their terms in messages."""
 
 _SLIDING = {'joint': 'slide', 'input': 'slide', 'any_joint': 'slide', 'pin': 'slider'}
-"""Kinds whose parts turn or slide, and the names of those that slide."""
+"""Kinds whose parts turn or slide, and the names of sliding parts."""
 
 CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
 """Pattern of a printable character."""
@@ -434,7 +434,7 @@ def each_part(meaning: str, kind: str, of: Any, *, required: bool = False) -> An
 
 
 def own_parameters(meaning: str, of: Any) -> Any:
-    """Declare parameters that joints have of their own, read as a mapping; if absent, None."""
+    """Declare parameters for each joint, read as a mapping; if absent, None."""
     return _declare(Each(meaning, 'joint', of), None)
 
 
@@ -511,7 +511,7 @@ def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]
     """
     Return the remedy for a key that belongs into a section of named parts; '' for another key.
 
-    The keys are those of each of its parts: none if a part has a single value.
+    The keys are the keys of a part: none if a part has a single value.
     """
     if key in keys:
         name = names[0] if names else 'NAME'

@@ -47,7 +47,7 @@ class StorageParameters(Storage):
     """How the bag is stored."""
 
     flush_period: float = number(
-        'what a power cut may cost: the disk is waited for a little more often',
+        'the most that a power cut may lose; the disk is synchronised a little more often',
         _DEFAULT.flush_period,
         unit='s',
         least=LEAST_FLUSH_PERIOD,
@@ -68,30 +68,29 @@ class StorageParameters(Storage):
         most=1e9,
     )
     keep_files: int = whole_number(
-        'how many files are kept: the oldest goes when one more begins; 0: all',
+        'number of files to keep: a new file replaces the oldest one; 0: all',
         _DEFAULT.keep_files,
         least=0,
         most=1_000_000,
     )
     min_free_bytes: int = whole_number(
-        'what stays free on the disk: where less is, the recording ends; 0: no matter',
+        'free space to leave on the disk: below it the recording ends; 0: no limit',
         _DEFAULT.min_free_bytes,
         unit='bytes',
         least=0,
         most=10**15,
     )
-    compression: str = choice('how messages are packed', COMPRESSIONS, _DEFAULT.compression)
+    compression: str = choice('compression of messages', COMPRESSIONS, _DEFAULT.compression)
     snapshot_seconds: float = number(
-        'no bag as the run goes: the last so many seconds are kept in memory, and written when '
-        '~/snapshot asks for them; 0: off',
+        'time to keep in memory instead of recording a bag; ~/snapshot writes it to a bag; 0: off',
         _DEFAULT.snapshot_seconds,
         unit='s',
         least=0.0,
         most=86_400.0,
     )
     snapshot_bytes: int = whole_number(
-        'how much memory that may take: where it is too little, less than snapshot_seconds is '
-        'kept; twice as much while a snapshot is written',
+        'memory for snapshot_seconds: if it is too little, less time is kept; twice as much while '
+        'a snapshot is written',
         _DEFAULT.snapshot_bytes,
         unit='bytes',
         least=1_000_000,

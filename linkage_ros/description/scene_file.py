@@ -66,6 +66,21 @@ _WHEN = ('at', 'seconds')
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
+_LINKAGE_KEYS = (
+    'prefix',
+    'publish_input',
+    'drive',
+    'effects',
+    'loads',
+    'solver',
+    'accuracy',
+    'beyond_limits',
+)
+"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
+
+_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
+"""Keys of a scene beside the linkages."""
+
 
 @dataclass(frozen=True)
 class _SceneSource:
@@ -124,15 +139,7 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
-    """
-    Return whether a file holds a scene or a linkage.
-
-    Raises
-    ------
-    FileError
-        It holds neither, or keys of both are mixed.
-
-    """
+    """Return whether a file holds a scene or a linkage; FileError for neither, or both."""
     if not ('linkage' in content or 'linkages' in content):
         if looks_like_linkage(content):
             for key in content:
@@ -304,7 +311,7 @@ def _read_linkages(
         )
         return [scene_linkage], {LINKAGE_FILE: data}
     if 'linkage' in content:
-        raise content.error('linkage', 'stands beside linkages', 'write one of the two')
+        raise content.error('linkage', 'cannot be combined with linkages', 'write one of the two')
     entries = content.sections('linkages')
     if len(entries) > _MOST_LINKAGES:
         raise content.error(
@@ -323,26 +330,10 @@ def _read_linkages(
             raise entry.error(
                 'prefix' if 'prefix' in entry else '',
                 f'a second linkage publishes {list_names(sorted(twice))}',
-                'give each linkage its own prefix, or its joints names of their own',
+                'give each linkage its own prefix, or its joints other names',
             )
         entry.finish(_LINKAGE_KEYS)
     return members, files
-
-
-_LINKAGE_KEYS = (
-    'prefix',
-    'publish_input',
-    'drive',
-    'effects',
-    'loads',
-    'solver',
-    'accuracy',
-    'beyond_limits',
-)
-"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
-
-_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
-"""Keys of a scene beside the linkages."""
 
 
 def _read_scene_linkage(
@@ -406,12 +397,14 @@ def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
     """Refuse effects that do not fit to the drive, or to what is published."""
     if 'effort' in effects and not published:
         raise effects.error(
-            'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
+            'effort',
+            'is the effort of the input joint, which is not published',
+            'set publish_input: true, or name pin_forces',
         )
     if drive == 'torque' and 'backlash' in effects:
         raise effects.error(
             'backlash',
-            'is a play without masses, and torque moves masses',
+            'is play without masses, and torque moves masses',
             'write drive.torque.play: {width: …, inertia: …} instead',
         )
 
@@ -429,7 +422,7 @@ def _read_prefix(content: Section, default: str) -> str:
     prefix = content.text('prefix', '') if 'prefix' in content else default
     if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
         raise content.error(
-            'prefix', f'{quote(prefix)} begins no name of a joint', 'use letters, digits and _/.-'
+            'prefix', f'{quote(prefix)} cannot begin a joint name', 'use letters, digits and _/.-'
         )
     return prefix
 
@@ -499,7 +492,7 @@ def _read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
     if 'accuracy' not in where:
         return {'solver': _read_solver(where, parts) if 'solver' in where else None}
     if 'solver' in where:
-        raise where.error('accuracy', 'stands beside solver', 'write one of the two')
+        raise where.error('accuracy', 'cannot be combined with solver', 'write one of the two')
     bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
     return {'accuracy': where.number('accuracy', unit='rad and m', **bounds)}
 
@@ -514,7 +507,7 @@ def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
         raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
     if not named or named[0] not in SOLVERS:
         solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names none', f'write one of {list_names(SOLVERS)}')
+        raise solvers.error('', 'names no solver', f'write one of {list_names(SOLVERS)}')
     (name,) = named
     parameters = import_module(SOLVERS[name]).PARAMETERS
     return name, read_parameters(solvers.section(name), parameters, parts)
@@ -572,7 +565,7 @@ def _read_spring_end(content: Section, key: str) -> tuple[str, str]:
     """Return link and point of a spring's end."""
     link, dot, point = content.text(key).rpartition('.')
     if not dot or not link or not point:
-        raise content.error(key, f'{content.text(key)!r} is no point', 'write LINK.POINT')
+        raise content.error(key, f'{content.text(key)!r} is not a point', 'write LINK.POINT')
     return link, point
 
 
@@ -618,7 +611,9 @@ def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]
     parameters: Any = read_parameters(content.section(kinds[0]), FAULTS[kinds[0]], parts)
     at = content.numbers('at', most=1e9) if 'at' in content else []
     if any(time < 0.0 for time in at):
-        raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')
+        raise content.error(
+            'at', f'{at} has a negative time', 'write seconds after the first tick'
+        )
     seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
     content.finish(_WHEN)
     return Fault(kinds[0], parameters, tuple(at), seconds)
@@ -639,7 +634,7 @@ def _read_storage(content: Section) -> StorageParameters:
         )
     if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
         raise content.error(
-            'keep_files', 'there is one file only', f'write {" or ".join(SPLITS)} too'
+            'keep_files', 'the bag has only one file', f'write {" or ".join(SPLITS)} too'
         )
     return storage
 

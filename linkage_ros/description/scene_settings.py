@@ -19,6 +19,9 @@ from linkage_ros.description.yaml_file import BoundedLoader, parse_yaml
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 import yaml
 
+_PART = re.compile(r'"[^"]+"|[^".]+')
+"""A part of a key; in quotes it may contain dots."""
+
 
 class _Dumper(yaml.SafeDumper):
     """A dumper that quotes what our reader would not take for a text."""
@@ -31,23 +34,11 @@ _Dumper.add_representer(LinedDict, yaml.SafeDumper.represent_dict)
 
 def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
     """
-    Set keys of a scene; return the scene as text, which a bag then holds.
+    Set keys of a scene, in place; return the scene as text, which a bag then holds.
 
-    Parameters
-    ----------
-    content
-        The scene, which is changed; no key of it may have been taken.
-    settings
-        One ``KEY=VALUE`` each: a dotted key, and a value in YAML. Of several linkages one is
-        named: ``linkages.left.drive.sine.amplitude=0.3``. A part with a dot that is not in the
-        scene yet stands in quotes: ``loads.forces."coupler.P".constant=5``.
-
-    Raises
-    ------
-    FileError
-        A setting is no ``KEY=VALUE``, its key lies within something other than a mapping, or
-        there is no such linkage.
-
+    A setting is ``KEY=VALUE``, a dotted key and a value in YAML. With several linkages the key
+    names one: ``linkages.left.drive.sine.amplitude=0.3``. A new part with a dot stands in quotes:
+    ``loads.forces."coupler.P".constant=5``. A FileError names a wrong setting.
     """
     for setting in settings:
         key, equal, text = setting.partition('=')
@@ -68,10 +59,6 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
     return (head + yaml.dump(content.mapping, Dumper=_Dumper, sort_keys=False)).encode()
 
 
-_PART = re.compile(r'"[^"]+"|[^".]+')
-"""A part of a key; in quotes it may contain dots."""
-
-
 def _next_part(within: Any, parts: list[str]) -> str:
     """Remove the next part of a key, and return it: the longest that is there, dots included."""
     count = 1
@@ -84,7 +71,7 @@ def _next_part(within: Any, parts: list[str]) -> str:
 
 
 def _inner_value(setting: str, within: Any, part: str) -> Any:
-    """Return what a key of a mapping holds, or the linkage of a name in a list of them."""
+    """Return what a key of a mapping holds, or the linkage of a name in a list."""
     if isinstance(within, list):
         names = _linkage_names(within)
         if part not in names:

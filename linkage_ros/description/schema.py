@@ -67,7 +67,7 @@ _NO_PLAY_UNDER_TORQUE: Schema = {
     'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
 }
 _OWN_EFFECT: Schema = {
-    'description': "An effect of one's own: a module that Python finds, and its parameters.",
+    'description': 'A user-defined effect: a module that Python finds, and its parameters.',
     'type': 'object',
     'additionalProperties': True,
 }
@@ -79,6 +79,12 @@ _NAMED = (
     'path of the linkage file, relative to the folder of this file; or the name of a linkage that '
     'comes with the package'
 )
+
+_either_slider: Schema = {
+    'if': {'required': ['slider']},
+    'then': {'properties': {'parent': False, 'child': False}},
+    'else': {'required': ['parent', 'child']},
+}
 
 
 def as_text(schema: Schema) -> str:
@@ -114,7 +120,7 @@ def scene_schema() -> Schema:
     """Return the schema of a scene file; it imports all drives, effects and faults."""
     own = {key: {'$ref': f'#/$defs/{key}'} for key in _of_a_linkage()}
     whole = mapping_schema(
-        'A linkage or several, what drives them, what is called for, and a recording.',
+        'One or more linkages, their drives and effects, faults, and a recording.',
         {
             'linkage': _text_schema(_NAMED),
             'linkages': _linkages_schema(own),
@@ -127,17 +133,15 @@ def scene_schema() -> Schema:
             'units': _units_schema(),
             'angles': _angles_schema(),
             'seed': {
-                'description': 'From which everything random comes; if not said, a number that '
-                'follows from the name of the scene.',
+                'description': 'Seed of all random numbers; without it, a number that follows '
+                'from the name of the scene.',
                 'type': 'integer',
                 'minimum': 0,
                 'maximum': 2**53,
             },
             **own,
             'faults': {
-                **named_mapping(
-                    'What can go wrong on demand, by a name for each.', _fault_schema()
-                ),
+                **named_mapping('Faults that can be injected, by name.', _fault_schema()),
                 'propertyNames': _text_schema(
                     'a name: letters, digits and _, a letter first', ROS_NAME
                 ),
@@ -175,9 +179,9 @@ def _units_schema() -> Schema:
 def _angles_schema() -> Schema:
     one = {'enum': [*PUBLISHED_ANGLES, *ANGLES]}
     return {
-        'description': 'Whether published angles run on or lie in (−π, π]; and the unit of the '
-        'angles in this file, of all values whose unit is rad, rad/s or rad/s². One word, or '
-        'one of each: [wrapped, degrees].',
+        'description': 'Whether published angles continue beyond a turn or are wrapped to '
+        '(−π, π]; and the unit of the angles in this file: of all values whose unit is rad, '
+        'rad/s or rad/s². One word, or one of each: [wrapped, degrees].',
         'if': {'type': 'array'},
         'then': {'items': one, 'maxItems': 2, 'uniqueItems': True},
         'else': one,
@@ -187,10 +191,10 @@ def _angles_schema() -> Schema:
 
 def _linkages_schema(own: Mapping[str, Schema]) -> Schema:
     one = mapping_schema(
-        'A linkage; what it does not say for itself is as the scene says.',
+        'A linkage; keys that it leaves out have the values of the scene.',
         {
             'name': _text_schema(
-                'its name, which its joints have before their own: letters, digits and _',
+                'its name, and the prefix of its joints: letters, digits and _',
                 ROS_NAME,
             ),
             'linkage': _text_schema(_NAMED),
@@ -200,7 +204,7 @@ def _linkages_schema(own: Mapping[str, Schema]) -> Schema:
     )
     one |= _ONE_SOLVER | _NO_PLAY_UNDER_TORQUE
     return {
-        'description': 'Several linkages in the place of one.',
+        'description': 'Several linkages instead of one.',
         'if': {'type': 'array'},
         'then': {'minItems': 1, 'items': one},
         'else': one,
@@ -222,7 +226,7 @@ def _of_a_linkage() -> dict[str, Schema]:
         },
         'publish_input': {
             'description': 'Whether the input joints are published too, before the others; '
-            'without it, they are where the drive is no topic, or effort is named.',
+            'without it, yes if the drive is not a topic or the effect effort is named.',
             'type': 'boolean',
         },
         'beyond_limits': {
@@ -232,18 +236,18 @@ def _of_a_linkage() -> dict[str, Schema]:
             'default': 'publish',
         },
         'drive': {
-            **mapping_schema('Where the crank comes from: one drive.', drives),
+            **mapping_schema('Source of the crank: one drive.', drives),
             'maxProperties': 1,
             'default': {'topic': {}},
         },
         'effects': {
-            **mapping_schema('What is called for beyond positions.', effects),
+            **mapping_schema('What to compute beyond positions.', effects),
             'patternProperties': {DOTTED: _OWN_EFFECT},
             'default': {},
         },
         'solver': _solver_schema(),
         'accuracy': _number_schema(
-            'Of the positions: the cheapest solver that proves it is chosen.',
+            'Required accuracy of positions: selects the cheapest solver proved to have it.',
             'rad and m',
             least=FINEST_ACCURACY,
             most=COARSEST_ACCURACY,
@@ -257,7 +261,7 @@ def _of_a_linkage() -> dict[str, Schema]:
                 ),
                 'drive_inertia': {
                     **_number_schema(
-                        'of the motor, at the input',
+                        'inertia of the motor, at the input',
                         'kg·m², or kg of a slide',
                         least=0.0,
                         most=GREATEST_LOAD,
@@ -292,11 +296,11 @@ def _solver_schema() -> Schema:
 
 
 def _spring_schema() -> Schema:
-    end = _text_schema('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
-    free = _number_schema('length without a force', 'm', least=0.0, most=GREATEST_LOAD)
-    damping = _number_schema('damping along it', 'N·s/m', least=0.0, most=STIFFEST)
+    end = _text_schema('its end: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
+    free = _number_schema('unloaded length', 'm', least=0.0, most=GREATEST_LOAD)
+    damping = _number_schema('damping along the spring', 'N·s/m', least=0.0, most=STIFFEST)
     return mapping_schema(
-        'A spring, with a damper beside it.',
+        'A spring with a parallel damper.',
         {
             'from': end,
             'to': end,
@@ -312,15 +316,15 @@ def _fault_schema() -> Schema:
     kinds = {name: parameters_schema(of) for name, of in FAULTS.items()}
     return {
         **mapping_schema(
-            'A fault of one kind, injected by service, or at the times that are said.',
+            'A fault of one kind, injected by service or at given times.',
             {
                 **kinds,
                 'at': {
-                    'description': 'when it is injected by itself, from the first tick on [s]',
+                    'description': 'when it is injected without a call, after the first tick [s]',
                     'type': 'array',
                     'items': _number_schema('a time', 's', least=0.0, most=1e9),
                 },
-                'seconds': _number_schema('how long it lasts then', 's', least=1e-6, most=1e9),
+                'seconds': _number_schema('how long it lasts', 's', least=1e-6, most=1e9),
             },
         ),
         'oneOf': [{'required': [kind]} for kind in kinds],
@@ -336,11 +340,11 @@ def _record_schema() -> Schema:
         above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
         storage[key] = {**storage[key], **above}
     whole = mapping_schema(
-        'How the run is recorded; without it, it is not.',
+        'How the run is recorded; without it, there is no recording.',
         {
             'directory': {
                 **_text_schema(
-                    "folder of the bags' folders, relative to where the node is started"
+                    'folder of the bags, relative to the working directory of the node'
                 ),
                 'default': 'runs',
             },
@@ -420,15 +424,14 @@ def _linkage_keys() -> dict[str, Schema]:
         ),
         'input': _input_schema(),
         'assembly': named_mapping(
-            'Of each pin or slider that closes a dyad, the side on which it lies, unless `pose` '
-            'tells it.',
+            'Side of each pin or slider that closes a dyad; not needed if `pose` gives it.',
             _choice_schema('the side', ('left', 'right', 'ahead', 'behind')),
         ),
         'sliders': named_mapping(
             'Points that stay on lines of other links, by name.', _slider_schema()
         ),
         'joints': {
-            **named_mapping('What is published, in this order, by name.', _joint_schema()),
+            **named_mapping('Published joints, in this order, by name.', _joint_schema()),
             'minProperties': 1,
         },
         'ratios': named_mapping(
@@ -440,7 +443,7 @@ def _linkage_keys() -> dict[str, Schema]:
             'items': _text_schema('a point'),
         },
         'pose': _pose_schema(),
-        'masses': named_mapping('What the links weigh, by their names.', _mass_schema()),
+        'masses': named_mapping('Masses of the links, by link name.', _mass_schema()),
     }
 
 
@@ -452,7 +455,7 @@ def _shorthand_schemas() -> dict[str, Schema]:
     left, ahead = ('left', 'right'), ('ahead', 'behind')
     return {
         'four_bar': mapping_schema(
-            'A four-bar by the lengths of its links; stands for a file written out.',
+            'A four-bar by the lengths of its links; shorthand for a full file.',
             {
                 **lengths,
                 'assembly': _choice_schema('side of A→O4 on which B lies', left, left[0]),
@@ -462,7 +465,7 @@ def _shorthand_schemas() -> dict[str, Schema]:
             required=tuple(lengths),
         ),
         'inverted_slider_crank': mapping_schema(
-            'A crank whose rod slides through a swivel; stands for a file written out.',
+            'A crank whose rod slides through a swivel; shorthand for a full file.',
             {
                 'a': _number_schema('crank', 'm', above=0.0, most=FARTHEST),
                 'swivel': _point_schema(
@@ -486,9 +489,7 @@ def _input_schema() -> Schema:
                 'joint': _text_schema('its name in crank messages'),
                 'parent': _text_schema('the link that carries the motor'),
                 'child': _text_schema('the link that is turned'),
-                'slider': _text_schema(
-                    'the slider that is driven, in the place of parent and child'
-                ),
+                'slider': _text_schema('the driven slider, instead of parent and child'),
                 **_limits_schemas(),
             },
             required=('joint',),
@@ -509,13 +510,16 @@ def _ratio_schema() -> Schema:
         {
             'of': _text_schema('the joint that it follows: an input, or a published joint'),
             'ratio': _number_schema(
-                'how far it moves, in rad or units of length, where the other one moves by 1',
+                'its displacement [rad or unit of length] when the other joint moves by 1',
                 least=-FARTHEST,
                 most=FARTHEST,
             )
             | {'default': 1},
             'offset': _number_schema(
-                'its value where the other one is at 0', 'rad or m', least=-FARTHEST, most=FARTHEST
+                'its value where the other joint is at 0',
+                'rad or m',
+                least=-FARTHEST,
+                most=FARTHEST,
             )
             | {'default': 0},
         },
@@ -530,7 +534,7 @@ def _joint_schema() -> Schema:
             {
                 'parent': _text_schema('the link from which the angle is measured'),
                 'child': _text_schema('the link whose angle it is'),
-                'slider': _text_schema('the slider, in the place of parent and child'),
+                'slider': _text_schema('the slider, instead of parent and child'),
                 **_limits_schemas(),
             },
         ),
@@ -542,7 +546,7 @@ def _limits_schemas() -> dict[str, Schema]:
     """Return the schemas of a joint's limits."""
     return {
         'limits': {
-            'description': 'between which the joint stays: [low, high] [rad or m]; '
+            'description': 'limits of the joint: [low, high] [rad or m]; '
             '-.inf or .inf for no limit on a side',
             'type': 'array',
             'minItems': 2,
@@ -550,9 +554,9 @@ def _limits_schemas() -> dict[str, Schema]:
             # The bounds may be -.inf and .inf: JSON Schema accepts these as numbers.
             'items': {'type': 'number'},
         },
-        'velocity': _number_schema('its greatest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
+        'velocity': _number_schema('its highest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
         'effort': _number_schema(
-            'its greatest torque or force', 'N·m or N', above=0.0, most=STRONGEST
+            'its highest torque or force', 'N·m or N', above=0.0, most=STRONGEST
         ),
     }
 
@@ -560,19 +564,12 @@ def _limits_schemas() -> dict[str, Schema]:
 def _limits_of(*joints: str) -> dict[str, Schema]:
     """Return the schemas of the limits that a shorthand gives to its joints."""
     return {
-        'input': mapping_schema('What the driven joint can do.', _limits_schemas()),
+        'input': mapping_schema('Limits of the driven joint.', _limits_schemas()),
         'joints': mapping_schema(
-            'What the published joints can do, by their names.',
-            {name: mapping_schema('What the joint can do.', _limits_schemas()) for name in joints},
+            'Limits of the published joints, by name.',
+            {name: mapping_schema('Limits of the joint.', _limits_schemas()) for name in joints},
         ),
     }
-
-
-_either_slider: Schema = {
-    'if': {'required': ['slider']},
-    'then': {'properties': {'parent': False, 'child': False}},
-    'else': {'required': ['parent', 'child']},
-}
 
 
 def _slider_schema() -> Schema:
@@ -580,13 +577,13 @@ def _slider_schema() -> Schema:
         **mapping_schema(
             'A point that stays on a line of the link `along`.',
             {
-                'point': _text_schema('the point; no point of `along`'),
+                'point': _text_schema('the point, on another link than `along`'),
                 'along': _text_schema('the link that carries the line'),
                 'through': _text_schema(
                     'point of `along` on the line; the slide is measured from it'
                 ),
                 'direction': _point_schema(
-                    'of the line, in the frame of `along`: [x, y]', '', FARTHEST
+                    'direction of the line, in the frame of `along`: [x, y]', '', FARTHEST
                 ),
                 'block': {
                     **_text_schema('the link that slides without turning', f'^{CHARACTER}*$'),
@@ -594,7 +591,7 @@ def _slider_schema() -> Schema:
                 },
                 'angle': {
                     **_number_schema(
-                        'angle of the block less that of `along`',
+                        'angle of the block relative to `along`',
                         'rad',
                         least=-FARTHEST,
                         most=FARTHEST,
@@ -611,8 +608,8 @@ def _slider_schema() -> Schema:
 
 def _pose_schema() -> Schema:
     return mapping_schema(
-        'The linkage as drawn, where it starts. Points and angles tell the assembly, as few as '
-        'tell it; of links that no dyad covers they start the iteration.',
+        'The pose as drawn, where the linkage starts. Points and angles select the assembly: as '
+        'few as are needed; for links outside dyads they start the iteration.',
         {
             'inputs': {
                 'description': 'a value for each input [rad or m]',
@@ -634,7 +631,7 @@ def _pose_schema() -> Schema:
 
 def _mass_schema() -> Schema:
     return mapping_schema(
-        'What a link weighs.',
+        'Mass properties of a link.',
         {
             'mass': _number_schema(
                 'mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST

@@ -19,6 +19,8 @@ from typing import Any, cast
 from linkage_ros.description.units import unit_of, Units
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 
+SI = Units()
+
 
 class LinedDict(dict[str, Any]):
     """A mapping with the line of each of its keys."""
@@ -28,9 +30,6 @@ class LinedDict(dict[str, Any]):
     def __init__(self) -> None:
         super().__init__()
         self.lines: dict[str, int] = {}
-
-
-SI = Units()
 
 
 class Section:
@@ -74,8 +73,8 @@ class Section:
 
     def locate_error(self, error: DefinitionError) -> FileError:
         """Return an error of this content as one of its file, in the file's units."""
-        told = self.units.convert_quantities
-        return self.error(error.where, told(error.reason), told(error.remedy))
+        convert = self.units.convert_quantities
+        return self.error(error.where, convert(error.reason), convert(error.remedy))
 
     def number(
         self,
@@ -127,16 +126,16 @@ class Section:
         """Return a boolean."""
         value = self._take_value(key, default, 'true or false')
         if not isinstance(value, bool):
-            raise self.error(key, f'{quote(value)} is not a flag', 'write true or false')
+            raise self.error(key, f'{quote(value)} is not true or false', 'write true or false')
         return value
 
-    def text(self, key: str, default: str | None = None, *, expected: str = 'a text') -> str:
-        """Return a string that is not empty, or the default; ``expected`` tells its meaning."""
+    def text(self, key: str, default: str | None = None, *, expected: str = 'a string') -> str:
+        """Return a string that is not empty, or the default; ``expected`` is its meaning."""
         value = self._take_value(key, default, expected)
         if value == default and default is not None:
             return default
         if not isinstance(value, str) or not value.isprintable() or not value:
-            raise self.error(key, f'{quote(value)} is not a text', 'write a name; quote numbers')
+            raise self.error(key, f'{quote(value)} is not a string', 'write a name; quote numbers')
         return value
 
     def ros_name(self, name: str) -> str:
@@ -144,7 +143,7 @@ class Section:
         if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
             raise self.error(
                 name if name in self._content else '',
-                f'{quote(name)} is no ROS name',
+                f'{quote(name)} is not a ROS name',
                 'use letters, digits and _, a letter first',
             )
         return name
@@ -160,7 +159,7 @@ class Section:
 
     def choose_words(self, key: str, groups: Sequence[Sequence[str]]) -> list[str]:
         """
-        Return a word of each group: of those that the file names, else the group's first.
+        Return a word of each group: one that the file names, else the group's first.
 
         The file names one word, or a list of words of different groups.
         """
@@ -234,7 +233,7 @@ class Section:
                 raise self.error(key, f'{quote(item)} is not a mapping', 'write {…}')
             found.append(Section(self.file, path, item, self._line_of(key), self.units))
         if not found:
-            raise self.error(key, 'the list is empty', 'name one at least')
+            raise self.error(key, 'the list is empty', 'name at least one')
         return found
 
     def numbers(self, key: str, *, most: float = inf, unit: str = '') -> list[float]:
@@ -242,7 +241,7 @@ class Section:
         value = self._take_value(key, None, 'a list of numbers')
         if not _is_list_of_finite(value):
             raise self.error(
-                key, f'{quote(value)} is no list of finite numbers', 'write [0.1, 0.2]'
+                key, f'{quote(value)} is not a list of finite numbers', 'write [0.1, 0.2]'
             )
         found = [self._to_si(key, v, unit) for v in value]
         self._check_most(key, value, found, most, unit)
@@ -261,7 +260,7 @@ class Section:
         row = f'[{", ".join(names)}]'
         table: list[tuple[float, ...]] = []
         if not isinstance(value, list) or not value:
-            raise self.error(key, f'{quote(value)} is no list of rows', f'write [{row}, …]')
+            raise self.error(key, f'{quote(value)} is not a list of rows', f'write [{row}, …]')
         for number, found in enumerate(value, 1):
             if not _is_list_of_finite(found) or len(found) != len(units):
                 raise self.error(
@@ -276,7 +275,7 @@ class Section:
         """Return a list of names; empty if the key is absent."""
         value = self._take_value(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
-            raise self.error(key, f'{quote(value)} is no list of names', 'write [one, other]')
+            raise self.error(key, f'{quote(value)} is not a list of names', 'write [one, other]')
         return list(value)
 
     def remove_key(self, key: str) -> None:
@@ -284,15 +283,7 @@ class Section:
         self._taken.add(key)
 
     def finish(self, known: Sequence[str] = ()) -> None:
-        """
-        Refuse the remaining keys.
-
-        Parameters
-        ----------
-        known
-            Further keys that could have been here, for the suggestion.
-
-        """
+        """Refuse the remaining keys; the remedy suggests the read keys and ``known``."""
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))

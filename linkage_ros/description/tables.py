@@ -35,6 +35,9 @@ Write = Callable[[Sequence[Row]], None]
 
 _CELLS = 2**20  # a block of this size takes about 40 MB
 
+_MOST = 1000  # rows that `numbers_of` reads
+_LARGEST_FILE = 10_000_000  # bytes that it reads
+
 
 @contextmanager
 def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
@@ -48,7 +51,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
     target = Path(os.path.realpath(file))
     try:
         if target.exists() and not target.is_file():
-            raise LinkageError(str(file), 'exists, and is no file', 'name another file')
+            raise LinkageError(str(file), 'exists and is not a file', 'name another file')
         kind = TABLE_KINDS[file.suffix.lower()]
         with replace_file(target) as stream, kind(stream, heads, whole) as write:
             yield write
@@ -59,15 +62,7 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
 
 
 def check_kind(file: Path) -> None:
-    """
-    Check that a table can be written to a file with this name.
-
-    Raises
-    ------
-    LinkageError
-        Its suffix is unknown, or the library for it is not installed or does not run here.
-
-    """
+    """Check the suffix of a file for a table, and that the library for it can be imported."""
     check_output_name(file, TABLE_KINDS)
     if file.suffix.lower() == '.parquet':
         _check_pyarrow()
@@ -131,35 +126,22 @@ TABLE_KINDS: dict[
 ] = {'.csv': _open_csv, '.parquet': _open_parquet}
 """Writer for each suffix of a file."""
 
-_MOST = 1000
-_LARGEST_FILE = 10_000_000
-
 
 def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
     """
-    Read rows of numbers from a CSV file with commas or semicolons, with or without a heading.
+    Read rows of numbers from a CSV file with commas or semicolons.
 
-    Parameters
-    ----------
-    file
-        The file; empty lines, lines that begin with ``#``, and a heading are skipped.
-    columns
-        Allowed numbers of columns; all rows have the same number.
-
-    Raises
-    ------
-    FileError
-        The file is wrong; the error has the line.
-
+    Empty lines, lines that begin with ``#``, and a heading are skipped. All rows have the same
+    number of columns, one of ``columns``. A FileError names the wrong line.
     """
     try:
         data = read_regular(file, _LARGEST_FILE)
         text = data[:_LARGEST_FILE].decode('utf-8-sig')
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
-        reason = getattr(error, 'strerror', None) or 'is no text'
+        reason = getattr(error, 'strerror', None) or 'not UTF-8 text'
         raise FileError(file, '', f'cannot be read ({reason})', 'name a CSV file') from None
     if len(data) > _LARGEST_FILE:
-        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'thin it out')
+        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'write fewer rows')
     delimiter = ';' if ';' in text else ','
     rows: list[tuple[float, ...]] = []
     for number, cells in _split_lines(file, text, delimiter):
@@ -174,12 +156,12 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
             raise FileError(
                 file,
                 '',
-                f'line {number}: {quote(delimiter.join(cells))} is no row of {wanted} numbers',
+                f'line {number}: {quote(delimiter.join(cells))} is not a row of {wanted} numbers',
                 'write numbers with commas between them',
             )
         rows.append(row)
         if len(rows) > _MOST:
-            raise FileError(file, '', f'has more than {_MOST} rows', 'thin it out')
+            raise FileError(file, '', f'has more than {_MOST} rows', 'write fewer rows')
     if not rows:
         raise FileError(file, '', 'holds no numbers', 'write rows of numbers with commas')
     return rows

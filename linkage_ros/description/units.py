@@ -62,7 +62,7 @@ class Units:
     # A key of `LENGTHS`, and one of `ANGLES`.
     length: str = 'm'
     angle: str = 'radians'
-    # Whether a value for a joint ('rad or m') is that of a slide; None if it is for joints of both
+    # Whether a value for a joint ('rad or m') is for a slide; None if it is for joints of both
     # kinds.
     slides: bool | None = None
 
@@ -94,7 +94,7 @@ class Units:
         return value if factor == 1 or not isfinite(value) else value / float(factor)
 
     def convert_brackets(self, text: str) -> str:
-        """Return a text whose units in brackets, ``[m]``, are those of the file."""
+        """Return a text with the file's units in brackets: ``[mm]`` for ``[m]``."""
         return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.file_unit(unit[1])}]', text)
 
     def convert_quantities(self, text: str) -> str:

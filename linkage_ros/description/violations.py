@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _TYPES = {
     'object': 'a mapping',
     'array': 'a list',
-    'string': 'a text',
+    'string': 'a string',
     'number': 'a number',
     'integer': 'a whole number',
     'boolean': 'true or false',
@@ -61,17 +61,7 @@ def import_jsonschema() -> ModuleType:
 
 
 def find_violations(content: Section, schema: Schema) -> list[FileError]:
-    """
-    Return the violations in a file, in the order of its lines.
-
-    Parameters
-    ----------
-    content
-        The file.
-    schema
-        Its JSON Schema.
-
-    """
+    """Return the violations of a JSON Schema in a file, in the order of its lines."""
     whole = content.mapping
     validator = import_jsonschema().Draft202012Validator(schema)
     broken: list[ValidationError] = list(validator.iter_errors(whole))
@@ -127,18 +117,18 @@ def _describe_error(error: ValidationError, whole: Schema) -> Iterator[_Problem]
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
         case 'maxProperties':
             others = f'leave all but {wanted} out'
-            yield path, f'{list_names(value)} stand beside each other', others
+            yield path, f'{list_names(value)} cannot be combined', others
         case 'minProperties':
-            yield path, 'is empty', 'name one at least'
+            yield path, 'is empty', 'name at least one'
         case 'oneOf':
             kinds = [kind['required'][0] for kind in wanted]
             named = [kind for kind in kinds if kind in value]
             yield path, *kinds_of_fault(str(path[-1]), named)
         case 'not':
             one, other = wanted['required']
-            yield (*path, other), f'stands beside {one}', 'write one of the two'
+            yield (*path, other), f'cannot be combined with {one}', 'write one of the two'
         case None:
-            yield path, 'does not go with the keys beside it', 'leave it out'
+            yield path, 'cannot be combined with the other keys', 'leave it out'
         case _:
             meaning = schema.get('description', '')
             expected = f'write {_expected_text(error)}{meaning and f" ({meaning})"}'
@@ -176,7 +166,7 @@ def _expected_text(error: ValidationError) -> str:
             return f'{least} of them{"" if least == most else " at least"}'
         case _ if rule in _BOUNDS:
             return f'a number{_bounds_text(schema)}'
-    return 'a text on one line'
+    return 'a string on one line'
 
 
 def _bounds_text(schema: Mapping[str, Any]) -> str:
@@ -218,7 +208,7 @@ def _dotted_path(path: _Path) -> str:
 
 
 def _line_number(content: Any, path: _Path) -> int:
-    """Return the line of a key, or that of the last existing key on its path."""
+    """Return the line of a key, or of the last existing key on its path."""
     line = 0
     for part in path:
         if isinstance(content, LinedDict) and isinstance(part, str):

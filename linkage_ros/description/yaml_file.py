@@ -34,6 +34,24 @@ DEEPEST = 100
 
 _LONGEST_INTEGER = 100
 
+_INDENT = 'give the keys of one mapping the same number of spaces'
+_IN_PLAIN_WORDS = (
+    ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
+    ('expected <block end>', 'is not indented like the lines above it', _INDENT),
+    ('mapping values are not allowed', 'has a misplaced colon', _INDENT),
+    (
+        "could not find expected ':'",
+        'has a key without a colon',
+        'write key: value',
+    ),
+    ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
+    ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
+)
+"""A part of PyYAML's message; reason and remedy."""
+
+LARGEST_FILE = 1_000_000
+"""Most bytes of a file."""
+
 
 class BoundedLoader(yaml.SafeLoader):
     """
@@ -73,7 +91,7 @@ class BoundedLoader(yaml.SafeLoader):
 
 def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
     """
-    Parse a YAML text of so many values at most.
+    Parse a YAML text with a bounded number of values.
 
     The text of a ValueError, one line, says whether it is not YAML, or which limit it exceeds.
     """
@@ -123,24 +141,6 @@ for _tag, _pattern, _first in (
         f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
     )
 
-_INDENT = 'give the keys of one mapping the same number of spaces'
-_IN_PLAIN_WORDS = (
-    ("'\\t'", 'has a tab', 'write spaces instead of tabs'),
-    ('expected <block end>', 'is indented otherwise than the lines above it', _INDENT),
-    ('mapping values are not allowed', 'has a colon where none can be', _INDENT),
-    (
-        "could not find expected ':'",
-        'has a key without a colon',
-        'write key: value',
-    ),
-    ("expected ',' or '}'", 'has a { that does not end, or no comma', 'close it: {x: 1, y: 2}'),
-    ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
-)
-"""A part of what PyYAML says of a line; what is wrong, and the remedy."""
-
-LARGEST_FILE = 1_000_000
-"""Most bytes of a file."""
-
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
     """
@@ -163,7 +163,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
         data = read_regular(file, LARGEST_FILE)
     except IsADirectoryError:
         kind = kind_of_folder(Path(file))
-        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy) from None
+        raise FileError(file, '', f'is {kind.noun}, not a YAML file', kind.remedy) from None
     except OSError as error:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'
@@ -192,7 +192,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
     """
     kind = kind_of_bytes(data)
     if kind.is_foreign:
-        raise FileError(file, '', f'is {kind.noun}, and no file in YAML', kind.remedy)
+        raise FileError(file, '', f'is {kind.noun}, not a YAML file', kind.remedy)
     if len(data) > LARGEST_FILE:
         raise FileError(file, '', f'is larger than {LARGEST_FILE} bytes', 'name a YAML file')
     try:
@@ -219,7 +219,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
         text = str(error).splitlines()[0]
         raise FileError(file, '', f'is not valid YAML ({text})', 'correct the file') from None
     except RecursionError:
-        raise FileError(file, '', 'is nested too deeply', 'write it flatter') from None
+        raise FileError(file, '', 'is nested too deeply', 'use fewer levels') from None
     finally:
         if loader is not None:
             loader.dispose()
@@ -250,7 +250,7 @@ class _StrictLoader(BoundedLoader):
             if key in mapping:
                 first = mapping.lines[key]
                 raise FileError(
-                    self.file, key, f'stands twice (first in line {first})', 'remove one', line
+                    self.file, key, f'is a duplicate (first in line {first})', 'remove one', line
                 )
             mapping[key] = self.construct_object(value_node, deep=True)
             mapping.lines[key] = line

@@ -21,6 +21,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+_MOST_DEPTH = 2**31 - 1  # as DDS counts it
+
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
     """Describe a topic for a bag, as `describe_topic` does, with the QoS of a publisher."""
@@ -42,29 +44,13 @@ def _recorded_qos(profile: QoSProfile) -> QosProfile:
     )
 
 
-_MOST_DEPTH = 2**31 - 1  # as DDS counts it
-
-
 def create_publishers(
     node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
 ) -> dict[str, Publisher]:
     """
-    Create a publisher for each topic of a bag.
+    Return a publisher for each topic of a bag, by its name there.
 
-    Parameters
-    ----------
-    node
-        The node.
-    topics
-        The topics.
-    left_out
-        Called with the reason if a topic cannot be published.
-
-    Returns
-    -------
-    publishers : dict of str to Publisher
-        By topic name in the bag.
-
+    ``left_out`` receives the reason if a topic cannot be published.
     """
     publishers = {}
     for topic in topics:
@@ -102,7 +88,7 @@ def _create_publisher(node: Node, topic: Topic) -> Publisher:
     """Return a publisher for a topic; raise LinkageError if there can be none."""
     kind = _class_of(topic)
     unfit = LinkageError(
-        quote(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+        quote(topic.name)[1:-1] or "''", 'is not a ROS 2 topic name', 'convert the bag'
     )
     if '\0' in topic.name:  # rclpy would publish on the part before it
         raise unfit
@@ -121,7 +107,7 @@ def _class_of(topic: Topic) -> Any:
     if topic.type_hash and installed and topic.type_hash != installed:
         raise LinkageError(
             topic.name,
-            f'{topic.type} was another when it was recorded',
-            'install its ROS package of that time',
+            f'{topic.type} had another definition when it was recorded',
+            'install the version of its ROS package that the recording used',
         )
     return message_class

@@ -42,6 +42,15 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
+_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
+_SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
+
+AnyNode = TypeVar('AnyNode', bound=Node)
+
+_LOOK = 0.1
+_OLDEST = 0.1
+"""Greatest age of a joint state that is still used, in [s]."""
+
 
 class DemoNode(Node):
     """A node with `PARAMETERS`, which are fixed at its start."""
@@ -57,30 +66,10 @@ class DemoNode(Node):
         return self.get_parameter(name).value
 
 
-_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
-_SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
-
-AnyNode = TypeVar('AnyNode', bound=Node)
-
-
 def run_demo_node(
     name: str, make: Callable[[], AnyNode], run: Callable[[AnyNode, Event], None], stop: Event
 ) -> int:
-    """
-    Run a demo node in this process, and return the exit code.
-
-    Parameters
-    ----------
-    name
-        Name of the node in messages.
-    make
-        Creates the node.
-    run
-        Runs the node until the event is set.
-    stop
-        Ends the run.
-
-    """
+    """Run a demo node in this process until the event is set, and return the exit code."""
     leave_out_shared_memory()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -96,18 +85,13 @@ def run_demo_node(
     return 0
 
 
-_LOOK = 0.1
-_OLDEST = 0.1
-"""Greatest age of a joint state that is still used, in [s]."""
-
-
 class PDController(DemoNode):
     """Commands the effort of a joint."""
 
     PARAMETERS = (
         _JOINT,
         NodeParameter('rate', 500.0, 'Commands a second [Hz]', (0.1, 20_000.0)),
-        NodeParameter('target', 2.0, 'Where the joint is to be [rad]', (-1e6, 1e6)),
+        NodeParameter('target', 2.0, 'Target position of the joint [rad]', (-1e6, 1e6)),
         NodeParameter('swing', 0.0, 'Amplitude about the target [rad]', (0.0, 1e6)),
         NodeParameter('period', 5.0, 'Of the swing [s]', (1e-3, 1e6)),
         NodeParameter('kp', 1.0, 'Effort for each unit of error [N·m/rad]', (0.0, 1e9)),

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-What the node reports on itself: ``diagnostic_msgs/DiagnosticArray`` once a period, and warnings.
+Reports of the node: ``diagnostic_msgs/DiagnosticArray`` once a period, and warnings.
 
 Warnings in the log are limited in rate, each kind by itself. The limit is not rclpy's throttle:
 there a suppressed log line costs 150 µs.
@@ -55,6 +55,44 @@ _NEARNESS = {
     'toggle_distance': 'Input to the nearest toggle ({unit})',
 }
 """Attributes of `Closure.singularity_margin` in the diagnostics, with their keys."""
+
+_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
+    Rejection.EMPTY: 'fill name and position',
+    Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
+    Rejection.TWICE: 'name the joint once',
+    Rejection.NOT_FINITE: 'check the sensor',
+    Rejection.TOO_LARGE: 'the units are rad and m',
+    Rejection.NO_EFFORT: 'fill name and effort',
+    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
+    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
+    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
+    Rejection.STAMP_INVALID: 'stamp the messages with the time',
+    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    Rejection.NO_CRANK: 'linkage check --branches shows the range of the joint on its branch',
+    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
+}
+
+_WRENCH_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
+    Rejection.WRENCH_NOT_FINITE: 'check the sensor',
+    Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
+}
+
+_STALE_PERIOD = 30.0
+"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
+
+_PATIENCE = 2.0
+"""Time without a warning about a missing crank, in [s]."""
+
+_UNCLOSED = {
+    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
+    Status.INDETERMINATE: (
+        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
+    ),
+    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
+    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +251,7 @@ class DiagnosticsSummary:
         if not self.crank_topic:
             message = 'Driven by the scene'
         elif counts.ignored and counts.ignored == counts.received:
-            level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
+            level, message = STALE if max_age else WARN, 'No crank yet: messages lack its joint'
         elif self.window_end.stale > self.window_start.stale and age * NANOSECONDS > max_age:
             level, message = STALE, f'Samples arrive, but are {age:.1f} s old by their stamps'
         elif max_age and age * NANOSECONDS > max_age:
@@ -251,7 +289,7 @@ class DiagnosticsSummary:
                 f'Open by {last.gap:.6g} m; reachable: {reachable}'
                 if last is not None
                 and self.window_end.indeterminate == self.window_start.indeterminate
-                else 'The pose cannot be told: two pins coincide, or a link is broken'
+                else 'Pose undefined: two pins coincide, or a link is broken'
             )
         elif self.window_end.limited > self.window_start.limited:
             number, beyond = counts.last_unclosed[Status.LIMITED]
@@ -348,7 +386,7 @@ class DiagnosticsSummary:
         if rejected:
             level, message = WARN, f'{rejected} wrenches rejected'
         elif silent:
-            level, message = STALE, f'No load, for want of messages: {", ".join(silent)}'
+            level, message = STALE, f'No messages, so no load: {", ".join(silent)}'
         return self._make_status('wrenches', level, message, values)
 
     def _recording_status(self) -> DiagnosticStatus:
@@ -366,7 +404,7 @@ class DiagnosticsSummary:
                 values[f'Dropped: {topic.name}'] = topic.dropped
                 values[f'Waiting: {topic.name}'] = topic.waiting
                 if topic.discarded:
-                    values[f'Let go: {topic.name}'] = topic.discarded
+                    values[f'Discarded: {topic.name}'] = topic.discarded
             if any(topic.dropped for topic in topics):
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:
@@ -386,7 +424,7 @@ class DiagnosticsSummary:
         for topic in topics:
             values[f'Received: {topic.name}'] = topic.received
             values[f'In memory: {topic.name}'] = topic.kept
-            values[f'Let go: {topic.name}'] = topic.discarded
+            values[f'Discarded: {topic.name}'] = topic.discarded
             values[f'Dropped: {topic.name}'] = topic.dropped
         values |= {
             'In memory (s)': f'{seconds:.3f}',
@@ -490,47 +528,8 @@ def _linkage_text(line: LinkagePipeline) -> str:
     return f' ({line.scene_linkage.name})' if line.scene_linkage.name else ''
 
 
-_REMEDIES = {
-    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
-    Rejection.EMPTY: 'fill name and position',
-    Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
-    Rejection.TWICE: 'name the joint once',
-    Rejection.NOT_FINITE: 'look at the sensor',
-    Rejection.TOO_LARGE: 'the units are rad and m',
-    Rejection.NO_EFFORT: 'fill name and effort',
-    Rejection.EFFORT_NOT_FINITE: 'activate the controller: ros2_control sends NaN before',
-    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
-    Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {topic: {stamp: arrival}}',
-    Rejection.STAMP_INVALID: 'stamp the messages with the time',
-    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
-    Rejection.NO_CRANK: 'linkage check --branches says how far the joint goes on its branch',
-    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
-}
-
-_WRENCH_REMEDIES = {
-    Rejection.MALFORMED: 'the publisher must send geometry_msgs/WrenchStamped as plain CDR',
-    Rejection.WRENCH_NOT_FINITE: 'look at the sensor',
-    Rejection.WRENCH_TOO_LARGE: 'the units are N and N·m',
-}
-
-
-_STALE_PERIOD = 30.0
-"""Least time between two warnings about stamps that are too old, in [s]: a clock stays wrong."""
-
-_PATIENCE = 2.0
-"""Time without a warning about a missing crank, in [s]."""
-
-
 class Warnings:
-    """
-    Warnings, with the time of the last one of each kind.
-
-    Parameters
-    ----------
-    logger
-        Logger of the warnings.
-
-    """
+    """Warnings, with the time of the last one of each kind."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
@@ -545,19 +544,9 @@ class Warnings:
 
     def check_age(self, counts: Counts, crank_topic: str, max_age: int, period: float) -> None:
         """
-        Warn of samples that are too old when they arrive, as where two clocks differ.
+        Warn of samples older than ``max_age`` [ns] when they arrive, as where two clocks differ.
 
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        crank_topic
-            Topic of the crank samples.
-        max_age
-            Age above which a sample gives no crank, in [ns].
-        period
-            Least time between two warnings of this kind, in [s], if it is above 30 s.
-
+        ``period``: least time between two such warnings, in [s], if it is above 30 s.
         """
         if (new := counts.stale - self._stale) <= 0:
             return
@@ -583,26 +572,10 @@ class Warnings:
         """
         Warn if no message arrives, or none with the crank's joints, and nothing is published.
 
-        Messages are taken by ticks. A tick that goes on says nothing on them, and is warned of.
-
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        crank_topic
-            Topic of the crank samples.
-        inputs
-            Names of the joints that a sample must have.
-        period
-            Least time between two warnings of this kind, in [s].
-        interval
-            Time from tick to tick, in [s]; 0 for one tick per message, infinity if a simulation
-            decides.
-        max_age
-            Age of the newest sample above which there is no crank, in [ns]; 0 for never.
-        publishers
-            Returns the names of the other publishers on the topic.
-
+        Messages are taken by ticks: a tick that does not end is warned of instead. ``interval``:
+        time from tick to tick, in [s]; 0 for one tick per message, infinity if a simulation
+        decides. ``max_age``: age of the newest sample above which there is no crank, in [ns]; 0
+        for never. ``publishers`` returns the names of the other publishers on the topic.
         """
         names = list_names(inputs)
         if counts.ignored and counts.ignored == counts.received:
@@ -647,21 +620,7 @@ class Warnings:
     def check_events(
         self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
     ) -> None:
-        """
-        Warn of events since the last warning of their kind.
-
-        Parameters
-        ----------
-        counts
-            Counts of the tick.
-        closures
-            The linkages.
-        crank_topic
-            Topic of the crank samples.
-        period
-            Least time between two warnings of a kind, in [s].
-
-        """
+        """Warn of events since the last warning of their kind, at most one in a period, in [s]."""
         new = {
             r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]
         }
@@ -681,7 +640,7 @@ class Warnings:
                     ticks=ticks,
                     gap=position.gap,
                     reachable=describe_ranges(closure.input_ranges),
-                    published='published all the same' if position.joints else 'nothing published',
+                    published='published anyway' if position.joints else 'nothing published',
                     beyond=closure.limit_exceeded(position),
                 )
                 if self.warn(status.value, line, period):
@@ -693,8 +652,8 @@ class Warnings:
             kind, count = f'chatter {line.scene_linkage.name}', line.drive.chatter_count
             before = min(self._chattered.get(kind, 0), count)  # a reset counts anew
             if count > before:
-                told = f'{describe_chatter(count - before)}{_linkage_text(line)}'
-                before = count if self.warn(kind, told, period) else before
+                text = f'{describe_chatter(count - before)}{_linkage_text(line)}'
+                before = count if self.warn(kind, text, period) else before
             self._chattered[kind] = before
 
     def check_jumps(self, linkages: Sequence[LinkagePipeline], crank_topic: str) -> None:
@@ -710,17 +669,7 @@ class Warnings:
                 )
 
     def check_wrenches(self, topics: Sequence[tuple[str, WrenchCounts]], period: float) -> None:
-        """
-        Warn of rejected wrenches since the last such warning.
-
-        Parameters
-        ----------
-        topics
-            The name of each topic with a wrench, and its counts.
-        period
-            Least time between two warnings about a topic, in [s].
-
-        """
+        """Warn of rejected wrenches since the last warning; the period of a topic is in [s]."""
         for name, counts in topics:
             rejected, before = dict(counts.rejected), self._wrenches_rejected.get(name, {})
             new = {why: n - before.get(why, 0) for why, n in rejected.items()}
@@ -742,7 +691,7 @@ class Warnings:
             else f'the operating system woke the node {seconds:.3f} s late'
         )
         where = 'at once' if stalls == 1 else f'in {stalls} stalls, the last'
-        remedy = 'lower the rate' if often else 'the rate holds otherwise'
+        remedy = 'lower the rate' if often else 'the rate is kept otherwise'
         return f'{lost} ticks lost {where}: {what}; {remedy}'
 
     def warn(self, kind: str, line: str, period: float) -> bool:
@@ -753,13 +702,3 @@ class Warnings:
         self._last[kind] = now
         self._logger.warning(line)
         return True
-
-
-_UNCLOSED = {
-    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
-    Status.INDETERMINATE: (
-        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
-    ),
-    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
-    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
-}

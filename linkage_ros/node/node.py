@@ -9,7 +9,7 @@
 """
 The node: crank samples in, joint states of the dependent joints out.
 
-A lifecycle node. The tick runs on a thread of its own (`tick_loop`). This module runs on the
+A lifecycle node. The tick runs on a separate thread (`tick_loop`). This module runs on the
 executor: transitions, services, parameters, diagnostics, and all logging.
 """
 
@@ -59,19 +59,22 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
+_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_DIAGNOSTICS_QOS = QoSProfile(depth=1)
+_WATCH_PERIOD = 0.25
+_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
+_TWIN_PATIENCE = 0.5
+"""How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
+
+Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
+
 
 class DeferredResponse:
     """
     Defers the answer of a service, so that its callback returns before the answer is known.
 
-    A coroutine as callback would do so too, but then rclpy's executor polls it continuously, and
-    each round of the executor costs as much as five ticks.
-
-    Parameters
-    ----------
-    service
-        The service, an rclpy ``Service``; at most one answer can be pending.
-
+    At most one answer can be pending. A coroutine as callback would do so too, but then rclpy's
+    executor polls it continuously, and each round of the executor costs as much as five ticks.
     """
 
     def __init__(self, service: Any) -> None:
@@ -96,16 +99,6 @@ class DeferredResponse:
             self._request_header = to
         else:
             self._send(response, to)
-
-
-_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-_DIAGNOSTICS_QOS = QoSProfile(depth=1)
-_WATCH_PERIOD = 0.25
-_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
-_TWIN_PATIENCE = 0.5
-"""How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
-
-Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
 
 def _log_errors(transition: Transition) -> Transition:
@@ -357,7 +350,7 @@ class LinkageNode(LifecycleNode):
         if self.loop is None or not self.loop.is_running:
             return _fill_response(response, False, 'not active: nothing to reset')
         self.loop.reset_requested = True
-        return _fill_response(response, True, 'crank and turns are forgotten before the next tick')
+        return _fill_response(response, True, 'crank and turns are reset before the next tick')
 
     def _on_inject(
         self, name: str, request: SetBool.Request, response: SetBool.Response

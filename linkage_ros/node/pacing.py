@@ -76,19 +76,7 @@ def on_steady_clock(rate: float) -> Pace:
 
 
 def on_samples(context: Context, subscription: Subscription, now: Callable[[], int]) -> Pace:
-    """
-    Tick once for every crank sample, with the stamp of the sample.
-
-    Parameters
-    ----------
-    context
-        The node's context.
-    subscription
-        Subscription to the crank's topic.
-    now
-        Returns the time against which stamps are checked, in [ns].
-
-    """
+    """Tick once for every crank sample, with its stamp; ``now`` checks stamps, in [ns]."""
 
     def pace(loop: TickLoop, stopping: Event) -> None:
         wait = _make_waiter(context, subscription)
@@ -100,19 +88,7 @@ def on_samples(context: Context, subscription: Subscription, now: Callable[[], i
 
 
 def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
-    """
-    Tick at a rate, in [Hz], of simulated time, at most once per ``/clock`` message.
-
-    Parameters
-    ----------
-    context
-        The node's context.
-    clock
-        Subscription to ``/clock``.
-    rate
-        Ticks per second of simulated time.
-
-    """
+    """Tick at a rate, in [Hz], of simulated time, at most once per ``/clock`` message."""
     period = round(NANOSECONDS / rate)
 
     def pace(loop: TickLoop, stopping: Event) -> None:
@@ -166,15 +142,7 @@ def nanoseconds_of(message: ClockMessage) -> int | None:
 
 
 class ClockGuard:
-    """
-    Keeps invalid times from rclpy, which raises on them and so would end the executor.
-
-    Parameters
-    ----------
-    source
-        The source that sets the node's clock.
-
-    """
+    """Keeps invalid times from rclpy, which raises on them and so would end the executor."""
 
     def __init__(self, source: TimeSource) -> None:
         self._pass_on: Callable[[ClockMessage], None] = source.clock_callback

@@ -65,9 +65,7 @@ LINKAGE_NODE = (
     NodeParameter(
         'cpu_affinity', [-1], 'Numbers of the processors that may run the tick; -1: all'
     ),
-    NodeParameter(
-        'lock_memory', False, 'Whether the memory of the process stays in that of the machine'
-    ),
+    NodeParameter('lock_memory', False, 'Whether the memory of the process is locked in RAM'),
     NodeParameter(
         'diagnostics_period', 1.0, 'Time between two diagnostics [s]', _PERIOD, changeable=True
     ),
@@ -119,24 +117,9 @@ def nearness_limits(node: Node) -> dict[str, float]:
 
 def show_help(program: str, purpose: str, declared: Sequence[NodeParameter], example: str) -> bool:
     """
-    Print the help of a node's program, if its command line asks for it.
+    Print the help of a node's program if its command line asks for it; return whether it does.
 
-    Parameters
-    ----------
-    program
-        Name of the program.
-    purpose
-        What the node does.
-    declared
-        Its parameters.
-    example
-        Arguments for ROS, as ``-p speed:=3.0``.
-
-    Returns
-    -------
-    asked : bool
-        Whether the command line has ``--help``; arguments for ROS do not count.
-
+    A ``--help`` among the arguments for ROS does not count.
     """
     typed = sys.argv[1:]
     if '--ros-args' in typed:

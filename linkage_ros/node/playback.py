@@ -33,6 +33,15 @@ _BATCHES = 8
 
 _LOOK = 0.1
 
+LATE = 10_000_000
+"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
+
+_FINE = 20_000_000
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
+
+_LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
+_REPORT_EVERY = 250_000_000
+
 
 class PlaybackPart(NamedTuple):
     """The part of a bag that is played."""
@@ -58,13 +67,8 @@ def playback_queue(order: LogTimeOrder, part: PlaybackPart) -> Iterator[QueuedMe
     """
     Yield the messages to play.
 
-    Raises
-    ------
-    BagError
-        The bag is damaged; the messages before the damage have been yielded by then.
-    LinkageError
-        The part to loop has no duration.
-
+    BagError if the bag is damaged, after the messages before the damage; LinkageError if the part
+    to loop has no duration.
     """
     base = 0
     while True:
@@ -79,7 +83,7 @@ def playback_queue(order: LogTimeOrder, part: PlaybackPart) -> Iterator[QueuedMe
             return
         if newest == part.first:
             raise LinkageError(
-                '--loop', 'all that is played is of one instant', 'play it without --loop'
+                '--loop', 'all messages have the same time', 'play it without --loop'
             )
         base += newest - part.first
 
@@ -141,16 +145,6 @@ def read_ahead(
         ended.set()
 
 
-LATE = 10_000_000
-"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
-
-_FINE = 20_000_000
-"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
-
-_LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
-_REPORT_EVERY = 250_000_000
-
-
 class Steady(Protocol):
     """A monotonic clock that can wait."""
 
@@ -189,34 +183,8 @@ class Playback:
     """
     Sends messages when they are due, and counts them.
 
-    Parameters
-    ----------
-    first
-        Log time of the start, in [ns].
-    rate
-        Seconds of bag time per second.
-    publish
-        Function that publishes a message, for each topic.
-    steady
-        The clock for due times.
-    ticks
-        Publish the bag's time; None if ``/clock`` is not wanted.
-    progress
-        Progress callback; receives the log time, in [ns], now and then.
-
-    Attributes
-    ----------
-    counts
-        Messages sent, for each topic.
-    late
-        Messages sent later than due by more than `LATE`.
-    latest
-        Greatest delay of a message, in [ns].
-    played
-        Bag time played, in [ns].
-    took
-        Duration of the playback, in [ns].
-
+    ``first``: log time of the start, in [ns]; ``rate``: seconds of bag time per second; ``ticks``
+    publish the bag's time; ``progress`` receives the log time, in [ns], now and then.
     """
 
     def __init__(
@@ -234,18 +202,21 @@ class Playback:
         self._steady = steady
         self._ticks = ticks
         self._progress = progress
-        self.counts = dict.fromkeys(publish, 0)
-        self.late = self.latest = self.played = self.took = 0
+        self.counts = dict.fromkeys(publish, 0)  # Messages sent, for each topic
+        self.late = 0  # Messages sent later than due by more than `LATE`
+        self.latest = 0  # Greatest delay of a message, in [ns]
+        self.played = 0  # Bag time played, in [ns]
+        self.took = 0  # Duration of the playback, in [ns]
 
     def send_messages(self, cues: Iterable[QueuedMessage]) -> None:
         """Send the messages, until there are no more or the clock reports a stop."""
         steady, counts = self._steady, self.counts
         begun: int | None = None
         last_base = number = 0
-        tick = tell = inf
+        tick = next_report = inf
         for base, log_time, topic, data in cues:
             if begun is None:
-                begun = tell = steady.now()
+                begun = next_report = steady.now()
                 tick = begun if self._ticks else inf
             offset = base + log_time - self._first
             due = begun + round(offset / self._rate)
@@ -267,9 +238,9 @@ class Playback:
             self.latest = max(self.latest, now - due)
             self.played, self.took = offset, now - begun
             last_base = base
-            if now >= tell:
+            if now >= next_report:
                 self._progress(log_time)
-                tell = now + _REPORT_EVERY
+                next_report = now + _REPORT_EVERY
         if self._ticks and begun is not None:
             # So that nodes on simulated time also reach the end of the bag.
             self._ticks.publish(self._first + self.played - last_base)

@@ -50,42 +50,19 @@ _DELIVERY = 1.0
 
 @dataclass(frozen=True, slots=True)
 class PlaybackOptions:
-    """
-    Options of a playback.
+    """Options of a playback."""
 
-    Parameters
-    ----------
-    rate
-        Seconds of bag time per second.
-    clock
-        Rate of ``/clock``, in [Hz]; 0 for never.
-    wait
-        Longest wait for a subscriber to one of the topics, in [s].
-
-    """
-
-    rate: float = 1.0
-    clock: float = 0.0
-    wait: float = 0.0
+    rate: float = 1.0  # Seconds of bag time per second
+    clock: float = 0.0  # Rate of ``/clock``, in [Hz]; 0 for never
+    wait: float = 0.0  # Longest wait for a subscriber to one of the topics, in [s]
 
 
 @contextmanager
 def player_node(arguments: Sequence[str], name: str = 'linkage_player') -> Iterator[Node]:
     """
-    Create a node for a command, within a context.
+    Create a node for a command, within a context; ``arguments`` follow the program's name.
 
-    Parameters
-    ----------
-    arguments
-        Command-line arguments with ``--ros-args``, without the program's name.
-    name
-        Name of the node.
-
-    Raises
-    ------
-    LinkageError
-        ROS is not installed, or does not accept the arguments.
-
+    LinkageError if ROS is not installed, or does not accept the arguments.
     """
     # As for the tick: else a message would wait for the thread that reads ahead.
     sys.setswitchinterval(_SWITCH_INTERVAL)
@@ -117,35 +94,9 @@ def play(
     """
     Publish messages until there are no more or the event is set.
 
-    Parameters
-    ----------
-    node
-        The node.
-    publishers
-        Publisher of each played topic.
-    order
-        Messages of the bag, in order of log time.
-    part
-        Part of the bag to play.
-    options
-        Options.
-    stop
-        Stops the playback.
-    progress
-        Progress callback; receives the log time, in [ns], now and then.
-
-    Returns
-    -------
-    playback : Playback
-        Counts of the playback.
-    error : LinkageError or None
-        Reason for an early end, for example a damaged bag; None without one.
-
-    Raises
-    ------
-    LinkageError
-        ``/clock`` cannot represent the times of the bag.
-
+    Return the playback, and the reason for an early end, such as a damaged bag, or None.
+    ``progress`` receives the log time, in [ns], now and then. LinkageError if ``/clock`` cannot
+    represent the times of the bag.
     """
     ticks = None
     if options.clock:
@@ -183,7 +134,7 @@ def _clock_message(time: int) -> bytes:
 
 
 def _wait_for_listener(publishers: Collection[Publisher], stop: Event, seconds: float) -> None:
-    """Wait until one of the publishers has a subscriber, for at most so many seconds."""
+    """Wait until one of the publishers has a subscriber, for a time, in [s], at most."""
     deadline = monotonic() + seconds
     while monotonic() < deadline and not stop.is_set():
         if any(publisher.get_subscription_count() for publisher in publishers):

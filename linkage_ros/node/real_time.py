@@ -45,6 +45,28 @@ _IPC_LOCK = 14
 
 _ALLOW = 'allow it in /etc/security/limits.d (USER - {limit}) and log in anew'
 
+_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_CONFIGURED = (
+    _TRANSPORTS,
+    _PROFILE,
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_PUBLICATION_MODE',
+)
+"""Environment variables with which the user configures the transports."""
+
+_PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
+"""Files in the working folder with the same purpose."""
+
+_SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
+
+STANDSTILL = (
+    'when another program subscribes, ticks may pause once for 0.33 s; the page "Keep ticks on '
+    'time" of the documentation says how to avoid it'
+)
+"""The same for a reader who does not know DDS."""
+
 
 @dataclass(slots=True)
 class RealTime:
@@ -116,23 +138,6 @@ def _process_status(key: str) -> str:
     return next(line.split(':')[1].strip() for line in lines if line.startswith(f'{key}:'))
 
 
-_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
-_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
-_CONFIGURED = (
-    _TRANSPORTS,
-    _PROFILE,
-    'FASTDDS_DEFAULT_PROFILES_FILE',
-    'RMW_FASTRTPS_PUBLICATION_MODE',
-)
-"""Environment variables with which the user configures the transports."""
-
-_PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
-"""Files in the working folder with the same purpose."""
-
-_SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
-
-
 def leave_out_shared_memory() -> None:
     """
     Make Fast DDS use UDP only, unless the user has configured the transports.
@@ -145,7 +150,7 @@ def leave_out_shared_memory() -> None:
 
 def stay_on_this_machine() -> None:
     """
-    Keep discovery within the machine, without shared memory where the user has said nothing of it.
+    Keep discovery within the machine, without shared memory unless the user configures it.
 
     Call it before `rclpy.init`; it holds for this process and its children. Clients with the
     discovery range LOCALHOST are found all the same.
@@ -160,13 +165,6 @@ def stay_on_this_machine() -> None:
 def _is_configured() -> bool:
     """Return whether the user has configured the transports."""
     return any(map(os.environ.get, _CONFIGURED)) or any(Path(name).is_file() for name in _PROFILES)
-
-
-STANDSTILL = (
-    'when another program subscribes, ticks may pause once for 0.33 s; the page "Keep ticks on '
-    'time" of the documentation says how to avoid it'
-)
-"""The same for a reader who does not know DDS."""
 
 
 def standstill_reason() -> str:

@@ -16,8 +16,8 @@ in                     type                                  out
 ``joint_trajectory``   ``trajectory_msgs/JointTrajectory``   ``crank_trajectory``
 =====================  ====================================  ======================
 
-Positions, velocities and accelerations are turned around, where they are given; efforts are left
-out. What has no crank is not sent: of a trajectory nothing, since one with a hole is another.
+Given positions, velocities and accelerations are converted; efforts are left out. A command
+without a crank position is not sent; nor is a trajectory with such a point.
 """
 
 from __future__ import annotations
@@ -57,11 +57,8 @@ class CommandRelay:
     """
     Turns commands for dependent joints of a scene into commands for their cranks.
 
-    Raises
-    ------
-    DefinitionError
-        If no linkage of the scene names such a joint, or the joint does not tell the crank.
-
+    DefinitionError if no linkage of the scene names such a joint, or if the joint does not
+    determine the crank.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -151,7 +148,7 @@ class CommandRelay:
     def _crank_motion(
         self, joint: str, value: float, rate: float, change: float
     ) -> tuple[float, float, float]:
-        """Return crank, rate and acceleration, NaN where that of the joint is NaN."""
+        """Return crank, rate and acceleration, NaN where the joint's is NaN."""
         inverse, _ = self._inverses[joint]
         position = inverse.position(value)
         place = f'{joint} at {value:.6g} {inverse.gap_unit}'

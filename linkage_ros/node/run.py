@@ -65,39 +65,13 @@ def run_linkage_node(
     raise_errors: bool = False,
 ) -> int:
     """
-    Run the linkage node until the event is set, or for a time.
+    Run the linkage node until the event is set, or for ``seconds`` from its first tick.
 
-    Parameters
-    ----------
-    stop
-        Ends the run; `linkage_ros.signals` sets it on signals.
-    arguments
-        Command line with ``--ros-args``, without the program's name.
-    overrides
-        Parameters of the node, in addition to those of the command line.
-    seconds
-        Duration of the run from its first tick, in [s].
-    patience
-        How long the duration waits at most for the first message for the crank, in [s].
-    view
-        Displays the run.
-    at_end
-        Called after the run has ended and its bag is closed.
-    raise_errors
-        Whether a wrong configuration is raised, for a terminal, and not logged.
-
-    Returns
-    -------
-    code : int
-        0; 1 if the recording failed or the tick ended early; 2 if the configuration is wrong.
-
-    Raises
-    ------
-    StoppedError
-        A signal arrived before the node was configured.
-    LinkageError
-        The configuration is wrong, if ``raise_errors``.
-
+    ``arguments`` follow the program's name; ``overrides`` are further parameters of the node. The
+    first message for the crank may take ``patience`` seconds. ``at_end`` is called when the bag is
+    closed. Return 0; 1 if the recording failed or the tick ended early; 2 if the configuration is
+    wrong, which is a LinkageError with ``raise_errors``. A StoppedError says that a signal arrived
+    before the node was configured.
     """
     # The tick shares the interpreter with executor and recorder: at the default switch interval it
     # would wait 5 ms for them.

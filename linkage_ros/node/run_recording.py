@@ -46,17 +46,12 @@ _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 DESCRIPTION = 'description_topic'
 """Key of the robot model's topic."""
 
+Answer = Callable[[bool, str], None]
+"""Takes whether the call succeeded, and the outcome as one line."""
+
 
 class RunRecording:
-    """
-    Starts and stops the bags of a node, or its memory of the last seconds, and reports on them.
-
-    Parameters
-    ----------
-    logger
-        Logger for its messages.
-
-    """
+    """Starts and stops the bags of a node, or its memory of the last seconds; reports on them."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
@@ -81,20 +76,10 @@ class RunRecording:
         """
         Start a bag that describes its own run, or a memory; return the outcome, as one line.
 
-        Parameters
-        ----------
-        scene
-            The scene that runs; the bag gets its files.
-        loop
-            The tick loop, which from now on passes on the messages that it takes and publishes.
-        directory
-            Parent of the bag's folder; '' for the folder that the scene names.
-        topics
-            Returns the topics to record, in the order of their handles, each with its key in the
-            run's account in the bag; topics with the same key form a list.
-        description
-            Robot model message (topic `DESCRIPTION`) that begins each file; empty for none.
-
+        The loop passes on the messages that it takes and publishes. ``directory``: parent of the
+        bag's folder; '' for the scene's own. ``topics`` returns the topics in the order of their
+        handles, each with its key in the run's account; topics with the same key form a list.
+        ``description``: message on topic `DESCRIPTION` that begins each file; empty for none.
         """
         record = scene.record or _DEFAULT
         storage = record.storage
@@ -257,10 +242,6 @@ def _new_folder(directory: Path, name: str, scene: str) -> Path:
     return folder
 
 
-Answer = Callable[[bool, str], None]
-"""Takes whether the call succeeded, and the outcome as one line."""
-
-
 @dataclass(frozen=True, slots=True)
 class SnapshotOutcome:
     """The outcome of a snapshot."""
@@ -280,26 +261,20 @@ class MemorySummary:
     failure: str  # Reason why the memory has ended early, or lacks messages; '' if it is complete
 
     def __str__(self) -> str:
-        counts = ', '.join(
-            f'{t.name} {t.received} received {t.kept} in memory at the end {t.discarded} let go'
-            + (f' {t.dropped} dropped' if t.dropped else '')
+        counts = '; '.join(
+            f'{t.name} {t.received} received, {t.kept} in memory, {t.discarded} discarded'
+            + (f', {t.dropped} dropped' if t.dropped else '')
             for t in self.topics
         )
         failure = f'{self.failure}; ' if self.failure else ''
-        return f'{failure}nothing is kept any more, {self.snapshots}: {counts}'
+        return f'{failure}the memory has ended, {self.snapshots}: {counts}'
 
 
 class RunSnapshots:
     """
     A memory and its snapshots.
 
-    Parameters
-    ----------
-    memory
-        The memory that the tick offers to.
-    new_bag
-        Makes a bag, given whether the memory reaches back to the start of the run.
-
+    ``new_bag`` makes a bag, given whether the memory reaches back to the start of the run.
     """
 
     def __init__(self, memory: SnapshotMemory, new_bag: Callable[[bool], BagWriter]) -> None:
@@ -328,35 +303,27 @@ class RunSnapshots:
     def count_text(self) -> str:
         """Return the number of snapshots as text."""
         if not self.written and not self.failed:
-            return 'no snapshot was asked for: nothing was written'
+            return 'no snapshot was requested: nothing was written'
         written = f'{self.written} snapshot{"s" * (self.written != 1)} written'
         return written + (f', {self.failed} failed' if self.failed else '')
 
     def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """
-        Begin to write the memory to a new bag, on another thread.
+        Begin to write the memory to a new bag, on another thread; return why not, or ''.
 
-        Parameters
-        ----------
-        answer
-            Called by `collect_snapshot` with the outcome.
-        wake
-            Called on the writing thread when the outcome is ready.
-
-        Returns
-        -------
-        str
-            Reason why it is not begun, as one line; '' if it is begun.
-
+        `collect_snapshot` calls ``answer`` with the outcome; the writing thread calls ``wake``
+        when it is ready.
         """
         if self._writing is not None:
-            return 'a snapshot is being written; ask again when it is: the memory goes on'
+            return (
+                'a snapshot is being written; call again when it has ended; the memory continues'
+            )
         try:
             kept = self.memory.take_content()
         except RecordingError as error:
             return str(error)
         if not kept.blocks:
-            return 'nothing is in memory yet; ask again when there are messages'
+            return 'nothing is in memory yet; call again when there are messages'
         self._answer = answer
         self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.is_complete), wake)
         return ''
@@ -394,7 +361,7 @@ def counts_text(summary: RecordingSummary) -> str:
     """Return the counts of a recording's messages as text."""
     return ', '.join(
         f'{t.name} {t.recorded} recorded {t.dropped} dropped'
-        + (f' {t.discarded} let go' if t.discarded else '')
+        + (f' {t.discarded} discarded' if t.discarded else '')
         for t in summary.topics
     )
 
@@ -413,10 +380,10 @@ def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCoun
 
 def _make_outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
     if isinstance(result, RecordingError):
-        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory goes on')
+        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory continues')
     counts = counts_text(result)
     if result.failure:
-        line = f'snapshot incomplete: {result.failure}: {counts}; the memory goes on'
+        line = f'snapshot incomplete: {result.failure}: {counts}; the memory continues'
         return SnapshotOutcome(result, result.failure, line)
     line = f'the last {seconds:.3f} s recorded to {result.folder}: {counts}'
     return SnapshotOutcome(result, '', line)

@@ -60,13 +60,7 @@ class SceneTopics:
     """
     The topics and services of a scene, from its configuration to its clean-up.
 
-    Parameters
-    ----------
-    node
-        Node that owns them.
-    on_inject
-        Serves the service of a fault, given the fault's name.
-
+    ``on_inject`` serves a fault's service; its first argument is the fault's name.
     """
 
     def __init__(self, node: Node, on_inject: Inject) -> None:
@@ -91,11 +85,8 @@ class SceneTopics:
         """
         Create what the scene asks for, and nothing else.
 
-        Raises
-        ------
-        LinkageError
-            The package of a message is not installed, or the topic of a wrench is another's too.
-
+        LinkageError if the package of a message is not installed, or the topic of a wrench is
+        taken.
         """
         self.disconnect()
         node, overridable = self._node, QoSOverridingOptions.with_default_policies()
@@ -160,11 +151,7 @@ class SceneTopics:
         """
         Publish the linkages as a robot model, once, with transient-local durability.
 
-        Raises
-        ------
-        LinkageError
-            The published joints do not determine the pose of every link.
-
+        LinkageError if the published joints do not determine the pose of every link.
         """
         text_type = message_type('std_msgs/msg/String', 'robot_description')
         model = find_tool('robot_description').scene_urdf(scene, pipeline.closures).decode()
@@ -178,15 +165,8 @@ class SceneTopics:
         """
         Publish the files of the scene, once, with transient-local durability.
 
-        A page on another machine so knows the linkage, the names of its topics, and its faults.
-
-        Parameters
-        ----------
-        scene, pipeline
-            The scene and what is built of it.
-        joint_states
-            Resolved name of the topic with the joint states.
-
+        A page on another machine so knows the linkage, the topics and the faults; ``joint_states``
+        is the resolved name of their topic.
         """
         topics = {'joint_states_topic': joint_states}
         if self.crank is not None:

@@ -436,7 +436,7 @@ def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
     assert account['verdict'] == 'identical'
     assert 'is damaged' in account['damage']
     assert 0 < account['topics'][0]['same'] < 12_000
-    assert 'what lies before was replayed' in err
+    assert 'the part before it was replayed' in err
 
 
 def test_a_wish_to_stop_is_heard(tmp_path, capsys):

@@ -115,7 +115,7 @@ def test_what_had_to_be_dropped_is_told_where_something_differs(tmp_path, capsys
     part = rewritten(bag, 'part', without_one, custom=custom, **said)
     code, account = told(capsys, part)
     assert (code, account['verdict']) == (3, 'different')
-    line = '1 messages had to be dropped when it was recorded: what depends on one that is not '
+    line = '1 messages were dropped during the recording: what depends on one that is not '
     assert account['gaps'] == [f'{line}there may differ']
     assert answer(replay, part) == 3
     assert line in capsys.readouterr().out
@@ -157,8 +157,8 @@ def test_info_tells_what_was_let_go(tmp_path, capsys) -> None:
     gone = len(list(read_bag(bag).messages())) - account['messages']
     assert sum(topic['let_go'] for topic in account['topics']) == gone > 100
     assert any(line.split()[:2] == ['beginning', 'its'] for line in text.splitlines())
-    assert f'{gone}, with files that made way for newer ones' in text
-    assert '  let go  ' in text
+    assert f'{gone}, in files that newer ones replaced' in text
+    assert '  discarded  ' in text
 
 
 def test_info_tells_what_was_received(tmp_path, capsys) -> None:
@@ -178,7 +178,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
     assert [line.split() for line in text.splitlines() if line.startswith('received')] == [
         ['received', '605']
     ]
-    assert 'let go' not in text
+    assert 'discarded' not in text
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_stages_come_in_their_order_and_say_who_brings_them_in(tmp_path, capsys)
         'constant_rate', 'backlash', 'velocity', 'acceleration', 'effort', 'pin_forces', 'delay',
     ]  # fmt: skip
     by_name = {line[1]: ' '.join(line) for line in lines if line and line[0].isdigit()}
-    assert by_name['velocity'].endswith('brought in by effort, pin_forces, delay')
+    assert by_name['velocity'].endswith('needed by effort, pin_forces, delay')
     assert 'between motor and crank' in by_name['backlash']
     assert by_name['delay'].endswith('seconds 0.002 s')
     assert by_name['constant_rate'].endswith('rate 6.28 rad/s or m/s')
@@ -198,7 +198,7 @@ WRONG = [
     (
         'drive: {topic: {}, sine: {amplitude: 1, frequency: 1}}\nlinkage: nowhere.yaml\n',
         '',
-        ['s.yaml:1: drive: topic, sine stand beside each other; leave all but 1 out'],
+        ['s.yaml:1: drive: topic, sine cannot be combined; leave all but 1 out'],
     ),
     (
         'linkage: l.yaml\nsolver: table\n',
@@ -208,7 +208,7 @@ WRONG = [
     (
         'linkage: l.yaml\nsolver: closed_form\naccuracy: 1e-6\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ['s.yaml:3: accuracy: stands beside solver; write one of the two'],
+        ['s.yaml:3: accuracy: cannot be combined with solver; write one of the two'],
     ),
     ('linkage: nowhere.yaml\n', '', ["s.yaml:1: linkage: 'nowhere.yaml' is not a file; name one"]),
     ('rate: [\n', '', ['s.yaml:2: is not valid YAML']),

@@ -44,7 +44,7 @@ FILES = {
     'fmu': (b'PK\x03\x04\x14\0', 'a ZIP file'),
     'db3': (b'SQLite format 3\0' + bytes(84), 'an SQLite file'),
     'bag': (b'#ROSBAG V2.0\n\x45\0\0\0', 'a bag of ROS 1'),
-    'bin': (bytes(range(256)) * 10, 'no text file'),
+    'bin': (bytes(range(256)) * 10, 'a binary file'),
     'empty': (b' \n', 'empty'),
 }
 """Content of a file, and how a person calls it."""
@@ -141,7 +141,7 @@ WRITTEN_WRONGLY = {
     'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is indented otherwise'),
     'links: {ground: {O: [0, 0]\njoints: {}\n': (2, ''),
     'links:\n  ground: {O: [0, 0}\n': (2, 'has a [ that does not end'),
-    'links\n  ground: {}\n': (2, 'has a colon where none can be'),
+    'links\n  ground: {}\n': (2, 'has a misplaced colon'),
     'links: ground\n': (1, 'write links: {ground: {}}'),
     'links:\njoints: {}\n': (1, 'is empty; write links: {…}'),
     'links: {ground: {O: [0, 0, 0.5]}}\n': (1, 'a planar linkage has no z'),
@@ -177,9 +177,9 @@ def typed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     [
         ('synthesize', 'the task: is not said; name one of --pair'),
         ('solve four_bar --at 40,5', 'a decimal has a point, not a comma'),
-        ('synthesize --pair 0 0 --pair 30 17 --pair 60 38,5', "'38,5' is no number; a decimal"),
-        ('simulate demo -o x.csv --seconds 0,5', "'0,5' is no number; a decimal has a point"),
-        ('solve four_bar --steps 4.5', "'4.5' is no whole number"),
+        ('synthesize --pair 0 0 --pair 30 17 --pair 60 38,5', "'38,5' is not a number; a decimal"),
+        ('simulate demo -o x.csv --seconds 0,5', "'0,5' is not a number; a decimal has a point"),
+        ('solve four_bar --steps 4.5', "'4.5' is not a whole number"),
         ('scene demo --set drive=topic', "write --set 'drive={topic: {}}'"),
         ('scene demo --set effects=[velocity,effort]', "'effects={velocity: {}, effort: {}}'"),
     ],

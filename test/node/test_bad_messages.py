@@ -201,7 +201,7 @@ def test_the_warning_is_throttled_and_names_reason_and_remedy(rig):
     last = '\n'.join(lines[count:])
     assert '/crank_states' in last
     assert NOT_FINITE in last
-    assert re.search(r'not finite \(\d+\): look at the sensor', last)
+    assert re.search(r'not finite \(\d+\): check the sensor', last)
     assert sum(map(int, re.findall(r'not finite \((\d+)\)', last))) == 20
 
 

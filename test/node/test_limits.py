@@ -143,7 +143,7 @@ def test_what_is_counted_and_told(said, published):
     assert (len(messages), counts.published, counts.suppressed) == (published, published, 0)
     lines = Said()
     Warnings(lines).check_events(counts, loop.pipeline.closures, '/crank', 1.0)
-    what = 'nothing published' if said else 'published all the same'
+    what = 'nothing published' if said else 'published anyway'
     assert lines == [
         f'2 ticks beyond limits, {what}: crank_joint at 2.1 rad, limits [0.5, 1.5] rad'
     ]

@@ -62,7 +62,9 @@ def told(counts):
 def test_one_slow_tick_is_named_and_the_rate_holds_otherwise(run):
     counts = run([0] * 50 + [54] + [0] * 50)
     assert counts.stall == Stall(52 * MS, in_tick=True)
-    assert told(counts) == ['26 ticks lost at once: a tick took 0.052 s; the rate holds otherwise']
+    assert told(counts) == [
+        '26 ticks lost at once: a tick took 0.052 s; the rate is kept otherwise'
+    ]
 
 
 def test_one_late_wake_up_is_that_of_the_operating_system(run):
@@ -71,7 +73,7 @@ def test_one_late_wake_up_is_that_of_the_operating_system(run):
     assert told(counts) == [
         (
             '20 ticks lost at once: the operating system woke the node 0.040 s late; '
-            'the rate holds otherwise'
+            'the rate is kept otherwise'
         )
     ]
 
@@ -79,7 +81,7 @@ def test_one_late_wake_up_is_that_of_the_operating_system(run):
 def test_two_stalls_of_a_long_run_are_no_reason_for_another_rate(run):
     (line,) = told(run([0] * 500 + [32] + [0] * 500 + [42] + [0] * 500))
     assert line == (
-        '35 ticks lost in 2 stalls, the last: a tick took 0.040 s; the rate holds otherwise'
+        '35 ticks lost in 2 stalls, the last: a tick took 0.040 s; the rate is kept otherwise'
     )
 
 

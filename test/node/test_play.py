@@ -393,13 +393,13 @@ LEFT_OUT = [
     ('/x', '', "its type '' is not a ROS 2 message"),
     ('/x', 'antigravity/msg/Thing', "'antigravity/msg/Thing' is not installed"),
     ('/x', '../../etc/msg/Thing', 'is not a ROS 2 message'),
-    ('two words', 'std_msgs/msg/Empty', 'two words: is no name of a ROS 2 topic'),
-    ('/a//b', 'std_msgs/msg/Empty', '/a//b: is no name of a ROS 2 topic'),
-    ('', 'std_msgs/msg/Empty', "'': is no name of a ROS 2 topic"),
-    ('/a\0b', 'std_msgs/msg/Empty', r'/a\x00b: is no name of a ROS 2 topic'),
-    ('/{word}', 'std_msgs/msg/Empty', '/{word}: is no name of a ROS 2 topic'),
-    (f'/{"x" * 3000}', 'std_msgs/msg/Empty', f'/{"x" * 37}…{"x" * 38}: is no name'),
-    ('/\x1b[2J', 'std_msgs/msg/Empty', r'/\x1b[2J: is no name of a ROS 2 topic'),
+    ('two words', 'std_msgs/msg/Empty', 'two words: is not a ROS 2 topic name'),
+    ('/a//b', 'std_msgs/msg/Empty', '/a//b: is not a ROS 2 topic name'),
+    ('', 'std_msgs/msg/Empty', "'': is not a ROS 2 topic name"),
+    ('/a\0b', 'std_msgs/msg/Empty', r'/a\x00b: is not a ROS 2 topic name'),
+    ('/{word}', 'std_msgs/msg/Empty', '/{word}: is not a ROS 2 topic name'),
+    (f'/{"x" * 3000}', 'std_msgs/msg/Empty', f'/{"x" * 37}…{"x" * 38}: is not a ROS 2'),
+    ('/\x1b[2J', 'std_msgs/msg/Empty', r'/\x1b[2J: is not a ROS 2 topic name'),
 ]
 
 
@@ -424,7 +424,10 @@ def test_another_definition_of_a_type_is_left_out(tmp_path, play):
     said, complaints = play(bag).ended()
     assert '/joints: 3\n' in said
     assert '/words' not in said
-    assert 'left out: /words: std_msgs/msg/String was another when it was recorded' in complaints
+    assert (
+        'left out: /words: std_msgs/msg/String had another definition when it was recorded'
+        in complaints
+    )
 
 
 def test_a_killed_recording_is_played_as_far_as_it_goes(tmp_path, bag, play):
@@ -436,7 +439,7 @@ def test_a_killed_recording_is_played_as_far_as_it_goes(tmp_path, bag, play):
     assert '/joints: 100\n' in said
     assert (
         complaints == f'linkage play: {bag}: unfinished: its recording was killed; '
-        'what it holds is played\n'
+        'its content is played\n'
     )
 
 
@@ -481,12 +484,12 @@ WRONG = [
     ('bag --topics /zzz', '/zzz: bag has no such topic; there are: /joints, /words'),
     ('bag --start 1', '--start 1: is behind the end of bag; it lasts 0.09 s'),
     ('bag --topics /words --start 0.05', 'bag: holds no message of these topics at these times'),
-    ('instant --loop', 'all that is played is of one instant; play it without --loop'),
+    ('instant --loop', 'all messages have the same time; play it without --loop'),
     ('far --clock', f'--clock: {2**62} ns is beyond the times of messages'),
     ('bag --rate 0', '--rate: 0 is not between 0.01 and 1000'),
     ('bag --rate 1001', '--rate: 1001 is not between 0.01 and 1000'),
     ('bag --rate nan', '--rate: nan is not between 0.01 and 1000'),
-    ('bag --rate fast', "argument --rate: 'fast' is no number"),
+    ('bag --rate fast', "argument --rate: 'fast' is not a number"),
     ('bag --clock 0', '--clock: 0 is not between 0.1 and 10000'),
     ('bag --start -1', '--start: -1 is not between 0 and 1e+09'),
     ('bag --ros-args -r', '--ros-args: '),

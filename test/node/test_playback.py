@@ -196,7 +196,7 @@ def test_a_loop_repeats_its_part():
 def test_a_loop_over_one_instant_is_refused_after_it():
     instant = playback_queue(Order([(10, 'a'), (10, 'b')]), PlaybackPart(10, 99, 'ab', loop=True))
     assert [next(instant).topic, next(instant).topic] == ['a', 'b']
-    with pytest.raises(LinkageError, match='all that is played is of one instant'):
+    with pytest.raises(LinkageError, match='all messages have the same time'):
         next(instant)
 
 

@@ -22,7 +22,7 @@ from .graph import crank, wait_for
 
 ERROR = b'\2'
 INCOMPLETE = 1
-WORDS = ('Recorded', 'Dropped', 'Waiting', 'Let go')
+WORDS = ('Recorded', 'Dropped', 'Waiting', 'Discarded')
 
 
 def told(status, word):
@@ -50,7 +50,7 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
 
     feed(4.5)
     status = wait_for(
-        lambda: (status := graph.status('recording')) and told(status, 'Let go') and status,
+        lambda: (status := graph.status('recording')) and told(status, 'Discarded') and status,
         'files that made way',
     )
     assert told(status, 'Received') == sum(told(status, word) for word in WORDS)
@@ -60,7 +60,7 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
     feed(0.5)
     answer = graph.call(Trigger, '/linkage_node/stop_recording')
     assert answer.success
-    assert ' let go' in answer.message
+    assert ' discarded' in answer.message
     assert node.end() == 0
     said = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
     information = said['rosbag2_bagfile_information']

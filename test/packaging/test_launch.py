@@ -117,7 +117,7 @@ def test_what_is_no_flag_is_refused(start, name, said):
     with pytest.raises(LinkageError) as caught:
         start(**{name: said})
     assert str(caught.value) == ' '.join(
-        f'{name}: {said!r} is not a flag; write true or false'.split()
+        f'{name}: {said!r} is not true or false; write true or false'.split()
     )
 
 
@@ -200,7 +200,7 @@ def test_the_frequency_and_the_prefix_of_frames_reach_robot_state_publisher(star
     assert (last['publish_frequency'], last['frame_prefix']) == (250.0, 'left/')
     with pytest.raises(LinkageError) as caught:
         start(**given, publish_frequency='fast')
-    assert str(caught.value) == "publish_frequency 'fast': is no number; write 1 to 1000"
+    assert str(caught.value) == "publish_frequency 'fast': is not a number; write 1 to 1000"
 
 
 class RobotStatePublisher:

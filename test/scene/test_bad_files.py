@@ -31,10 +31,10 @@ BOMB = b'a: &a [1, 1]\n' + b''.join(
 SCENES = {
     'unknown key': (b'rtae: 5', ":2: rtae: unknown key; did you mean 'rate'?"),
     'unlike any key': (b'x: 5', ':2: x: unknown key; known: accuracy, angles, beyond_limits, '),
-    'key twice': (b'rate: 1\nrate: 2', ':3: rate: stands twice (first in line 2); remove one'),
+    'key twice': (b'rate: 1\nrate: 2', ':3: rate: is a duplicate (first in line 2); remove one'),
     'key twice, deep': (
         b'drive: {topic: {max_age: 1, max_age: 2}}',
-        ':2: max_age: stands twice (first in line 2); remove one',
+        ':2: max_age: is a duplicate (first in line 2); remove one',
     ),
     'text for a number': (b'rate: fast', ":2: rate: 'fast' is not a number; write a number"),
     'flag for a number': (b'rate: true', ':2: rate: True is not a number; write a number'),
@@ -49,7 +49,7 @@ SCENES = {
     '9000 digits': (b'rate: ' + b'9' * 9000, ':2: rate: inf is out of bounds; write a finite'),
     'YAML 1.1 flag': (
         b'drive: {topic: {carry_forward: yes}}',
-        ":2: drive.topic.carry_forward: 'yes' is not a flag; write true or false",
+        ":2: drive.topic.carry_forward: 'yes' is not true or false; write true or false",
     ),
     'YAML 1.1 off': (b'rate: off', ":2: rate: 'off' is not a number; write a number"),
     'YAML 1.1 time': (b'rate: 1:30', ":2: rate: '1:30' is not a number; write a number"),
@@ -86,10 +86,13 @@ SCENES = {
         ":2: record.name: 'a/b' is not a plain name; leave out the folders",
     ),
     'bag above': (b'record: {name: ..}', ":2: record.name: '..' is not a plain name; leave out"),
-    'bag name a number': (b'record: {name: 7}', ':2: record.name: 7 is not a text; write a name'),
+    'bag name a number': (
+        b'record: {name: 7}',
+        ':2: record.name: 7 is not a string; write a name',
+    ),
     'line break in a name': (
         b'record: {name: "a\\nb"}',
-        ":2: record.name: 'a\\nb' is not a text; write a name",
+        ":2: record.name: 'a\\nb' is not a string; write a name",
     ),
     'half a message': (b'record: {queue: 100.5}', ':2: record.queue: 100.5 is not whole; write'),
     'flush at every tick': (
@@ -106,7 +109,7 @@ SCENES = {
     ),
     'ring of one file': (
         b'record: {keep_files: 2, split_bytes: 0}',
-        ':2: record.keep_files: there is one file only; write split_bytes or split_seconds too',
+        ':2: record.keep_files: the bag has only one file; write split_bytes or split_seconds too',
     ),
     'memory of a moment': (
         b'record: {snapshot_seconds: 0.05}',
@@ -151,8 +154,8 @@ SCENES = {
     'tagged list': (b'rate: !!int [1]', ':2: is not valid YAML (expected a scalar node'),
     'tagged text': (b'drive: !!map [a, b]', ':2: is not valid YAML (expected a mapping);'),
     'tag that does not fit': (b'rate: !!int fast', ': is not valid YAML (invalid literal for int'),
-    'deep nesting': (b'rate: ' + b'[' * 3000, ': is nested too deeply; write it flatter'),
-    'NUL': (b'rate: \0', ': is no text file, and no file in YAML; name a scene or'),
+    'deep nesting': (b'rate: ' + b'[' * 3000, ': is nested too deeply; use fewer levels'),
+    'NUL': (b'rate: \0', ': is a binary file, not a YAML file; name a scene or'),
     'NUL in a key': (b'"ra\\0te": 1', ":2: the key 'ra\\x00te' is not a name; write a name"),
     'half a surrogate': (b'"\\ud800": 1', ":2: the key '\\ud800' is not a name; write a name"),
     'number as a key': (b'5: 1', ':2: the key 5 is not a name; write a name'),
@@ -220,7 +223,7 @@ SLIDER = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
 
 # The whole linkage file.
 LINKAGES = {
-    'empty': (b'', ': is empty, and no file in YAML; linkage gallery four_bar prints an example'),
+    'empty': (b'', ': is empty, not a YAML file; linkage gallery four_bar prints an example'),
     'a list': (b'- four_bar', ": holds ['four_bar']; write a mapping (key: value)"),
     'nothing known': (b'bars: 4', ':1: bars: unknown key; known: angles, assembly, four_bar'),
     'shorthand misspelt': (b'fourbar: {}', ":1: fourbar: unknown key; did you mean 'four_bar'?"),
@@ -301,7 +304,7 @@ LINKAGES = {
     ),
     'joint of no text': (
         WRITTEN_OUT.replace(b'crank_joint', b'"\\udc00"'),
-        ":9: input.joint: '\\udc00' is not a text; write a name",
+        ":9: input.joint: '\\udc00' is not a string; write a name",
     ),
     'nothing to publish': (
         WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')] + b'joints: {}',

@@ -237,8 +237,8 @@ def test_a_file_takes_the_place_of_the_one_before(tmp_path):
 NOT_WRITTEN = {
     'no/linkage.yaml': 'there is no folder ',
     'file/linkage.yaml': 'cannot be written (Not a directory); name another file',
-    '.': 'is there already and is no file; name another file',
-    'pipe': 'is there already and is no file; name another file',
+    '.': 'exists and is not a file; name another file',
+    'pipe': 'exists and is not a file; name another file',
     'circle': 'cannot be written (',
     'n' * 300: 'cannot be written (File name too long); name another file',
     'nul\0': 'cannot be written (embedded null byte); name another file',

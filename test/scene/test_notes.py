@@ -77,7 +77,7 @@ NOTES = {
         'units: mm\nloads: {gravity: [0, -9.81]}',
         [
             (
-                'scene.yaml:3: loads.gravity: [0, -9.81] mm/s² is hardly any; '
+                'scene.yaml:3: loads.gravity: [0, -9.81] mm/s² is very small; '
                 'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]'
             )
         ],

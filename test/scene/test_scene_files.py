@@ -447,7 +447,7 @@ WRONG = {
     'parameters of a node': ('/**: {ros__parameters: {scene: x.yaml}}', f': {NEITHER}'),
     'a scene without a linkage': (
         'rate: 5',
-        ": the key 'linkage' is missing; add linkage: a text",
+        ": the key 'linkage' is missing; add linkage: a string",
     ),
     'a linkage with a rate': (
         FOLDS + 'rate: 5',

@@ -78,7 +78,7 @@ def check_goes_on(kept, capsys):
     assert 3 <= lines < 24
     assert not Path('worn.csv').exists()
     assert main(command('worn.csv', '--workers', '1')) == 0
-    assert f'goes on after {lines} of 24 runs, of worn.csv.part' in capsys.readouterr().err
+    assert f'continues after {lines} of 24 runs, of worn.csv.part' in capsys.readouterr().err
     assert Path('worn.csv').read_bytes() == uninterrupted()
     assert not kept.exists()
 
@@ -104,7 +104,7 @@ def test_a_study_that_is_ended_itself_goes_on(ended_by, workers, capsys):
     assert study.returncode == (-ended_by if ended_by == signal.SIGKILL else 1)
     assert 'Traceback' not in said
     if ended_by != signal.SIGKILL:
-        assert 'runs are kept in worn.csv.part; the same command goes on' in said
+        assert 'runs are kept in worn.csv.part; the same command continues' in said
     check_goes_on(kept, capsys)
 
 
@@ -130,7 +130,7 @@ def test_a_line_that_was_cut_anywhere_costs_one_run(finished, capsys):
     for cut in (0, 1, len(last) // 2, len(last) - 1):
         kept.write_bytes(whole[: len(whole) - len(last) + cut])
         assert main(again) == 0
-        assert 'goes on after 2 of 3 runs' in capsys.readouterr().err
+        assert 'continues after 2 of 3 runs' in capsys.readouterr().err
         tables.add(Path('x.csv').read_bytes())
         Path('x.csv').unlink()
     kept.write_bytes(whole)

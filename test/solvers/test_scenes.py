@@ -200,9 +200,9 @@ REFUSED = {
     'solver: {table: {tolerance: 1.0e-3, knots: 4}}': 'solver.table.knots: unknown key',
     'solver: {table: {tolerance: 1.0e-3, span: [1]}}': 'solver.table.span: [1] is not a point',
     'solver: {table: {tolerance: 1.0e-3}, newton: {}}': 'solver.newton: is a second solver',
-    'solver: {}': 'solver: names none; write one of closed_form, newton, table',
+    'solver: {}': 'solver: names no solver; write one of closed_form, newton, table',
     'solver: 5': 'solver: 5 is not a mapping',
-    'accuracy: 1.0e-6\nsolver: closed_form': 'accuracy: stands beside solver',
+    'accuracy: 1.0e-6\nsolver: closed_form': 'accuracy: cannot be combined with solver',
     'accuracy: fine': "accuracy: 'fine' is not a number",
     'accuracy: 1.0e-15': 'accuracy: 1e-15 is out of bounds',
 }
