@@ -314,15 +314,8 @@ def needs_penalties(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
     Return `needs_penalty` for many four-bars without defects.
 
-    Parameters
-    ----------
-    lengths
-        Lengths of crank, coupler, rocker and ground, above 0; (…, 4).
-    transmission
-        The least angle over the travel, in [rad]; (…).
-    needs
-        The requirements.
-
+    ``lengths``: crank, coupler, rocker and ground, above 0, (…, 4). ``transmission``: the least
+    angle over the travel, in [rad], (…).
     """
     total = np.zeros(transmission.shape)
     if needs.kind:

@@ -65,11 +65,7 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
     """
     Refuse poses and pivots that no four-bar can have.
 
-    Raises
-    ------
-    SynthesisError
-        With the numbers of the poses, counted from 1, or the names of the pivots.
-
+    The SynthesisError has the numbers of the poses, counted from 1, or the names of the pivots.
     """
     if len(poses) != 3:
         raise SynthesisError('poses', f'{len(poses)} were given', 'give three')
@@ -153,17 +149,9 @@ def centre_sensitivity(found: PoleCircle, own: Complex, shared: Complex) -> Arra
     """
     Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
 
-    Times 2⁻⁵³ it bounds the error of the centre that rounding the inputs alone causes.
-
-    Parameters
-    ----------
-    found
-        The circle.
-    own
-        x·∂A/∂x of each place by the inputs that move only this place, (…, 3, k).
-    shared
-        x·∂A/∂x of each place by the inputs that move all three, (…, 3, m).
-
+    Times 2⁻⁵³ it bounds the error of the centre that rounding the inputs alone causes. ``own`` and
+    ``shared`` are x·∂A/∂x of each place: by the inputs that move only this place, (…, 3, k), and
+    by the inputs that move all three, (…, 3, m).
     """
     with np.errstate(all='ignore'):
         back = np.conj(found.spokes)[..., None]
@@ -223,15 +211,10 @@ class MotionLinks(NamedTuple):
 
 def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> MotionLinks:
     """
-    Return the links that carry moving pivots (…) through poses (…, 3), without raising errors.
+    Return the links that carry moving pivots through poses, without raising errors.
 
-    Parameters
-    ----------
-    places, angles
-        Places and angles of the coupler, in [m] and [rad].
-    moving
-        Pivots in the frame of the coupler, in [m].
-
+    The poses are places and angles of the coupler, in [m] and [rad], (…, 3). The pivots are in the
+    frame of the coupler, in [m], (…).
     """
     point = np.asarray(moving, np.complex128)[..., None]
     sine, cosine = sine_cosine(_as_twofold(angles))
@@ -247,15 +230,10 @@ def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> MotionLin
 
 def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> MotionLinks:
     """
-    Return the links that lead from fixed pivots (…) to poses (…, 3), without raising errors.
+    Return the links that lead from fixed pivots to poses, without raising errors.
 
-    Parameters
-    ----------
-    places, angles
-        Places and angles of the coupler, in [m] and [rad].
-    fixed
-        Pivots in the frame of the ground, in [m].
-
+    The poses are places and angles of the coupler, in [m] and [rad], (…, 3). The pivots are in the
+    frame of the ground, in [m], (…).
     """
     point = np.asarray(fixed, np.complex128)[..., None]
     sine, cosine = sine_cosine(_as_twofold(-angles))

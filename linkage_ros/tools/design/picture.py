@@ -272,26 +272,11 @@ def draw_design(
     error: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> None:
     """
-    Paint a design to a file.
+    Paint a design to a PNG, SVG or PDF file.
 
-    Parameters
-    ----------
-    design
-        The four-bar and its wanted positions.
-    title
-        Title of the picture.
-    file
-        PNG, SVG or PDF.
-    error
-        Error of the rocker's angle over a range: crank angles, and the errors there, in [rad];
-        (n,) each.
-
-    Raises
-    ------
-    LinkageError
-        If the design closes at none of its positions, matplotlib is not installed, or the file
-        cannot be written.
-
+    ``error`` is the error of the rocker's angle over a range: crank angles and the errors there,
+    in [rad], (n,) each. A LinkageError is raised if the design closes at none of its positions,
+    matplotlib is not installed, or the file cannot be written.
     """
     context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load

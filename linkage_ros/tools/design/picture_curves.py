@@ -35,27 +35,13 @@ _TURNS = (False, False)
 
 
 class DesignPose(NamedTuple):
-    """
-    A design at one of its positions, in the assembly that meets it.
+    """A design at one of its positions, in the assembly that meets it."""
 
-    Attributes
-    ----------
-    number
-        Number of the position, from 1.
-    wanted, met
-        The wanted position, and the actual one.
-    own
-        Whether it is on the design's own assembly.
-    closure, position
-        The linkage in that assembly, and its position there.
-
-    """
-
-    number: int
+    number: int  # Number of the position, from 1
     wanted: DesignRequest
     met: AchievedPosition
-    own: bool
-    closure: Closure
+    own: bool  # Whether it is on the design's own assembly
+    closure: Closure  # The linkage in the assembly that meets the position
     position: Position
 
     @property

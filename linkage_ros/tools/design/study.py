@@ -89,28 +89,11 @@ def search(
     address: str = '',
 ) -> list[DesignFound]:
     """
-    Return the best candidates of a problem, the best first.
+    Return the best ``keep`` of ``count`` candidates with a finite score, the best first.
 
-    Parameters
-    ----------
-    problem
-        Draws and scores candidates.
-    seed
-        Seed of the study, 0 or above.
-    count
-        Number of candidates to draw.
-    keep
-        Number of candidates to return; fewer if fewer have a finite score.
-    progress
-        Called with the number of candidates that are done, and their total.
-    address
-        Address of a Dask scheduler, such as ``tcp://host:8786``; '' to search in this process.
-
-    Raises
-    ------
-    LinkageError
-        If the scheduler or its workers fail.
-
+    The seed is 0 or above. ``progress`` is called with the number of finished candidates and the
+    total. ``address`` names a Dask scheduler, such as ``tcp://host:8786``; '' searches in this
+    process. A LinkageError is raised if the scheduler or its workers fail.
     """
     work = partial(_search_part, problem, seed, keep)
     results = (

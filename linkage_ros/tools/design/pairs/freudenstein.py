@@ -80,15 +80,7 @@ class System(NamedTuple):
 
 
 def solve_pairs(theta: Array, phi: Array) -> System:
-    """
-    Solve three pairs; infinite or NaN if there is no solution.
-
-    Parameters
-    ----------
-    theta, phi
-        Angles of crank and rocker, in [rad]; (3, n).
-
-    """
+    """Solve three pairs, in [rad], (3, n); infinite or NaN without a solution."""
     with np.errstate(all='ignore'):
         P, Q, R = equation_differences(theta, phi)
         determinant, of_k1, of_k2 = _determinant(P, Q), _determinant(R, Q), _determinant(P, R)
@@ -117,18 +109,9 @@ def solve_pairs(theta: Array, phi: Array) -> System:
 
 def equation_differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
     """
-    Return all equations but the first minus the first, divided by −2.
+    Return all equations but the first minus the first, divided by −2, for angles (m, n) in [rad].
 
-    Parameters
-    ----------
-    theta, phi
-        Angles of crank and rocker, in [rad]; (m, n).
-
-    Returns
-    -------
-    tuple
-        Of cos φ, of cos θ and of cos(θ − φ); (m − 1, n) each.
-
+    The results are the differences of cos φ, cos θ and cos(θ − φ); (m − 1, n) each.
     """
     theta_by, phi_by = two_sum(theta[1:], -theta[:1]), two_sum(phi[1:], -phi[:1])
     theta_sum, phi_sum = two_sum(theta[1:], theta[:1]), two_sum(phi[1:], phi[:1])
@@ -151,16 +134,12 @@ def length_gradient(system: System) -> Array:
     """
     Differentiate the lengths, and the direction of the coupler in the first pair, by the angles.
 
-    The residual of equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ), changes by
-    sin(θ − φ) − k2·sin θ with θᵢ and by −sin(θ − φ) − k1·sin φ with φᵢ; k changes by that times
-    minus column i of the inverse. The coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
+    The residual of equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ), changes by sin(θ − φ) −
+    k2·sin θ with θᵢ and by −sin(θ − φ) − k1·sin φ with φᵢ; k changes by that times minus column i
+    of the inverse. The coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
 
-    Returns
-    -------
-    Array
-        Of crank, coupler, rocker and direction by the three crank angles, then by the three rocker
-        angles, per [rad]; (4, 6, n).
-
+    The result, (4, 6, n) per [rad], has crank, coupler, rocker and direction by the three crank
+    angles, then by the three rocker angles.
     """
     theta, phi = system.theta, system.phi
     k1, k2, _ = system.k
@@ -256,11 +235,7 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
     """
     Refuse pairs that no four-bar can have, or that repeat each other.
 
-    Raises
-    ------
-    SynthesisError
-        With the numbers of the pairs, counted from 1.
-
+    The SynthesisError has the numbers of the pairs, counted from 1.
     """
     if not SHORTEST <= ground <= FARTHEST:
         remedy = f'give it one from {SHORTEST:g} to {FARTHEST:g}'

@@ -200,15 +200,8 @@ def coupler_directions(
     """
     Return e^{iβ}, and y², which is below 0 if the loop is open.
 
-    Parameters
-    ----------
-    crank
-        The crank vector a·e^{iθ}, (n, N).
-    b, c, d
-        Lengths, (n, 1).
-    side
-        1 for left and −1 for right, (n, 1).
-
+    ``crank`` is the vector a·e^{iθ}, (n, N); the lengths are (n, 1), and ``side`` is 1 for left
+    and −1 for right, (n, 1).
     """
     diagonal = d - crank
     square = diagonal.real**2 + diagonal.imag**2
@@ -257,21 +250,11 @@ def transmission_cotangents(rows: Array, angles: Array) -> tuple[Array, Array, A
     """
     Return the cotangent of the transmission angle, and its derivatives.
 
-    It is 0 if coupler and rocker are square, and unbounded if they are in line. With
-    cos μ = (b² + c² − |D|²)/2bc, d(cot μ) = d(cos μ)/sin³ μ.
+    It is 0 if coupler and rocker are square, and unbounded if they are in line. With cos μ = (b² +
+    c² − |D|²)/2bc, d(cot μ) = d(cos μ)/sin³ μ.
 
-    Parameters
-    ----------
-    rows
-        Dimensions, (n, 9).
-    angles
-        Crank angles, (n, N).
-
-    Returns
-    -------
-    tuple
-        Cotangents (n, N), by dimension (n, N, 9), by crank angle (n, N).
-
+    For dimensions (n, 9) and crank angles (n, N) the results are the cotangents, (n, N), their
+    derivatives by dimension, (n, N, 9), and by crank angle, (n, N).
     """
     a, b, c, d = np.exp(rows[:, LENGTHS]).T[:, :, None]
     cosine, swing = np.cos(angles), 2.0 * a * d * np.sin(angles)

@@ -222,19 +222,10 @@ _NOTHING = 1e-30
 
 def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fitted, Array]:
     """
-    Return the four-bars after some steps, and their sums of squared distances, (n,).
+    Return the four-bars after at most ``steps``, and their sums of squared distances, (n,).
 
-    Invalid four-bars (open, or with points out of order) have inf, and are not changed.
-
-    Parameters
-    ----------
-    start, aim
-        The start, and the points.
-    steps
-        Most steps.
-    guard
-        Weight of a transmission angle of 45° as a distance. Not part of the sums.
-
+    Invalid four-bars (open, or with points out of order) have inf, and are not changed. ``guard``
+    is the weight of a transmission angle of 45° as a distance; it is not part of the sums.
     """
     now = Fitted(*(np.array(part) for part in start))
     seen = point_slopes(*now)
@@ -330,20 +321,10 @@ class PathResult(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """
-    The result of a path generation, sorted by error.
+    """The result of a path generation, sorted by error."""
 
-    Attributes
-    ----------
-    found
-        The best accepted linkages.
-    refused
-        The best refused linkages.
-
-    """
-
-    found: tuple[PathResult, ...]
-    refused: tuple[PathResult, ...]
+    found: tuple[PathResult, ...]  # The best accepted linkages
+    refused: tuple[PathResult, ...]  # The best refused linkages
 
 
 def generate_path(
