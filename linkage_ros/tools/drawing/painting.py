@@ -58,15 +58,8 @@ def place_labels(
     """
     Place labels one after the other, each where it hides least.
 
-    Parameters
-    ----------
-    labels
-        The labels; the first ones are placed first.
-    obstacles
-        Points of lines and shapes that should not be hidden.
-    frame
-        The lower left and the upper right corner of the drawing.
-
+    The obstacles are points of lines and shapes; the frame is the lower left and the upper right
+    corner of the drawing.
     """
     placed: list[PlacedText] = []
     for label in labels:
@@ -315,11 +308,7 @@ class NameLabels:
     """
     Texts placed together, each where it hides little.
 
-    Parameters
-    ----------
-    axes
-        Axes of a figure with a final layout: before it a text has no size.
-
+    The figure of the axes has its final layout: before it a text has no size.
     """
 
     def __init__(self, axes: Any) -> None:
