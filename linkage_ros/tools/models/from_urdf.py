@@ -76,24 +76,11 @@ _REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE,
 
 def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
     """
-    Return a linkage with the sides that give a pose.
+    Return a linkage with the sides that give a pose, from a linkage without sides.
 
-    Parameters
-    ----------
-    linkage
-        The linkage, without sides.
-    inputs
-        Inputs of the pose, in [rad] or [m].
-    poses
-        Poses of its links there.
-    where
-        The pose in words, for messages.
-
-    Raises
-    ------
-    DefinitionError
-        If it is no valid linkage, or if no sides or several combinations give the pose.
-
+    ``poses`` are the poses of its links at the inputs, in [rad] or [m]; ``where`` names the pose
+    in messages. A DefinitionError is raised if the linkage is not valid, or if no sides or several
+    combinations give the pose.
     """
     groups = assur_groups(linkage).groups
     # Where a side changes at change points, it is that at the pose.
@@ -181,25 +168,12 @@ def linkage_from_urdf(
     """
     Make a linkage of a URDF.
 
-    Parameters
-    ----------
-    urdf
-        The robot.
-    close
-        Pairs of links whose origins coincide, beside those that frame names and loop tags define.
-    inputs
-        Names of driven joints; by default those that the file names.
-    at
-        Values of joints in a pose in which the loops close, in [rad] or [m]; by default those of
-        the file, or 0.
-    limits
-        Whether to keep the limits of the joints.
+    ``close`` has pairs of links whose origins coincide, beside the pairs that frame names and loop
+    tags define. ``inputs`` names driven joints; by default the ones that the file names. ``at``
+    has values of joints, in [rad] or [m], in a pose in which the loops close; by default the
+    file's values, or 0. With ``limits`` the joints keep their limits.
 
-    Raises
-    ------
-    FileError
-        If it does not give a linkage; the message has a remedy.
-
+    A FileError with a remedy is raised if the URDF does not give a linkage.
     """
     made = _Import(urdf, close, inputs, at or {}).make_linkage()
     if not limits:

@@ -168,17 +168,9 @@ _LEAST_INERTIA = 1e-12
 
 class Bodies:
     """
-    The bodies of a linkage, written into a model.
+    The bodies of a linkage, written into the ``world`` element of a model.
 
-    Parameters
-    ----------
-    world
-        Element of the model that receives them.
-    part, names
-        The linkage, and the names of its parts.
-    first_layer
-        Number of layers that other linkages occupy below.
-
+    ``first_layer`` is the number of layers that other linkages occupy below.
     """
 
     def __init__(

@@ -117,18 +117,8 @@ def grow_tree(linkage: Linkage, names: PrefixedNames) -> Tree:
     """
     Attach all links of a linkage to its ground.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    names
-        Provides names for frames and joints without a name in messages.
-
-    Raises
-    ------
-    DefinitionError
-        If the published joints do not determine a link's position; it names a joint that would.
-
+    ``names`` provides names for frames and joints without a name in messages. A DefinitionError is
+    raised if the published joints do not determine a link's position; it names a joint that would.
     """
     growth = _Growth(linkage, names)
     if len(growth.attach_links()) < len(linkage.links):

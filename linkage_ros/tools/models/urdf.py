@@ -181,21 +181,10 @@ class _Model(NamedTuple):
 
 def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     """
-    Return a robot model.
+    Return a robot model of some linkages.
 
-    Parameters
-    ----------
-    name
-        Name of the robot.
-    parts
-        Its linkages.
-
-    Raises
-    ------
-    PartError
-        If the published joints of a linkage do not determine all its links, or xacro would
-        evaluate one of its names.
-
+    A PartError is raised if the published joints of a linkage do not determine all its links, or
+    xacro would evaluate one of its names.
     """
     names, own = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
     models = []

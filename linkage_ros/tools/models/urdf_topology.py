@@ -51,15 +51,8 @@ def find_chains(planar: Planar, marked: Collection[str], near: float) -> list[Ch
     """
     Return the connections of the bodies.
 
-    Parameters
-    ----------
-    planar
-        The URDF.
-    marked
-        Bodies that carry a loop joint: they are kept even without shape or mass.
-    near
-        Positions closer than this are one, in [m].
-
+    ``marked`` are bodies that carry a loop joint: they are kept even without shape or mass.
+    Positions closer than ``near``, in [m], are one.
     """
     hung: dict[str, list[PlanarJoint]] = {}
     for joint in planar.joints:
@@ -119,11 +112,7 @@ class Points:
     """
     Points, in the order in which they are added.
 
-    Parameters
-    ----------
-    near
-        Positions on a body that are closer than this are one point, in [m].
-
+    Positions on a body that are closer than ``near``, in [m], are one point.
     """
 
     def __init__(self, near: float) -> None:

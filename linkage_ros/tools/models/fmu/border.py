@@ -47,15 +47,8 @@ def guard_call(
     """
     Make a method of `GuardedSlave` that PythonFMU3 calls, and which never raises.
 
-    Parameters
-    ----------
-    call
-        Name of the function of FMI.
-    states
-        States that allow it.
-    otherwise
-        Returns what PythonFMU3 is given after a failure, from the arguments of the call.
-
+    ``call`` is the name of the function of FMI, ``states`` are the states that allow it. After a
+    failure PythonFMU3 gets the result of ``otherwise`` for the arguments of the call.
     """
 
     def decorate(method: Callable[..., Any]) -> Callable[..., Any]:

@@ -102,11 +102,8 @@ class SceneSlave(GuardedSlave):
     """
     An instance of the FMU.
 
-    Raises
-    ------
-    LinkageError
-        Another version of linkage_ros made the FMU, or its files are damaged.
-
+    A LinkageError is raised if another version of linkage_ros made the FMU, or its files are
+    damaged.
     """
 
     def __init__(self, **given: Any) -> None:

@@ -76,15 +76,7 @@ class Variable(NamedTuple):
 
 
 class _Sender:
-    """
-    Sends the input values of a linkage as the message that its drive reads.
-
-    Parameters
-    ----------
-    line
-        The pipeline of the linkage, whose drive listens to a topic.
-
-    """
+    """Sends the input values of a linkage as the message that its drive reads from a topic."""
 
     def __init__(self, line: LinkagePipeline) -> None:
         scene_linkage = line.scene_linkage
@@ -182,17 +174,7 @@ def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
 
 
 class MotorOutputs:
-    """
-    What the encoder of a motor reads: the newest message on ``~/motor``.
-
-    Parameters
-    ----------
-    line
-        The pipeline of its linkage.
-    writer
-        Number of its topic among the auxiliary topics.
-
-    """
+    """Readings of a motor's encoder: the newest ``~/motor`` message, by its auxiliary writer."""
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
         scene_linkage = line.scene_linkage
@@ -224,17 +206,8 @@ class SteppedScene:
     """
     A scene that is stepped from outside. To reset it, build it again.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
-    Raises
-    ------
-    FileError
-        The scene cannot be stepped: it has no tick rate, needs further files or modules, or sets
-        its own clock.
-
+    A FileError is raised if the scene cannot be stepped: it has no tick rate, needs further files
+    or modules, or sets its own clock.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -279,20 +252,10 @@ class SteppedScene:
 
     def whole_ticks(self, begin: float, seconds: float) -> int:
         """
-        Return how many ticks a step takes.
+        Return how many ticks a step takes; its begin is in [s] since the first tick.
 
-        Parameters
-        ----------
-        begin
-            Begin of the step, in [s] since the first tick.
-        seconds
-            Its length, in [s].
-
-        Raises
-        ------
-        LinkageError
-            The step does not begin where the last one ended, or is no whole number of ticks.
-
+        A LinkageError is raised if the step does not begin where the last one ended, or is not a
+        whole number of ticks.
         """
         rate = self._scene.rate
         # Written so that NaN is refused too.
