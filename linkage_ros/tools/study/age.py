@@ -71,11 +71,7 @@ def measure_age_in_use(
     """
     Return the errors of rates of ticks, for a listener who holds and one who carries forward.
 
-    Raises
-    ------
-    LinkageError
-        The loops close at no state of the motion.
-
+    A LinkageError is raised if the loops close at no state of the motion.
     """
     by_sample = not scene.rate
     rate = scene.rate or max(each.sample_rate for each in motions) or USUAL_RATE
@@ -113,11 +109,7 @@ def errors_in_use(
     """
     Return for each rate the errors of a state in use: held, and carried by its rates.
 
-    Raises
-    ------
-    LinkageError
-        The loops close at no state of the motion.
-
+    A LinkageError is raised if the loops close at no state of the motion.
     """
     blocks = [_times_of_use(rate, horizon, periods) for rate in rates]
     # All in one run, since a drive that integrates takes time for it.

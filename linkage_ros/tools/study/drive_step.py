@@ -69,28 +69,12 @@ def measure_drive_step(
     """
     Return the errors of methods and steps, and what was left out for lack of time.
 
-    Parameters
-    ----------
-    motion
-        What the linkage of a torque drive does.
-    rate
-        Ticks per second.
-    horizon
-        How long it runs, in [s].
-    key
-        Key of the drive in the scene.
-    quick
-        Whether to measure a few settings only.
-    seconds
-        Processor time that the measurement may take, in [s].
-    progress
-        Called with the fraction that is done.
+    The linkage has a torque drive; ``key`` is its key in the scene. The rate is in [Hz],
+    ``horizon`` is the duration of the run, in [s], and ``seconds`` the processor time that the
+    measurement may take. A ``quick`` measurement has few settings; ``progress`` gets the fraction
+    that is done.
 
-    Raises
-    ------
-    LinkageError
-        The input runs away, or stops at a toggle, before the horizon.
-
+    A LinkageError is raised if the input runs away, or stops at a toggle, before the horizon.
     """
     begun = process_time()
     use: TorqueParameters = motion.scene_linkage.drive[1]
@@ -159,13 +143,8 @@ def exact_cranks(
     """
     Return the exact motion at some times, in [ns], and its own error.
 
-    Where the drive itself stands in for it, its step is divided by up to ``finest``.
-
-    Raises
-    ------
-    LinkageError
-        The motion ends before the last time.
-
+    Where the drive itself stands in for it, its step is divided by up to ``finest``. A
+    LinkageError is raised if the motion ends before the last time.
     """
     use: TorqueParameters = motion.scene_linkage.drive[1]
     if _stands_in(use):

@@ -129,24 +129,11 @@ def exact_motion(
     tolerance: float = TOLERANCE,
 ) -> list[State]:
     """
-    Return values and rates of the input at some times.
+    Return values and rates of the input at some times, in [s] and in order.
 
-    Parameters
-    ----------
-    start
-        The state of the mechanism at 0: a `Motion`, or a `PlayMotion`.
-    acting
-        What acts, from 0 on.
-    times
-        Times, in [s], in order.
-    tolerance
-        Relative and absolute tolerance of a step.
-
-    Raises
-    ------
-    NoMotionError
-        The motion ends before the last time.
-
+    ``start`` is the state of the mechanism at 0, a `Motion` or a `PlayMotion`; ``acting`` are the
+    efforts from 0 on; ``tolerance`` is the relative and absolute tolerance of a step. A
+    NoMotionError is raised if the motion ends before the last time.
     """
     found: list[State] = []
     run = _ExactRun(start, tolerance)

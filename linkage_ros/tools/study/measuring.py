@@ -95,19 +95,11 @@ def time_in_turn(
     clock: Callable[[], float] | None = None,
 ) -> list[Spread]:
     """
-    Return the time that each contender takes per state, in [s].
+    Return the time that each candidate takes per state, in [s]; each is run once before.
 
-    Parameters
-    ----------
-    candidates
-        The contenders; each is run once before.
-    seconds
-        Approximate duration of all; the minimum number of rounds is made even if it takes longer.
-    progress
-        Called after each block with the fraction that is done, 0 to 1.
-    clock
-        Returns the time, in [s]; by default the processor time of the thread.
-
+    The whole takes about ``seconds``, or longer if the minimum number of rounds does. ``progress``
+    is called after each block with the fraction that is done, 0 to 1. ``clock`` returns the time,
+    in [s]; by default the processor time of the thread.
     """
     clock = clock or thread_clock()
     repeats, block_time = [], 0.0

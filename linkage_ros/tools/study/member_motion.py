@@ -69,20 +69,8 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
     """
     Return the crank at some times since the first tick, in [ns] and in order.
 
-    Parameters
-    ----------
-    motion
-        What the linkage does.
-    times
-        The times.
-    **changes
-        Parameters of a torque drive that differ from the scene's: its method, or its step.
-
-    Raises
-    ------
-    LinkageError
-        The input runs away before the last time.
-
+    ``changes`` are parameters of a torque drive that differ from the scene's: its method, or its
+    step. A LinkageError is raised if the input runs away before the last time.
     """
     if motion.path is not None:
         return [motion.path(time) for time in times]

@@ -76,26 +76,12 @@ def measure_solving(
     """
     Return the error of solving the linkages of a scene along their motion.
 
-    Parameters
-    ----------
-    motions
-        What the linkages do; the comparisons are those of the first.
-    rate
-        Ticks per second.
-    horizon
-        How long they move, in [s].
-    quick
-        Whether to take fewer states.
-    seconds
-        Time for the prices, in [s].
-    progress
-        Called with the fraction that is done.
+    The comparisons are made for the first of the motions. The rate is in [Hz], the horizon in [s];
+    ``seconds`` is the time for the prices. A ``quick`` measurement takes fewer states;
+    ``progress`` gets the fraction that is done.
 
-    Raises
-    ------
-    LinkageError
-        A package for the proof is missing, or nothing can be proved of the motion.
-
+    A LinkageError is raised if a package for the proof is missing, or nothing can be proved of the
+    motion.
     """
     check_installed('flint')
     count = _QUICK_STATES if quick else _STATES
