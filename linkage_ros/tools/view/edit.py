@@ -84,25 +84,14 @@ class _LinkageChange(NamedTuple):
 
 def edit_text(text: str, edit: Mapping[str, Any], name: str = _NAME) -> EditResult:
     """
-    Return the text of a linkage file after an edit; whether it still closes, its model tells.
+    Return the text of a linkage file after an edit; `build_model` then shows whether it closes.
 
-    Parameters
-    ----------
-    text
-        The text before.
-    edit
-        One kind with its values, such as ``{'side': {'B': 'right'}}``; and ``inputs``, at which
-        the page shows the linkage. Places and lengths are in [m], angles in [rad].
-    name
-        Name of the file, for errors.
+    The edit is one kind with its values, such as ``{'side': {'B': 'right'}}``, and ``inputs``, at
+    which the page shows the linkage. Places and lengths are in [m], angles in [rad]; ``name`` is
+    for errors.
 
-    Raises
-    ------
-    FileError
-        If the text is not that of a linkage.
-    LinkageError
-        If there is no such edit, or it does not fit to the linkage.
-
+    A FileError is raised if the text is not a linkage, a LinkageError if there is no such edit or
+    it does not fit the linkage.
     """
     kind = next((key for key in edit if key in _KINDS), None)
     if kind is None:

@@ -33,12 +33,8 @@ class HandCrank:
     """
     The inputs of a linkage, as hands on pages turn them.
 
-    Parameters
-    ----------
-    whole_turns
-        For each input, whether it turns without bounds: its angle is then continued across whole
-        turns, on the shorter way.
-
+    ``whole_turns`` marks inputs that turn without bounds: their angles continue across whole
+    turns, on the shorter way.
     """
 
     def __init__(self, whole_turns: Sequence[bool]) -> None:

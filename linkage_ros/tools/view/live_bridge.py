@@ -113,27 +113,11 @@ class _Call:
 
 class LiveBridge:
     """
-    Follows a linkage node, on a thread of its own.
+    Follows a linkage node, on its own thread; ``name`` becomes the node's full name.
 
-    Parameters
-    ----------
-    name
-        Name of the node; '' for the only one on the graph.
-    patience
-        How long the node and its scene are waited for, in [s].
-    domain
-        ROS domain; None for the one of the environment.
-
-    Attributes
-    ----------
-    name
-        Full name of the node.
-
-    Raises
-    ------
-    LinkageError
-        There is no such node, or there are several to choose from.
-
+    A name of '' takes the only node on the graph. ``patience`` is how long to wait for the node
+    and its scene, in [s]; a domain of None takes the ROS domain of the environment. A LinkageError
+    is raised if there is no such node, or there are several to choose from.
     """
 
     def __init__(

@@ -72,25 +72,13 @@ def build_model(
     text: str, name: str, *, whole: bool = True, shown: ViewState | None = None
 ) -> dict[str, Any]:
     """
-    Return the model of a linkage file.
+    Return the model of a linkage file; the name is for errors and the title.
 
-    Parameters
-    ----------
-    text
-        The file's text.
-    name
-        Its name, for errors and as a title.
-    whole
-        Whether what takes longer is wanted too: other assemblies, ranges, quality, warnings.
-    shown
-        How the page shows the linkage during a drag. Where it closes so, a linkage of pins is not
-        searched for its ranges, and its ``drawn`` has neither ``frame`` nor ``paths``.
+    With ``whole`` it has what takes longer too: other assemblies, ranges, quality, warnings.
+    ``shown`` is how the page shows the linkage during a drag. Where it closes so, a linkage of
+    pins is not searched for its ranges, and its ``drawn`` has neither ``frame`` nor ``paths``.
 
-    Raises
-    ------
-    FileError
-        If the text is not that of a linkage which closes.
-
+    A FileError is raised if the text is not a linkage that closes.
     """
     content = parse_yaml(text.encode(), name)
     written, shorthand = written_linkage(content)

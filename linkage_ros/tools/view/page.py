@@ -64,24 +64,11 @@ def page_html(
     node: str | None = None,
 ) -> str:
     """
-    Return the page.
+    Return the page of a linkage; see `linkage_ros.tools.view.model`.
 
-    Parameters
-    ----------
-    model
-        The linkage; see `linkage_ros.tools.view.model`.
-    mode
-        ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
-    can_save
-        Whether the server may save the user's file.
-    scene, node
-        Name of the scene whose sensors are read, and of the node; None without one.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed.
-
+    The mode is ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
+    ``can_save`` is whether the server may save the user's file. ``scene`` is the name of the scene
+    whose sensors are read. A LinkageError is raised if plotly is not installed.
     """
     data = {
         'mode': mode,

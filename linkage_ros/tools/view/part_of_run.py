@@ -65,13 +65,7 @@ def read_part(
     """
     Read a part of a run; see `read_run`. The layouts of its files say how much there is to read.
 
-    Raises
-    ------
-    LinkageError
-        If the bag cannot be read.
-    StoppedError
-        If the event was set.
-
+    A LinkageError is raised if the bag cannot be read, a StoppedError if the event was set.
     """
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
     with show_progress('read [MiB]') as advance:

@@ -70,11 +70,7 @@ def read_request(message: str) -> Request:
     """
     Read a message of a page.
 
-    Raises
-    ------
-    RequestError
-        It is too large, no JSON, or no request.
-
+    A RequestError is raised if it is too large, not JSON, or not a request.
     """
     if len(message) > LARGEST or len(message.encode('utf-8', 'surrogatepass')) > LARGEST:
         raise RequestError(f'is larger than {LARGEST} bytes', 'send a smaller linkage')
@@ -101,15 +97,8 @@ class RequestHandler:
     """
     Answers the requests of all pages of a server.
 
-    Parameters
-    ----------
-    name
-        Name of the linkage with which the server was opened.
-    scene
-        The scene with which it was opened; None for a linkage.
-    report
-        Called with the line of each defect of this package.
-
+    The server was opened with the linkage ``name`` and, if not None, the scene. ``report`` is
+    called with one line for each defect of this package.
     """
 
     def __init__(self, name: str, scene: SceneFiles | None, report: Callable[[str], Any]) -> None:
@@ -120,21 +109,10 @@ class RequestHandler:
 
     def answer_request(self, page: int, request: Request) -> str:
         """
-        Return the answer to a request, as JSON.
+        Return the answer to a request of the page with this number, as JSON.
 
-        Parameters
-        ----------
-        page
-            Number of the page that asks.
-        request
-            The request.
-
-        Returns
-        -------
-        answer : str
-            With ``ok``, or with ``error``: its text, one line; the key in the file; and the pin or
-            the link that it concerns. A defect of this package is such an error too.
-
+        It has ``ok``, or ``error``: its text, one line; the key in the file; and the pin or the
+        link concerned. A defect of this package is such an error too.
         """
         fields = _RequestFields(request.content, self._name, partial(self._sensors_of, page))
         try:
@@ -300,15 +278,7 @@ def closure_of(text: str, name: str) -> Closure:
 
 
 def encode_text(text: str, name: str) -> bytes:
-    """
-    Return the bytes of a file's text.
-
-    Raises
-    ------
-    FileError
-        It holds half of a surrogate pair, which UTF-8 has not.
-
-    """
+    """Return the bytes of a file's text; a FileError is raised for half a surrogate pair."""
     try:
         return text.encode()
     except UnicodeEncodeError as error:
@@ -328,15 +298,8 @@ def failure_answer(
     """
     Return the answer to a request that failed, as JSON.
 
-    Parameters
-    ----------
-    number
-        The number of the request; None if it has none.
-    error
-        Why it failed.
-    content
-        The request; the answer then has the pin or the link that the error concerns.
-
+    ``number`` is the number of the request; None if it has none. With the request as ``content``
+    the answer has the pin or the link that the error concerns.
     """
     where = error.key if isinstance(error, FileError) else error.where
     pin = None if content is None else _find_pin(error, content)

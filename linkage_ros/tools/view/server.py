@@ -82,15 +82,9 @@ class Server:
     """
     The server of a page.
 
-    Parameters
-    ----------
-    page
-        Returns the page; called in a thread, whenever a browser asks for it.
-    routes
-        What is served beside it.
-    report
-        Called with one line where something is refused for the first time, and with each defect.
-
+    ``page`` returns the page; it is called in a thread whenever a browser asks. ``routes`` are
+    served beside it. ``report`` is called with one line for the first refusal of a kind, and for
+    each defect.
     """
 
     def __init__(

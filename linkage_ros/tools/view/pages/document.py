@@ -45,28 +45,11 @@ def html_document(
     has_plots: bool = True,
 ) -> str:
     """
-    Return a page.
+    Return a page with a title, lines of HTML, and data for its script as JSON without NaN.
 
-    Parameters
-    ----------
-    title
-        Title of the window.
-    body
-        Lines of HTML.
-    data
-        Data of the script, as JSON holds them; numbers are finite.
-    styles, scripts
-        Files of this page beside those of all pages, in their order.
-    policy
-        Content policy; a page with a server must be allowed to ask it.
-    has_plots
-        Whether its scripts draw with Plotly, which is then part of the page.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is needed and not installed.
-
+    ``styles`` and ``scripts`` are its files beside the ones that all pages share, in their order.
+    The content policy of a page with a server must allow requests to it. With ``has_plots`` Plotly
+    is part of the page; a LinkageError is raised if it is not installed.
     """
     plotting = [f'<script>{_within_script(plotting_library())}</script>'] if has_plots else []
     return '\n'.join(

@@ -37,11 +37,7 @@ class RunClock:
     """
     Converts log times to run time.
 
-    Parameters
-    ----------
-    disorder
-        By how much a message may come too late without a jump of the clock, in [ns].
-
+    A message may come too late by ``disorder``, in [ns], without a jump of the clock.
     """
 
     def __init__(self, disorder: int = 0) -> None:
@@ -82,13 +78,8 @@ class RunClock:
         """
         Return the run times of messages that another thread has recorded, in [ns].
 
-        Parameters
-        ----------
-        logged
-            Their log times, in [ns]; they may deviate a little from those of the first thread.
-        behind
-            How many messages of the last call of `run_times` precede each.
-
+        Their log times, in [ns], may deviate a little from the first thread's. ``behind`` is how
+        many messages of the last call of `run_times` precede each.
         """
         since = np.maximum(logged - self._logged[behind], 0)
         next_ones = np.append(self._times[1:], _LATEST)
@@ -123,17 +114,9 @@ class Blocks:
     Reads a bag block by block, and counts.
 
     A block ends between two ticks: messages of one log time stay in one block, unless there are
-    more than any tick has.
-
-    Parameters
-    ----------
-    bag
-        The bag. If it is damaged, the part before the damage is read.
-    wanted
-        Topics whose messages are needed; messages of others are only counted.
-    progress
-        Receives the progress, and says whether to stop.
-
+    more than any tick has. Of a damaged bag the part before the damage is read. Messages of topics
+    that are not ``wanted`` are only counted. ``progress`` receives the progress, and says whether
+    to stop.
     """
 
     def __init__(self, bag: Bag, wanted: Collection[str], progress: Progress) -> None:
@@ -222,17 +205,8 @@ def rows_of(
     """
     Return the messages of a block by kind.
 
-    Parameters
-    ----------
-    block
-        The messages of each topic.
-    topics
-        Kind of each topic, one of `KINDS` or a kind of its own; topics without one are left out.
-    own
-        Distinguishes the run's joint states from the samples if they share a topic.
-    clock
-        The clock of the run.
-
+    ``topics`` has the kind of each topic, one of `KINDS` or its own kind; other topics are left
+    out. ``own`` distinguishes the run's joint states from the samples if they share a topic.
     """
     kinds: dict[str, list[Entry]] = {kind: [] for kind in (*topics.values(), *KINDS)}
     kinds[_OTHER_RECORDER] = kinds.pop(_OTHER_RECORDER)  # the last

@@ -90,18 +90,8 @@ def link_poses(
     """
     Return the poses of the links.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    prefix
-        Prefix of its joints' names in messages.
-    values
-        Joint values by name in messages, in [rad] or [m]; NaN where unknown. All have one length;
-        the inputs are among them.
-    inputs
-        Names of the driven joints in messages.
-
+    ``values`` are joint values, in [rad] or [m], by names in messages, which begin with the
+    prefix; NaN where unknown. All have one length; the inputs are among them.
     """
     known = {
         name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()

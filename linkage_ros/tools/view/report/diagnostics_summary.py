@@ -87,16 +87,10 @@ MOST_VALUES = 500
 
 class RecordedDiagnostics:
     """
-    Collects the diagnostics.
+    Collects the diagnostics, and the tracks of their events by kind.
 
-    Parameters
-    ----------
-    event_tracks
-        Lanes of the events, by kind: lost, told_open, told_toggle, told_limited, dropped and
-        health.
-    from_beginning
-        Whether the bag holds the beginning of the run; if not, counters do not start at 0.
-
+    The kinds are lost, told_open, told_toggle, told_limited, dropped and health. Counters start at
+    0 if the bag holds the beginning of the run.
     """
 
     def __init__(

@@ -53,13 +53,8 @@ class JointStates:
     """
     Decodes the messages of a topic.
 
-    Parameters
-    ----------
-    joints
-        Joints that come first; others follow in the order of their appearance.
-    others
-        Whether other joints may follow; if not, they are ignored.
-
+    The given joints come first. With ``others``, other joints follow in the order of their
+    appearance; else they are ignored.
     """
 
     def __init__(self, joints: Sequence[str] = (), *, others: bool = True) -> None:

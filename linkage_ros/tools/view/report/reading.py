@@ -164,28 +164,12 @@ def read_run(
     scene_of: Callable[[Bag], Scene] = recorded_scene,
 ) -> tuple[ReportedRun, Scene | None, str]:
     """
-    Read a bag for its page.
+    Return the contents of a bag for its page, its scene, and why the scene is missing.
 
-    Parameters
-    ----------
-    bag
-        The bag. If it is damaged, the part before the damage is shown.
-    window
-        The part of the run to show.
-    progress
-        Called with the progress; returns whether to stop.
-    scene_of
-        Returns the scene that a bag carries.
-
-    Returns
-    -------
-    run
-        Its contents.
-    scene
-        Its scene, if it carries one.
-    missing
-        Why the scene is missing, or cannot be built here; '' if it is complete.
-
+    Of a damaged bag the part before the damage is shown. ``progress`` is called with the progress
+    and returns whether to stop; ``scene_of`` returns the scene that a bag carries. The scene is
+    None if the bag carries none; the reason is '' if the scene is complete, else it may also be
+    that the scene cannot be built here.
     """
     scene, missing = None, ''
     reader: SceneRun | ForeignRun

@@ -36,13 +36,8 @@ class CrankHistory:
     """
     Driven joints of a linkage, by the last accepted sample.
 
-    Parameters
-    ----------
-    linkage
-        The pipeline of the linkage, driven from a topic.
-    columns
-        Columns of the joints that its samples name, among those of all samples.
-
+    A topic drives the linkage; ``columns`` are the columns of the joints that its samples name,
+    among the columns of all samples.
     """
 
     def __init__(self, linkage: LinkagePipeline, columns: Sequence[int]) -> None:
