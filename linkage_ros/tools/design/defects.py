@@ -200,7 +200,9 @@ def _order_defect(design: Design, path: Traversal) -> Defect:
     directions: Array = path.directions - path.directions[0]
     visited = np.argsort(np.mod(directions, tau) if path.turns else directions)
     visits = ', '.join(f'{i + 1} ({_degrees_text(design.wanted[i].crank)})' for i in visited)
-    return Defect('order', f'a crank that goes one way comes by the positions as {visits}')
+    return Defect(
+        'order', f'a crank that turns one way passes the positions in the order {visits}'
+    )
 
 
 def _sides_text(met: tuple[AchievedPosition, ...]) -> str:
@@ -275,7 +277,7 @@ class Needs(NamedTuple):
         if self.kind and self.kind not in _WORDS:
             raise SynthesisError(
                 self.kind,
-                'is no kind of four-bar',
+                'is not a kind of four-bar',
                 did_you_mean(self.kind, _WORDS, f'name one of {list_names(_WORDS)}'),
             )
 
@@ -295,7 +297,7 @@ def _missed_needs(assessment: Assessment, needs: Needs) -> list[tuple[str, float
     if needs.usable:
         missed += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
     if needs.kind and not _is_kind(assessment, needs.kind):
-        missed.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
+        missed.append((f'a {assessment.kind.name}, not {needs.kind}', 1.0))
     if assessment.transmission < needs.transmission:
         angle, wanted = degrees(assessment.transmission), degrees(needs.transmission)
         text = f'a transmission angle of {angle:.4g}°, not {wanted:.4g}°'

@@ -78,7 +78,9 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
             )
     for name, place in pivots.items():
         if not abs(place) <= FARTHEST:
-            raise SynthesisError(name, f'({place.real}, {place.imag}) is no place', 'give numbers')
+            raise SynthesisError(
+                name, f'({place.real}, {place.imag}) is not a place', 'give numbers'
+            )
     spread = max(abs(one.place - other.place) for one, other in combinations(poses, 2))
     for (i, one), (j, other) in combinations(enumerate(poses, 1), 2):
         if (
@@ -377,12 +379,12 @@ def _check_link(
         raise SynthesisError(
             name,
             f'its three places{seen} lie on a line at {slope:.4g}°, so that its {kind} pivot is '
-            f'infinitely far: a slider along that line{slider} does it, not a link',
+            f'infinitely far: a slider along that line{slider} guides it, not a link',
             'choose another place for it, or turn a pose',
         )
     raise SynthesisError(
         name,
-        f'is so near a pole that not a digit of its {kind} pivot is certain',
+        f'is so near a pole that its {kind} pivot has no certain digit',
         'choose another place for it',
     )
 

@@ -84,7 +84,7 @@ def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[Design
     if len(named) != 1:
         raise LinkageError(
             list_names(named, ' and ') or 'the task',
-            'stand for two tasks' if named else 'is not said',
+            'stand for two tasks' if named else 'is not given',
             f'name one of {list_names(tasks)}',
         )
     work = {
@@ -99,7 +99,7 @@ def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[Design
 
 def _solve_pairs(typed: argparse.Namespace, search: DesignSearch) -> list[DesignAnswer]:
     rows = typed.pair or numbers_of(typed.pairs, (2,))
-    crank, rocker = ([typed.angles.read(row[i]) for row in rows] for i in (0, 1))
+    crank, rocker = ([typed.angles.to_radians(row[i]) for row in rows] for i in (0, 1))
     return _of_pairs(crank, rocker, typed, search)
 
 
@@ -285,7 +285,7 @@ def _solve_path(typed: argparse.Namespace, search: DesignSearch) -> list[DesignA
     task = PathTask(
         tuple(complex(row[0], row[1]) for row in rows),
         typed.closed,
-        None if timing is None else tuple(map(typed.angles.read, timing)),
+        None if timing is None else tuple(map(typed.angles.to_radians, timing)),
         typed.free_zeros,
         search.needs.needs_full_turn,
     )
@@ -316,7 +316,7 @@ def _dead_centres(typed: argparse.Namespace, search: DesignSearch) -> list[Desig
         if getattr(typed, name) is None:
             option = f'--{name.replace("_", "-")}'
             raise LinkageError('--swing and --time-ratio', f'{option} is missing', f'add {option}')
-    task = DeadCentreTask(typed.angles.read(typed.swing), typed.time_ratio, typed.ground)
+    task = DeadCentreTask(typed.angles.to_radians(typed.swing), typed.time_ratio, typed.ground)
     offset = f'{degrees(task.imbalance_angle):.6g}° more than half a turn for the longer stroke'
     return [
         DesignAnswer('dead centres', design, assess(design), [('crank', offset)])
@@ -339,7 +339,7 @@ def _solve_motion(typed: argparse.Namespace, _search: DesignSearch) -> list[Desi
     if len(pivots) != 2:
         reason = f'was given {len(pivots)} time(s)'
         raise LinkageError(f'--{kind}-pivot', reason, "name the crank's and the rocker's")
-    poses = [Pose(complex(x, y), typed.angles.read(angle)) for x, y, angle in typed.pose]
+    poses = [Pose(complex(x, y), typed.angles.to_radians(angle)) for x, y, angle in typed.pose]
     solve = from_fixed_pivots if fixed else from_moving_pivots
     design, links = solve(poses, *pivots)
     (one, one_digits), (other, other_digits) = (

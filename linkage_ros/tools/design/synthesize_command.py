@@ -291,7 +291,7 @@ def _read_ratio(text: str) -> float:
     try:
         return float(Fraction(text))
     except (ValueError, ZeroDivisionError, OverflowError):
-        raise argparse.ArgumentTypeError(f'{text!r} is no ratio; write 10/9 or 1.2') from None
+        raise argparse.ArgumentTypeError(f'{text!r} is not a ratio; write 10/9 or 1.2') from None
 
 
 def _add_freedoms(parser: argparse.ArgumentParser) -> None:
@@ -337,8 +337,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     except LinkageError as error:
         if arguments.angles.in_degrees:
             raise
-        told = arguments.angles.told
-        raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
+        parts = map(arguments.angles.convert_text, (error.where, error.reason, error.remedy))
+        raise LinkageError(*parts) from None
 
 
 def _run_design(arguments: argparse.Namespace) -> int:
@@ -374,7 +374,9 @@ def find_solutions(
 
 def needs_of(typed: argparse.Namespace) -> Needs:
     """Return the requirements; if there are any, a solution must also be free of defects."""
-    needs = Needs(typed.need, typed.angles.read(typed.min_transmission), typed.max_link_ratio)
+    needs = Needs(
+        typed.need, typed.angles.to_radians(typed.min_transmission), typed.max_link_ratio
+    )
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())
 
@@ -410,8 +412,8 @@ def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
-    told = arguments.angles.told
-    lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
+    convert = arguments.angles.convert_text
+    lines = [convert(f'Designed: {answer.title}'), command, *map(convert, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
     names = ' and '.join(one.name for one in answer.assessment.defects)
     print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

@@ -351,7 +351,7 @@ def generate_function(
 
     """
     if not isinstance(function, str):
-        raise TypeError(f"function: {quote(function)} is not a text; write it as 'log10(x)'")
+        raise TypeError(f"function: {quote(function)} is not a string; write it as 'log10(x)'")
     if points < 3:
         raise SynthesisError('points', f'there are {points}', 'ask for 3 or more')
     task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)

@@ -301,7 +301,7 @@ class Count(NamedTuple):
     def __str__(self) -> str:
         """Return the text for a user, such as '3 solutions, 2 imaginary'."""
         parts = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
-        kinds = ('imaginary', 'with infinite links', 'whose links cannot be told')
+        kinds = ('imaginary', 'with infinite links', 'with uncertain links')
         parts += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
         return ', '.join(parts)
 
@@ -501,6 +501,6 @@ def _undetermined_error(count: int) -> SynthesisError:
     return SynthesisError(
         'pairs',
         f'the {count} equations depend on each other, so that any number of four-bars fits or '
-        'none, or the pairs are too near each other to tell',
+        'none, or the pairs are too close to decide',
         'move one of the angles, or leave the zeros as they are',
     )

@@ -239,13 +239,13 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
     """
     if not SHORTEST <= ground <= FARTHEST:
         remedy = f'give it one from {SHORTEST:g} to {FARTHEST:g}'
-        raise SynthesisError('ground', f'{ground!r} m is no length', remedy)
+        raise SynthesisError('ground', f'{ground!r} m is not a length', remedy)
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     for number, pair in pairs:
         if not all(abs(angle) <= _FARTHEST for angle in pair):
             raise SynthesisError(
                 f'pair {number}',
-                f'{_pair_text(pair)} is no pair of angles',
+                f'{_pair_text(pair)} is not a pair of angles',
                 f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
             )
     for (i, one), (j, other) in combinations(pairs, 2):
@@ -292,14 +292,14 @@ def dependence_error(crank: Sequence[float], rocker: Sequence[float]) -> Synthes
                 f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground '
                 'line: a '
                 'four-bar that has one has the other',
-                'give another pair in place of one of them',
+                'replace one of the pairs',
             )
     P, Q, R = centre_cosines(crank, rocker)
     matrix = np.stack((P, Q), 1)
     rest = R - matrix @ np.linalg.lstsq(matrix, R, _CONSISTENT)[0]
     if np.linalg.norm(rest) < _CONSISTENT * np.linalg.norm(R):
         return SynthesisError(
-            'the pairs', 'say so little that any number of four-bars has them all', MOVE
+            'the pairs', 'do not determine a four-bar: any number of four-bars has them all', MOVE
         )
     return SynthesisError(
         'the pairs',
@@ -458,7 +458,7 @@ def exact_four_bar(
     if not solution.reliable_digits.all():
         raise SynthesisError(
             'the pairs',
-            f'do not tell how long the links are: rounding their angles changes one by '
+            f'do not determine the lengths of the links: rounding their angles changes one by '
             f'{parts.max():.0%}',
             'move the pairs apart',
         )

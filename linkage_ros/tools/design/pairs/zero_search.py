@@ -137,7 +137,7 @@ def search_zeros(
         raise SynthesisError(
             f'pairs {pairs}',
             f'none of {count} zeros of crank and rocker gives a four-bar without a defect',
-            'try more of them, or move an angle',
+            'try more zeros, or move an angle',
         )
     spacing = pi / count**0.5
     best = [_polish(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]

@@ -82,7 +82,7 @@ class PathTask:
         shortest, longest = self.links
         if not 0.0 < shortest < longest < inf:
             raise SynthesisError(
-                'links', f'from {shortest:g} to {longest:g} of the path', 'say e.g. 0.2 to 4'
+                'links', f'from {shortest:g} to {longest:g} of the path', 'write e.g. 0.2 to 4'
             )
 
     @property
@@ -97,7 +97,7 @@ def _check_points(points: tuple[complex, ...], closed: bool) -> None:
     for number, point in enumerate(points, 1):
         if not (isfinite(point.real) and isfinite(point.imag)):
             raise SynthesisError(
-                f'point {number}', f'({point.real:g}, {point.imag:g}) is no place', 'correct it'
+                f'point {number}', f'({point.real:g}, {point.imag:g}) is not a place', 'correct it'
             )
     for number, (point, after) in enumerate(pairwise(points), 1):
         if point == after:
@@ -126,7 +126,7 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
     if not (all(step > 0.0 for step in steps) or all(step < 0.0 for step in steps)):
         raise SynthesisError(
             'timing',
-            'the crank angles go neither up nor down all the way',
+            'the crank angles neither increase nor decrease throughout',
             'write on beyond 360° or below 0° where they wrap',
         )
     travel = abs(timing[-1] - timing[0])
