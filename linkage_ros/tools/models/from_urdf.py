@@ -102,9 +102,9 @@ def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: s
     candidates.sort(key=lambda each: each[0])
     least, closure = candidates[0]
     if least > _FOUND:
-        raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
+        raise DefinitionError('assembly', f'no assembly closes the loops {where}', _REMEDY)
     if len(candidates) > 1 and candidates[1][0] < least + _SAME:
-        raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
+        raise DefinitionError('assembly', f'several assemblies close the loops {where}', _REMEDY)
     if closure.linkage.pose == AssemblyPose(inputs, {}):
         bare = Closure(replace(closure.linkage, pose=None))
         if _are_near(usual_inputs(bare), inputs) and _largest_error(bare, inputs, poses) <= _FOUND:

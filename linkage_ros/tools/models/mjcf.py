@@ -443,7 +443,7 @@ def _refuse_massless(parts: Sequence[ModelPart]) -> None:
                     count,
                     f'masses.{link}.mass',
                     'is 0, and MuJoCo moves no massless body',
-                    'write a small mass, or omit it for that of its shape',
+                    'write a small mass, or omit it: its shape then has one',
                 )
 
 
@@ -454,7 +454,7 @@ def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, float]:
             raise PartError(
                 count,
                 'loads.gravity',
-                f'[{format_numbers(*gravity)}] is another than that of the first linkage',
+                f'[{format_numbers(*gravity)}] differs from the first linkage',
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )

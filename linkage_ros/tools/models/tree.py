@@ -273,7 +273,7 @@ def _missing_error(linkage: Linkage) -> DefinitionError:
     several = len(lost) > 1
     return DefinitionError(
         'joints',
-        f'the published ones do not tell where link{"s" if several else ""} '
+        f'the published joints do not determine where link{"s" if several else ""} '
         f'{list_names(map(quote, lost), " and ")} {"stand" if several else "stands"}',
         f'add to joints: {", ".join(joint_text(name, joint) for name, joint in added.items())}',
     )

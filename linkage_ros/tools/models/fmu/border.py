@@ -102,7 +102,7 @@ class GuardedSlave(Fmi3Slave):
             raise LinkageError(
                 call,
                 f'there is no value reference {reference}',
-                f'use those of the model description, 0 to {len(self.vars) - 1}',
+                f'use 0 to {len(self.vars) - 1}, as in the model description',
             )
         return variable
 

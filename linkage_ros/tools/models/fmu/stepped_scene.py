@@ -320,7 +320,7 @@ def _refuse_scene(scene: Scene) -> None:
     for name, fault in scene.faults.items():
         if fault.kind == 'time_jump':
             raise content.error(
-                f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
+                f'faults.{name}', 'sets the clock, which the importer keeps', 'leave it out'
             )
     for scene_linkage in scene.linkages:
         drive, _ = scene_linkage.drive
