@@ -210,7 +210,7 @@ def _advice_line(budget: Budget, knob: Knob) -> str:
         left = rest + better.error.worst
         cost = _cost_text(budget, knob, better)
         return f'{error_text(left)} rad are left with: {better.instruction} ({cost})'
-    return 'nothing that was measured makes it less'
+    return 'no measured setting reduces it'
 
 
 def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:

@@ -104,8 +104,8 @@ def _linkage_motion(
     if like is None:
         raise scene_linkage.content.error(
             'drive',
-            'topic has no motion of its own',
-            'say what its crank does: --like sine, or --like BAG with its samples',
+            'topic has no own motion',
+            'choose a motion of its crank: --like sine, or --like BAG with its samples',
         )
     return motion._replace(
         path=_sine_path(closure),
