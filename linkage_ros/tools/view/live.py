@@ -75,7 +75,9 @@ def add_live(app: web.Application, bridge: Bridge) -> None:
                     if content is None or len(waiting) >= _MOST_WAITING:
                         refused = content is None
                         server.count_refusal(
-                            'a message that is no request' if refused else 'a haste'
+                            'a message that is not a request'
+                            if refused
+                            else 'a request while too many wait'
                         )
                         continue
                     task = asyncio.create_task(_answer(socket, bridge, content))

@@ -225,7 +225,7 @@ class LiveBridge:
             return names[0]
         if wanted:
             remedy = did_you_mean(wanted, names, _node_remedy(names))
-            raise LinkageError(f'--node {name}', 'is no linkage node on this graph', remedy)
+            raise LinkageError(f'--node {name}', 'is not a linkage node on this graph', remedy)
         reason = f'there are {len(names)} linkage nodes' if names else 'there is no linkage node'
         raise LinkageError('--node', f'{reason} on this graph', _node_remedy(names))
 
@@ -494,7 +494,9 @@ class LiveBridge:
         number = content.get('input', 0)
         if type(number) is not int or not 0 <= number < len(run.topic_driven.input_names):
             count = len(run.topic_driven.input_names)
-            raise LinkageError('input', f'{quote(number)} is none', f'name one of {count}')
+            raise LinkageError(
+                'input', f'{quote(number)} is not the index of an input', f'name one of {count}'
+            )
         at = [0.0] * len(run.topic_driven.input_names)
         if self._cranks is not None and run.topic_driven is run.drawn_linkage:
             at = list(self._cranks.angles)
@@ -620,5 +622,5 @@ def _send_reply(future: Future[str], line: str) -> None:
 
 def _node_remedy(names: Sequence[str]) -> str:
     if names:
-        return f'name one of them: {list_names(names)}'
-    return 'start one, in the same ROS_DOMAIN_ID (linkage run says it)'
+        return f'name one of {list_names(names)}'
+    return 'start one, in the same ROS_DOMAIN_ID (linkage run prints it)'

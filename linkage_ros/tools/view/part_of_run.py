@@ -47,7 +47,9 @@ def window_of(since: float | None, until: float | None) -> Window:
     ends = []
     for option, value, default in (('--since', since, 0), ('--until', until, Window().until)):
         if value is not None and (not isfinite(value) or not 0.0 <= value < 1e9):
-            raise LinkageError(option, f'{value} is no time in a run', 'write seconds from 0 on')
+            raise LinkageError(
+                option, f'{value} is not a time in a run', 'write seconds from 0 on'
+            )
         ends.append(default if value is None else round(value * 1e9))
     if ends[0] >= ends[1]:
         raise LinkageError('--until', f'{until} is not after --since', 'write a later one')

@@ -79,7 +79,7 @@ def read_request(message: str) -> Request:
     except (ValueError, RecursionError):
         raise RequestError('is not JSON', 'send an object with id and do') from None
     if not isinstance(content, dict):
-        raise RequestError('is no object', 'send an object with id and do')
+        raise RequestError('is not an object', 'send an object with id and do')
     number: Any = content.get('id')
     if type(number) not in (int, float) or not abs(number) <= 2**53:
         raise RequestError('has no id', 'send a number as id')
@@ -209,7 +209,7 @@ def _answer_open(fields: _RequestFields) -> dict[str, Any]:
     name, names = fields.content.get('name'), linkage_names()
     if not isinstance(name, str) or name not in names:
         remedy = did_you_mean(str(name), names, f'name one of {list_names(names)}')
-        raise LinkageError('name', f'{quote(name)} is no shipped linkage', remedy)
+        raise LinkageError('name', f'{quote(name)} is not a shipped linkage', remedy)
     return build_model(shipped_path(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
 
 

@@ -178,7 +178,7 @@ class Server:
         finally:
             self._sockets.pop(socket, None)
             if socket.exception() is not None:
-                self.count_refusal('what is no WebSocket message')
+                self.count_refusal('what is not a WebSocket message')
 
     async def _has_place(self, path: str) -> bool:
         """Return whether one more page may be open, if need be after one that is being closed."""
@@ -202,7 +202,7 @@ class Server:
         if not compare_digest(token.encode('utf-8', 'replace'), self._token.encode()):
             return self._refuse(404, 'a request without the token')
         if request.method not in ('GET', 'HEAD'):
-            return self._refuse(405, 'a request that is no GET')
+            return self._refuse(405, 'a request that is not a GET')
         try:
             response: web.StreamResponse = await handler(request)
         except web.HTTPException:
