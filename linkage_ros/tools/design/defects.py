@@ -49,6 +49,27 @@ _IN_LINE = 1e-5
 """Below this transmission angle coupler and rocker are in line, in [rad]; near a toggle the angle
 is the root of the rounding error of the lengths."""
 
+# For each word the ends of Barker's codes that match it.
+_KINDS = {
+    'crank-rocker': ('CRR',),
+    'rocker-crank': ('RRC',),
+    'double-crank': ('CCC',),
+    'drag-link': ('CCC',),
+    'double-rocker': ('GRCR', 'SRCR'),
+    'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
+}
+_TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
+_WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
+
+# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
+# shortest at a change point. No word selects equal links, as in a parallelogram.
+_CODES = tuple(
+    tuple(code for code, _ in names) for names in (GRASHOF, TRIPLE_ROCKERS, CHANGE_POINTS)
+)
+
+_FAR = 10.0
+"""Weight of a defect, relative to a number that misses its requirement by its own size."""
+
 
 class Defect(NamedTuple):
     """A reason why a linkage cannot move as designed: a name, and a sentence."""
@@ -222,28 +243,6 @@ def _positions_text(numbers: Iterable[int]) -> str:
 
 def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.6g}°'
-
-
-# For each word the ends of Barker's codes that match it.
-_KINDS = {
-    'crank-rocker': ('CRR',),
-    'rocker-crank': ('RRC',),
-    'double-crank': ('CCC',),
-    'drag-link': ('CCC',),
-    'double-rocker': ('GRCR', 'SRCR'),
-    'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
-}
-_TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
-_WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
-
-# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
-# shortest at a change point. No word selects equal links, as in a parallelogram.
-_CODES = tuple(
-    tuple(code for code, _ in names) for names in (GRASHOF, TRIPLE_ROCKERS, CHANGE_POINTS)
-)
-
-_FAR = 10.0
-"""Weight of a defect, relative to a number that misses its requirement by its own size."""
 
 
 class Needs(NamedTuple):

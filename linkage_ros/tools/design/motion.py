@@ -53,6 +53,19 @@ from numpy.typing import ArrayLike
 SAME = 1e-12
 """Angles nearer than this count as equal, in [rad], and places, relative to the motion."""
 
+Place: TypeAlias = tuple[Twofold, Twofold]
+"""Its x and y coordinates."""
+
+TRUSTED = 2.0
+"""Bound of a pivot's error, in units of roundoff times sensitivity: one for the rounding of the
+inputs, and one for the computation, whose measured error is a third of that."""
+
+_LONGEST = 1e9
+"""In chords: the length of a longer link is indistinguishable from infinite."""
+
+_NEAR = 1e-3
+"""Places nearer than this, relative to the motion, are at the pole rather than on a line."""
+
 
 class Pose(NamedTuple):
     """A wanted pose of the coupler: the origin of its frame, in [m], and its angle, in [rad]."""
@@ -114,10 +127,6 @@ def place_text(place: complex) -> str:
     return f'({place.real:.6g}, {place.imag:.6g}) m'
 
 
-Place: TypeAlias = tuple[Twofold, Twofold]
-"""Its x and y."""
-
-
 class PoleCircle(NamedTuple):
     """A circle; inf or NaN if the places lie on a line, or two of them are equal."""
 
@@ -177,11 +186,6 @@ def _place_at(places: Place, index: int) -> Place:
 
 def _subtract_places(one: Place, other: Place) -> Place:
     return subtract(one[0], other[0]), subtract(one[1], other[1])
-
-
-TRUSTED = 2.0
-"""Bound of a pivot's error, in units of roundoff times sensitivity: one for the rounding of the
-inputs, and one for the computation, whose measured error is a third of that."""
 
 
 class MotionLinks(NamedTuple):
@@ -266,13 +270,6 @@ def _as_twofold(numbers: ArrayLike) -> Twofold:
 
 def _broadcast_all(*numbers: ArrayLike) -> list[Any]:
     return list(np.broadcast_arrays(*numbers))
-
-
-_LONGEST = 1e9
-"""In chords: the length of a longer link is indistinguishable from infinite."""
-
-_NEAR = 1e-3
-"""Places nearer than this, relative to the motion, are at the pole rather than on a line."""
 
 
 def from_moving_pivots(

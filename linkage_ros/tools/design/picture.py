@@ -66,6 +66,14 @@ _BEHIND_TEXT = '#5f5f5f'
 _EVERY = 6
 """Every so many places of a path are obstacles for a number."""
 
+_DRAWN, _DRAWN_OF_PATH = 6, 4
+"""Most positions that are drawn; fewer for a path, which should be visible between them."""
+
+_TINY = 1.0 / 25.0
+"""A link shorter than this, relative to the picture, is drawn again, enlarged."""
+
+_MAGNIFIED = 4
+
 
 def paint_wanted(axes: Any, design: Design, shown: Sequence[DesignPose], picture: float) -> None:
     """Paint rays to wanted rocker pins, crosses at wanted places, frames at wanted poses."""
@@ -253,15 +261,6 @@ def _link_ends(pose: DesignPose, link: str) -> dict[str, complex]:
 def _link_length(pose: DesignPose, link: str) -> float:
     one, other = _link_ends(pose, link).values()
     return abs(other - one)
-
-
-_DRAWN, _DRAWN_OF_PATH = 6, 4
-"""Most positions that are drawn; fewer for a path, which should be visible between them."""
-
-_TINY = 1.0 / 25.0
-"""A link shorter than this, relative to the picture, is drawn again, enlarged."""
-
-_MAGNIFIED = 4
 
 
 def draw_design(

@@ -33,6 +33,16 @@ Array = NDArray[np.float64]
 _SAMPLES = 481
 _TURNS = (False, False)
 
+_UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
+_ROUNDING = 1e-9
+"""Smaller errors, relative to the linkage's size, count as none."""
+
+_EVERY = 6
+"""Every so many points of a curve are obstacles for a number."""
+
+_NUMBERED = 12
+"""With more positions only every second is numbered, or every third, and so on."""
+
 
 class DesignPose(NamedTuple):
     """A design at one of its positions, in the assembly that meets it."""
@@ -136,17 +146,6 @@ def _sweep_branch(
     relative, rocker = np.unwrap(np.array(joints), axis=0).T
     at = np.array(crank)
     return DesignBranch(side == own, limited, at, rocker, relative + at, tuple(trace))
-
-
-_UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
-_ROUNDING = 1e-9
-"""Smaller errors, relative to the linkage's size, count as none."""
-
-_EVERY = 6
-"""Every so many points of a curve are obstacles for a number."""
-
-_NUMBERED = 12
-"""With more positions only every second is numbered, or every third, and so on."""
 
 
 def is_numbered(number: int, count: int) -> bool:

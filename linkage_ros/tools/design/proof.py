@@ -40,6 +40,12 @@ Flags = NDArray[np.bool_]
 SAME = 1e-9
 """Angles nearer than this count as equal, in [rad]; the lengths' error is far below."""
 
+SIDES: tuple[Assembly, Assembly] = ('left', 'right')
+
+_MARKEDLY = 2.0
+"""An assembly is better if the error of the other is this many times larger. At a toggle, where
+the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
+
 
 class Mobility(NamedTuple):
     """The mobility of four-bars."""
@@ -200,13 +206,6 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
         np.take_along_axis(angles, least, -1)[..., 0],
         np.take_along_axis(places, least, -1)[..., 0],
     )
-
-
-SIDES: tuple[Assembly, Assembly] = ('left', 'right')
-
-_MARKEDLY = 2.0
-"""An assembly is better if the error of the other is this many times larger. At a toggle, where
-the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
 
 
 class AchievedPosition(NamedTuple):

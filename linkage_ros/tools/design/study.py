@@ -28,13 +28,6 @@ from linkage_ros.errors import check_installed
 import numpy as np
 from numpy.typing import NDArray
 
-
-def scipy_optimize() -> Any:
-    """Return scipy.optimize, for fits."""
-    check_installed('scipy', "pip install 'linkage_ros[design]'")
-    return import_module('scipy.optimize')
-
-
 Array = NDArray[np.float64]
 
 CHUNK = 16384
@@ -45,6 +38,12 @@ _MOST_CHUNKS = 16
 
 _FEWEST_TASKS = 16
 """Tasks for each thread before they grow, so that the last thread does not finish far behind."""
+
+
+def scipy_optimize() -> Any:
+    """Return scipy.optimize, for fits."""
+    check_installed('scipy', "pip install 'linkage_ros[design]'")
+    return import_module('scipy.optimize')
 
 
 class Problem(Protocol):

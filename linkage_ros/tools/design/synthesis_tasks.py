@@ -39,6 +39,8 @@ _SHIFT = 0.01
 
 Angles = Sequence[float]
 
+_LINKS = ('crank', 'coupler', 'rocker')
+
 
 class DesignAnswer(NamedTuple):
     """A solution."""
@@ -137,9 +139,6 @@ def _pairs_facts(pairs: ThreePairs) -> list[tuple[str, str]]:
         ('digits to trust', f'{", ".join(digits)}, of lengths worked out from these angles'),
         (f'{_SHIFT}° on one angle', f'moves {" %, ".join(moves)} %, at most'),
     ]
-
-
-_LINKS = ('crank', 'coupler', 'rocker')
 
 
 def _search_answers(

@@ -49,6 +49,14 @@ from linkage_ros.tools.design.synthesis_tasks import (
 
 # Tables of a designed four-bar: its links, its proof, its quality.
 
+_NOT_MET = 1
+"""Exit code if there are solutions, but none meets the requirements."""
+
+_LISTED = 3
+"""Default number of solutions that a search lists."""
+
+EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
+
 
 def solution_tables(
     answer: DesignAnswer, title: str, needs: Needs, angles: AngleUnit
@@ -132,17 +140,6 @@ def _assessment_facts(
         yield 'defects', 'none: order, branch and circuit are right'
     for missed in unmet_needs(assessment, needs):
         yield 'lacks what is needed', angles.convert_text(missed)
-
-
-_NOT_MET = 1
-"""Exit code if there are solutions, but none meets the requirements."""
-
-
-_LISTED = 3
-"""Default number of solutions that a search lists."""
-
-
-EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -46,6 +46,25 @@ _JUMP = 0.1
 _ROUNDING = 1e-12
 """Smaller fractions of a function's values are rounding."""
 
+Range = tuple[float, float]
+"""First and last value of a range; it may decrease."""
+
+_MOST = 1000
+"""Most precision points; more do not improve a four-bar."""
+
+_ERROR_SAMPLES = 720
+
+_ERROR_ZOOMS = 4
+"""Zooms on a maximum, each 32 times closer; then its height has all digits."""
+
+_GRID = 64
+
+_SUMMITS = 8
+"""Number of maxima that are refined: the errors of a good design are nearly equal."""
+
+_SAME = 1e-9
+"""In [rad]: a loop that opens nearer than this to the end of a range counts as closed there."""
+
 
 def check_defined(function: Expression, low: float, high: float) -> None:
     """
@@ -141,13 +160,6 @@ def _rounded_text(x: float, span: float) -> str:
     """Return a place with the digits that matter in a range of this width."""
     # Adding 0 makes 0 of -0.
     return f'{round(x, 10 - floor(log10(span))) + 0.0:.10g}'
-
-
-Range = tuple[float, float]
-"""First and last value of a range; it may decrease."""
-
-_MOST = 1000
-"""Most precision points; more do not improve a four-bar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -364,20 +376,6 @@ def generate_function(
         return nearest_four_bar(crank, rocker, ground)
     design, _ = exact_four_bar(crank, rocker, ground)
     return design
-
-
-_ERROR_SAMPLES = 720
-
-_ERROR_ZOOMS = 4
-"""Zooms on a maximum, each 32 times closer; then its height has all digits."""
-
-_GRID = 64
-
-_SUMMITS = 8
-"""Number of maxima that are refined: the errors of a good design are nearly equal."""
-
-_SAME = 1e-9
-"""In [rad]: a loop that opens nearer than this to the end of a range counts as closed there."""
 
 
 class StructuralError(NamedTuple):

@@ -80,6 +80,9 @@ _STEPS = 8
 _VAGUE = 0.1
 """Largest relative uncertainty of a link."""
 
+_NEARLY_REAL = 1e-3
+"""Largest imaginary part of a root that is still polished; rounding splits a double root so."""
+
 
 class DividedDifferences(NamedTuple):
     """The equations of the other pairs minus the first, as rows of length 1."""
@@ -283,10 +286,6 @@ def _pin_places(solution: Solution) -> tuple[NDArray[np.complex128], Array]:
     lengths = solution.lengths[::2]
     sensitivity = solution.sensitivity[[0, 2]] + np.abs(lengths) * solution.sensitivity[3:]
     return lengths * np.exp(1j * solution.zeros), sensitivity
-
-
-_NEARLY_REAL = 1e-3
-"""Largest imaginary part of a root that is still polished; rounding splits a double root so."""
 
 
 class Count(NamedTuple):

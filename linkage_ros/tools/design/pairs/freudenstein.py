@@ -60,6 +60,29 @@ from linkage_ros.tools.design.proof import assemble
 import numpy as np
 from numpy.typing import ArrayLike
 
+MOVE = 'move one of the angles'
+
+_SAME = 1e-12
+"""Angles nearer than this count as equal, in [rad]."""
+
+_FARTHEST = 1e9
+"""Larger angles, in [rad], have lost the digits of their direction."""
+
+_CONSISTENT = 1e-9
+"""Equations with a smaller relative residual do not contradict each other."""
+
+TRUSTED = 4.0
+"""Bound of the error of a length, in units of roundoff times sensitivity; measured."""
+
+LONGEST = 1e9
+"""In grounds: the length of a longer link is indistinguishable from infinite."""
+
+_NOISE = TRUSTED * UNIT_ROUNDOFF
+_SHAKEN = 0.1
+
+_BLOCK = 2048
+"""Triples of pairs that are computed at once: they stay in the cache."""
+
 
 class System(NamedTuple):
     """Freudenstein's equation for three pairs, and its solution for a ground of length 1."""
@@ -214,18 +237,6 @@ def _matrix_norm(x: Array, y: Array, z: Array) -> Array:
     return np.asarray(np.sqrt(mean + 2.0 * width * np.cos(turned)))
 
 
-MOVE = 'move one of the angles'
-
-_SAME = 1e-12
-"""Angles nearer than this count as equal, in [rad]."""
-
-_FARTHEST = 1e9
-"""Larger angles, in [rad], have lost the digits of their direction."""
-
-_CONSISTENT = 1e-9
-"""Equations with a smaller relative residual do not contradict each other."""
-
-
 def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[DesignRequest, ...]:
     """Return pairs as wanted positions."""
     return tuple(DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True))
@@ -314,19 +325,6 @@ def _pair_text(pair: tuple[float, float]) -> str:
 
 def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.10g}°'
-
-
-TRUSTED = 4.0
-"""Bound of the error of a length, in units of roundoff times sensitivity; measured."""
-
-LONGEST = 1e9
-"""In grounds: the length of a longer link is indistinguishable from infinite."""
-
-_NOISE = TRUSTED * UNIT_ROUNDOFF
-_SHAKEN = 0.1
-
-_BLOCK = 2048
-"""Triples of pairs that are computed at once: they stay in the cache."""
 
 
 class FreudensteinLinks(NamedTuple):

@@ -37,6 +37,16 @@ from linkage_ros.tools.design.design import FARTHEST, SHORTEST
 import numpy as np
 from numpy.typing import NDArray
 
+COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')
+"""The dimensions in a row."""
+
+LENGTHS = slice(3, 7)
+POINT = slice(7, 9)
+"""The slices of a row with the logarithms of the lengths, and with the traced point."""
+
+_SPARE = 1e-9
+"""Least distance of a loop from folding, relative to its longest diagonal, for its derivative."""
+
 
 @dataclass(frozen=True, slots=True)
 class PathTask:
@@ -169,17 +179,6 @@ class Aim:
     # x and along y.
     shortest: float
     longest: float
-
-
-COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')
-"""The dimensions in a row."""
-
-LENGTHS = slice(3, 7)
-POINT = slice(7, 9)
-"""The slices of a row with the logarithms of the lengths, and with the traced point."""
-
-_SPARE = 1e-9
-"""Least distance of a loop from folding, relative to its longest diagonal, for its derivative."""
 
 
 class Slopes(NamedTuple):

@@ -72,6 +72,34 @@ _AHEAD = 0.1
 _TINY = 1e-30
 """Prevents a division by zero if a crank angle moves nothing."""
 
+_DAMPING = 1e-2
+_LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
+_HELPED, _FAILED = 0.2, 5.0
+"""Factors of the damping after a step that improved the distances, and after one that did not."""
+
+_SETTLED = 1e-15
+"""A step with a smaller relative gain of the squares is the last."""
+
+_NOTHING = 1e-30
+"""Squares below this are rounding, for a path of size 1."""
+
+COUNT = 200_000
+"""Default number of four-bars that are drawn."""
+
+_STARTS = 512
+_STAGES = ((30, 3e-3, 128), (50, 3e-4, 64), (150, 3e-5, 32))
+"""Steps, guard, and the number of distinct four-bars that continue."""
+
+_LAST_STEPS = 300
+_THINNED = 32
+"""Points used by the search; the last steps use all of them."""
+
+_SAME = 0.05
+"""Linkages that differ by less than this, relative to the longest length, count as one."""
+
+_EXACT = 1e-9
+"""Errors below this, relative to the size of the path, count as none."""
+
 
 def damped_step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
     """
@@ -208,18 +236,6 @@ def _row_bounds(aim: Aim) -> tuple[Array, Array]:
     return low, high
 
 
-_DAMPING = 1e-2
-_LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
-_HELPED, _FAILED = 0.2, 5.0
-"""Factors of the damping after a step that improved the distances, and after one that did not."""
-
-_SETTLED = 1e-15
-"""A step with a smaller relative gain of the squares is the last."""
-
-_NOTHING = 1e-30
-"""Squares below this are rounding, for a path of size 1."""
-
-
 def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fitted, Array]:
     """
     Return the four-bars after at most ``steps``, and their sums of squared distances, (n,).
@@ -289,24 +305,6 @@ def _squared_distances(seen: Slopes, aim: Aim) -> Array:
     total: Array = (miss.real**2 + miss.imag**2).sum(1)
     total[~np.isfinite(total)] = np.inf
     return total
-
-
-COUNT = 200_000
-"""Default number of four-bars that are drawn."""
-
-_STARTS = 512
-_STAGES = ((30, 3e-3, 128), (50, 3e-4, 64), (150, 3e-5, 32))
-"""Steps, guard, and the number of distinct four-bars that continue."""
-
-_LAST_STEPS = 300
-_THINNED = 32
-"""Points used by the search; the last steps use all of them."""
-
-_SAME = 0.05
-"""Linkages that differ by less than this, relative to the longest length, count as one."""
-
-_EXACT = 1e-9
-"""Errors below this, relative to the size of the path, count as none."""
 
 
 class PathResult(NamedTuple):
