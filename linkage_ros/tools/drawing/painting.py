@@ -32,6 +32,25 @@ _ROUNDS = 3
 _GAP = 4.0
 """Smallest distance between two names, in pixels."""
 
+WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
+"""Colours in a design: wanted values, path of a point, other assembly."""
+
+OTHER_TEXT = '#a86b00'
+"""Colour of text about the other assembly, dark enough to read."""
+
+NAME_INK = '#35608a'
+GHOST = '#cfcfcf'
+LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
+
+_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+_SETTINGS: Any = {
+    'font.size': 8.0,
+    'svg.hashsalt': 'linkage_ros',
+    'axes.linewidth': 0.6,
+    'text.parse_math': False,  # a name between dollar signs is no formula
+}
+
 
 class Label(NamedTuple):
     """A name to be placed; all sizes in one unit, such as pixels."""
@@ -138,26 +157,6 @@ def _is_outside(
         or centre.imag - height < low.imag
         or centre.imag + height > high.imag
     )
-
-
-WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
-"""Colours in a design: wanted values, path of a point, other assembly."""
-
-OTHER_TEXT = '#a86b00'
-"""Colour of text about the other assembly, dark enough to read."""
-
-NAME_INK = '#35608a'
-GHOST = '#cfcfcf'
-LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
-
-_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
-STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
-_SETTINGS: Any = {
-    'font.size': 8.0,
-    'svg.hashsalt': 'linkage_ros',
-    'axes.linewidth': 0.6,
-    'text.parse_math': False,  # a name between dollar signs is no formula
-}
 
 
 def picture_settings() -> Any:
