@@ -73,6 +73,9 @@ _SAME = 1e-6
 
 _REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE, for each joint'
 
+_MET = 1e-3
+"""Maximum distance between pins that meet in a pose, as a fraction of the linkage's size."""
+
 
 def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
     """
@@ -140,10 +143,6 @@ def _largest_error(closure: Closure, inputs: tuple[float, ...], poses: Poses) ->
 
 def _are_near(one: Sequence[float], other: Sequence[float]) -> bool:
     return all(abs(p - q) < _SAME for p, q in zip(one, other, strict=True))
-
-
-_MET = 1e-3
-"""Maximum distance between pins that meet in a pose, as a fraction of the linkage's size."""
 
 
 class ImportedLinkage(NamedTuple):

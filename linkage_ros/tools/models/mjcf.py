@@ -50,6 +50,39 @@ from linkage_ros.tools.models.xml import (
 # Inputs and sliders stay in the tree, since an engine closes a pin most easily. Of the other
 # pins, published joints have priority. A pin in a slot gets a block of its own, which slides.
 
+DENSITY = 7850.0
+"""Density of links without a given mass: steel, in [kg/m³]."""
+
+LIGHT = 10.0
+"""Density of the blocks of pins in slots, in [kg/m³]: negligible."""
+
+_DIFFERENCE = 1e-4
+"""Step of the finite differences, in [rad] or as a fraction of a length."""
+
+_FARTHEST = 1e9
+"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
+
+_LEAST_INERTIA = 1e-12
+"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
+
+_STEP = 5e-4
+"""Step of the integration, in [s]."""
+
+_STIFF = {'solref': f'{format_number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
+"""Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
+
+_PACE = 30.0
+"""Bandwidth of the position servo of an input, in [rad/s]."""
+
+_HEAD = f"""\
+A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
+are equality constraints between sites. A hinge or slide that is a published joint has its name,
+sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
+Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
+pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
+Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
+its gravity and its springs between points are."""
+
 
 class TreeBranch(NamedTuple):
     """A joint of the tree."""
@@ -148,22 +181,6 @@ def _joint_name(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple
         elif edge.kind == 'R' and {joint.parent, joint.child} == {parent, child}:
             return name, 1 if joint.parent == parent else -1
     return '', 1
-
-
-DENSITY = 7850.0
-"""Density of links without a given mass: steel, in [kg/m³]."""
-
-LIGHT = 10.0
-"""Density of the blocks of pins in slots, in [kg/m³]: negligible."""
-
-_DIFFERENCE = 1e-4
-"""Step of the finite differences, in [rad] or as a fraction of a length."""
-
-_FARTHEST = 1e9
-"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
-
-_LEAST_INERTIA = 1e-12
-"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
 
 
 class Bodies:
@@ -372,25 +389,6 @@ def _write_geoms(element: ET.Element, body: LinkBody, origin: complex) -> None:
         if solid.kind == 'slot':
             where['density'] = format_number(LIGHT)
         ET.SubElement(element, 'geom', where, type='box', size=size)
-
-
-_STEP = 5e-4
-"""Step of the integration, in [s]."""
-
-_STIFF = {'solref': f'{format_number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
-"""Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
-
-_PACE = 30.0
-"""Bandwidth of the position servo of an input, in [rad/s]."""
-
-_HEAD = f"""\
-A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
-are equality constraints between sites. A hinge or slide that is a published joint has its name,
-sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
-Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
-pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
-Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
-its gravity and its springs between points are."""
 
 
 def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:

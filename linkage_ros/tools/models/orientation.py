@@ -45,6 +45,10 @@ if TYPE_CHECKING:
 # two; a block keeps its angle to the link it slides along. So the links whose angles messages
 # determine form a connected graph with the ground, and the path between two links is the sum.
 
+_SAMPLES = 2880
+_MARGIN = 1e-3
+"""Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
+
 
 class Turn(NamedTuple):
     """A term of an orientation."""
@@ -111,11 +115,6 @@ class Orientations:
                     more = joints + bool(turn.joint)
                     heappush(ahead, (more, count, other, (*turns, turn)))
         return paths
-
-
-_SAMPLES = 2880
-_MARGIN = 1e-3
-"""Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
 
 
 class AngleSpan(NamedTuple):

@@ -30,6 +30,11 @@ from linkage_ros.tools.models.part import free_name, ModelNames, PrefixedNames
 
 # The remedy if the published joints do not determine the position of a link.
 
+Kind = Literal['revolute', 'prismatic', 'fixed']
+
+_DEAR = 9
+"""Cost of using a joint that another link may need."""
+
 
 def suggest_joint(
     linkage: Linkage, placed: Collection[str]
@@ -59,9 +64,6 @@ def joint_text(name: str, joint: RevoluteJoint | SlideJoint) -> str:
     if isinstance(joint, SlideJoint):
         return f'{name}: {{slider: {joint.slider}}}'
     return f'{name}: {{parent: {joint.parent}, child: {joint.child}}}'
-
-
-Kind = Literal['revolute', 'prismatic', 'fixed']
 
 
 class TreeJoint(NamedTuple):
@@ -252,10 +254,6 @@ class _Growth:
             yield slide
         if slide is None and not turning:
             yield TreeJoint('', 'fixed', '', '', 0j, constant)
-
-
-_DEAR = 9
-"""Cost of using a joint that another link may need."""
 
 
 def _missing_error(linkage: Linkage) -> DefinitionError:

@@ -53,6 +53,27 @@ from linkage_ros.tools.models.xml import (
 # do those of a slider whose slide is published; otherwise the x axis of SLIDER_line_on_LINK lies
 # along the line.
 
+EFFORT, VELOCITY = 1000.0, 100.0
+"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+FARTHEST = 1e9
+"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
+
+_ROOT = 'world'
+
+_EXPRESSION = re.compile(r'\$[{(]')
+"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
+
+_HEAD = f"""\
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
+the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
+iyy = izz/2.
+A limit is as the linkage gives it; else what the joint comes to over the range of the input that
+the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. An angle that passes pi has none either, since it is published as it
+begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+
 
 class LoopJoint(NamedTuple):
     """A pin or slider that the tree leaves open."""
@@ -156,18 +177,6 @@ class _FrameAdding:
         return joint.child
 
 
-EFFORT, VELOCITY = 1000.0, 100.0
-"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
-
-FARTHEST = 1e9
-"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
-
-_ROOT = 'world'
-
-_EXPRESSION = re.compile(r'\$[{(]')
-"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
-
-
 class _Model(NamedTuple):
     """A linkage with its tree, ready to be written."""
 
@@ -258,17 +267,6 @@ def _head_lines(models: Sequence[_Model]) -> Iterator[str]:
             yield f'{what} {cut.name} is cut, {how}'
         if spare := ', '.join(map(model.names.own_name, model.tree.spare)):
             yield f'no link hangs by {spare}'
-
-
-_HEAD = f"""\
-A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
-the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
-Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
-iyy = izz/2.
-A limit is as the linkage gives it; else what the joint comes to over the range of the input that
-the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
-angles, the reach for slides. An angle that passes pi has none either, since it is published as it
-begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
 
 
 def _write_linkage(robot: ET.Element, model: _Model) -> None:

@@ -26,6 +26,25 @@ Vector = tuple[float, float, float]
 
 MOVING = ('revolute', 'continuous', 'prismatic')
 
+_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
+_FARTHEST = 1e9
+
+_LOOP_TAGS = {
+    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
+    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
+}
+"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
+
+_PINS = ('', 'revolute', 'continuous', 'spherical')
+"""Types of a loop joint that are a pin in the plane; without a type it is one."""
+
+_USUAL_TAGS = (
+    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
+    *_LOOP_TAGS,
+)  # fmt: skip
+
+_LARGEST_FILE = 10_000_000
+
 
 class Inertial(NamedTuple):
     """Mass [kg], its centre [m], rotation of its axes [rad], and ixx ixy ixz iyy iyz izz."""
@@ -81,27 +100,6 @@ class UrdfFile(NamedTuple):
     # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
     pinned: tuple[tuple[str, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
-
-
-_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
-_FARTHEST = 1e9
-
-_LOOP_TAGS = {
-    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
-    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
-}
-"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
-
-_PINS = ('', 'revolute', 'continuous', 'spherical')
-"""Types of a loop joint that are a pin in the plane; without a type it is one."""
-
-_USUAL_TAGS = (
-    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
-    *_LOOP_TAGS,
-)  # fmt: skip
-
-
-_LARGEST_FILE = 10_000_000
 
 
 def read_urdf_file(file: Path) -> bytes:

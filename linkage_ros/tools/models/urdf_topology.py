@@ -33,6 +33,12 @@ Symbol = tuple[tuple[tuple[str, float], ...], float]
 
 _PATTERNS = 'R+|P|PR+|R+P'
 
+NEAR = 1e-9
+"""Positions closer than this fraction of the linkage's size are one."""
+
+_TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
+"""Sources of a point's name; the lowest wins."""
+
 
 class Chain(NamedTuple):
     """Joints from one body to another, with no body between them."""
@@ -164,13 +170,6 @@ class Points:
             if body in links:
                 links[body][name] = place
         return links, names
-
-
-NEAR = 1e-9
-"""Positions closer than this fraction of the linkage's size are one."""
-
-_TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
-"""Sources of a point's name; the lowest wins."""
 
 
 class _SliderRail(NamedTuple):

@@ -71,6 +71,9 @@ _STATUS_TEXTS = {
     'indeterminate': 'two pins coincide: the position is undefined',
 }
 
+_loaded: set[str] = set()
+"""Folders of FMUs that could be instantiated."""
+
 
 class Content(NamedTuple):
     """
@@ -92,10 +95,6 @@ class _Enumeration(Enumeration):
     """An enumeration of PythonFMU3, which asks every integer for its dimensions, with none."""
 
     dimensions = ()
-
-
-_loaded: set[str] = set()
-"""Folders of FMUs that could be instantiated."""
 
 
 class SceneSlave(GuardedSlave):

@@ -66,6 +66,14 @@ _MOST_TICKS = 10_000_000
 _OF_A_TICK = 1e-3
 """How far a step may be from whole ticks, in ticks: what rounding of sums of steps takes."""
 
+_READ_AS = {
+    'position': 'joints',
+    'velocity': 'rates',
+    'acceleration': 'accelerations',
+    'effort': 'efforts',
+}
+"""Name of each field in a `SensorReading`."""
+
 
 class Variable(NamedTuple):
     """A number that goes in or comes out, named as ``joint_states.rocker_joint.position``."""
@@ -155,15 +163,6 @@ class LinkageOutputs:
             self.valid[field] = bool(newest) and all(map(isfinite, newest))
             if self.valid[field]:
                 values[:] = newest
-
-
-_READ_AS = {
-    'position': 'joints',
-    'velocity': 'rates',
-    'acceleration': 'accelerations',
-    'effort': 'efforts',
-}
-"""Name of each field in a `SensorReading`."""
 
 
 def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
