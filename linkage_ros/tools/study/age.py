@@ -64,6 +64,9 @@ _PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 _BEFORE = 20
 """Samples before the newest one that a drive gets, for its differences."""
 
+_BLOCK = 100
+"""Samples that are read together."""
+
 
 def measure_age_in_use(
     scene: Scene, motions: Sequence[LinkageMotion], horizon: float, *, quick: bool = False
@@ -224,10 +227,6 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
 
     (spread,) = time_in_turn([Candidate(run, _BLOCK)], seconds)
     return spread.scale(1e6)
-
-
-_BLOCK = 100
-"""Samples that are read together."""
 
 
 class _CommandSamples:

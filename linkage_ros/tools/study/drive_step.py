@@ -55,6 +55,9 @@ _LONGEST, _SHORTEST = 0.1, 1e-6
 _UNSURE = 1e-3
 """Where the exact motion itself is known no better than this, in [rad], it cannot be foretold."""
 
+_EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
+"""Evaluations of the equation of motion in a step, about."""
+
 
 def measure_drive_step(
     motion: LinkageMotion,
@@ -119,10 +122,6 @@ def measure_drive_step(
     if left_out:
         left_out = [f'for lack of time: {"; ".join(left_out)}']
     return Knob(NAME, settings, 0, horizon, note=note), left_out
-
-
-_EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
-"""Evaluations of the equation of motion in a step, about."""
 
 
 def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: float) -> Price:

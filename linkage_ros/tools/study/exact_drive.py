@@ -54,6 +54,12 @@ _MOST_PIECES = 100_000
 _FASTEST = 1e10
 """Values and rates beyond this, per [s], are no motion any more."""
 
+State = tuple[float, float]
+"""Value and rate."""
+
+Margin = Callable[[float, Any], float]
+"""A function of time and state that is 0 or more before an event, and negative after it."""
+
 
 class NoMotionError(Exception):
     """The exact motion does not go on: a toggle, or rates without bound."""
@@ -113,13 +119,6 @@ class _MovingMass:
         if terms is None or not abs(value) < _FASTEST:
             raise NoMotionError(time)
         return terms
-
-
-State = tuple[float, float]
-"""Value and rate."""
-
-Margin = Callable[[float, Any], float]
-"""A function of time and state that is 0 or more before an event, and negative after it."""
 
 
 def exact_motion(

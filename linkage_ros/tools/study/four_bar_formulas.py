@@ -48,6 +48,11 @@ from linkage_ros.kinematics import (
 )
 import numpy as np
 
+Solve = Callable[..., Sequence[Any]]
+"""Takes the inputs of a state; returns the published joints, or nothing where it has no answer."""
+
+_Single = np.float32
+
 
 class PlainFourBar(NamedTuple):
     """A linkage that is a single four-bar with its crank on the ground."""
@@ -117,10 +122,6 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     )
 
 
-Solve = Callable[..., Sequence[Any]]
-"""Takes the inputs of a state; returns the published joints, or nothing where it has no answer."""
-
-
 def solve_by_textbook(shape: PlainFourBar) -> Solve:
     """Return the textbook form of a four-bar."""
     a, b, c, d, sign, turn, offset, _ = shape
@@ -141,9 +142,6 @@ def solve_by_textbook(shape: PlainFourBar) -> Solve:
         return joints((0.0, theta, atan2(by - ay, bx - ax), atan2(by, bx - d)))
 
     return position
-
-
-_Single = np.float32
 
 
 def solve_in_single_precision(shape: PlainFourBar) -> Solve:

@@ -36,6 +36,18 @@ Item = TypeVar('Item')
 Progress = Callable[[float], None]
 """Takes the fraction of a measurement that is done, 0 to 1; an exception ends the measurement."""
 
+BLOCK = 1e-3
+"""Minimum duration of a block, in [s]: hundreds of times the duration of reading the clock."""
+
+_FINE = 20e-6
+"""Coarsest acceptable resolution of a clock, in [s]."""
+
+FEWEST, MOST = 5, 200
+"""Minimum number of rounds."""
+
+_CPU = Path('/proc/cpuinfo')
+_GOVERNOR = Path('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor')
+
 
 class Spread(NamedTuple):
     """The quartiles of repeated measurements."""
@@ -69,16 +81,6 @@ def alternate_order(items: Sequence[Item], rounds: int) -> Iterator[Item]:
 def spread_of(values: Sequence[float]) -> Spread:
     """Return the quartiles of some values; of a single value, that value."""
     return Spread(*(percentile(values, percent) for percent in (25.0, 50.0, 75.0)))
-
-
-BLOCK = 1e-3
-"""Minimum duration of a block, in [s]: hundreds of times the duration of reading the clock."""
-
-_FINE = 20e-6
-"""Coarsest acceptable resolution of a clock, in [s]."""
-
-FEWEST, MOST = 5, 200
-"""Minimum number of rounds."""
 
 
 class Candidate(NamedTuple):
@@ -139,10 +141,6 @@ def thread_clock() -> Callable[[], float]:
         if perf_counter() - begun > _FINE:
             return perf_counter
     return thread_time
-
-
-_CPU = Path('/proc/cpuinfo')
-_GOVERNOR = Path('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor')
 
 
 def describe_machine() -> list[tuple[str, str]]:

@@ -35,6 +35,12 @@ from linkage_ros.kinematics import (
 )
 import numpy as np
 
+_MOST = 50
+"""Most iterations; more mean no convergence."""
+
+_BEHIND = 0.01
+"""How far behind a state its iteration starts, in [rad] or parts of the size."""
+
 
 class ConstraintEquations:
     """The constraint equations in the angles and positions of the links, without dyads."""
@@ -129,13 +135,6 @@ class ConstraintEquations:
 
     def _link_facing(self, link: str, direction: float = 0.0) -> BodyDirection:
         return BodyDirection(self._bodies.get(link, -1), 0, direction)
-
-
-_MOST = 50
-"""Most iterations; more mean no convergence."""
-
-_BEHIND = 0.01
-"""How far behind a state its iteration starts, in [rad] or parts of the size."""
 
 
 def solve_by_newton(linkage: Linkage, tolerance: float) -> Callable[..., Sequence[Any]]:

@@ -48,6 +48,12 @@ _FAINT = '#6b7782'
 _HALO = 'stroke="#ffffff" stroke-width="3" paint-order="stroke"'
 """So that no line of the grid runs through letters."""
 
+_DIRECTIONS = (
+    *((side, up) for up in (0.0, -0.6, 0.6, -1.0, 1.0) for side in (1.0, -1.0)),
+    *((side, up) for side in (0.0, 0.5, -0.5) for up in (-1.4, 1.4)),
+)
+"""Where a label may be, seen from its mark: to the right and up."""
+
 
 class Box(NamedTuple):
     """A rectangle, in pixels."""
@@ -289,13 +295,6 @@ def _legend_places(names: Sequence[str]) -> Iterator[tuple[float, int]]:
             x, row = 12.0, row + 1
         yield x, row
         x += width
-
-
-_DIRECTIONS = (
-    *((side, up) for up in (0.0, -0.6, 0.6, -1.0, 1.0) for side in (1.0, -1.0)),
-    *((side, up) for side in (0.0, 0.5, -0.5) for up in (-1.4, 1.4)),
-)
-"""Where a label may be, seen from its mark: to the right and up."""
 
 
 def _places_beside(mark: Mark, text: str) -> Iterator[Box]:

@@ -56,6 +56,8 @@ _FAR = 0.1
 DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
 
+Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
+
 
 class SolvingMethod(NamedTuple):
     """A way to solve a linkage."""
@@ -306,9 +308,6 @@ def compare_hard_cases() -> Iterator[HardCase]:
         for solver in (_scene_solver(closure), *comparison_solvers(closure)):
             error, failed = compare_solver(linkage, solver.solve, known, exact, far)
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
-
-
-Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
 
 
 def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
