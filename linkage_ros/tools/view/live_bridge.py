@@ -98,6 +98,11 @@ _NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
 _HAND_QOS = QoSProfile(depth=1)
 """Reliable, for any subscriber; only the newest crank matters."""
 
+_PLAIN = ('snapshot', 'reset')
+"""Requests that are services without an argument."""
+
+_REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
+
 
 @dataclass(slots=True, eq=False)
 class _Call:
@@ -548,12 +553,6 @@ class LiveBridge:
             self._hand_publisher.publish(command)
         else:
             self._hand_timer.cancel()
-
-
-_PLAIN = ('snapshot', 'reset')
-"""Requests that are services without an argument."""
-
-_REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 
 
 def _take_all(subscription: Any) -> list[bytes]:

@@ -33,6 +33,9 @@ _HERE = 'linkage_ros.tools.view.pages'
 Parts = Sequence[tuple[str, str]]
 """Files of one page: each with its package and its name."""
 
+_LONG = 28
+"""Length from which the text of a cell may be broken into lines."""
+
 
 def html_document(
     title: str,
@@ -122,10 +125,6 @@ def _escape_letters(letters: set[str], text: str, before: str = '') -> str:
 
 def _within_script(text: str) -> str:
     return text.replace('</script', r'<\/script')
-
-
-_LONG = 28
-"""Length from which the text of a cell may be broken into lines."""
 
 
 def table_html(

@@ -27,6 +27,18 @@ import numpy as np
 _LATEST = 2**62
 """Latest plausible log time, in [ns]; a later one is damage."""
 
+_MOST_MESSAGES = 8192
+_MOST_BYTES = 32 * 2**20
+_FARTHEST = 4
+"""Factor by which a block may grow to keep messages of one log time together."""
+
+Entry = tuple[int, int, int, bytes]
+"""Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
+
+KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'forces', 'health')
+_OTHER_RECORDER = 'health'
+"""Topics recorded by another thread; run time does not follow them."""
+
 
 def times_of(logged: Sequence[int]) -> Times:
     """Return log times as an array; they may be any 64-bit numbers."""
@@ -91,15 +103,6 @@ class RunClock:
         """Yield time and size of the clock's jumps since the last call, in [ns]."""
         found, self._jumps = self._jumps, []
         yield from found
-
-
-_MOST_MESSAGES = 8192
-_MOST_BYTES = 32 * 2**20
-_FARTHEST = 4
-"""Factor by which a block may grow to keep messages of one log time together."""
-
-Entry = tuple[int, int, int, bytes]
-"""Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
 
 
 class Progress(NamedTuple):
@@ -179,11 +182,6 @@ class Blocks:
         logs, sizes = zip(*entries, strict=True)
         self._tallies[name].add_messages(len(entries), sum(sizes), min(logs), max(logs))
         self._read += sum(sizes) + RECORD_SIZE * len(entries)
-
-
-KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'forces', 'health')
-_OTHER_RECORDER = 'health'
-"""Topics recorded by another thread; run time does not follow them."""
 
 
 class MessageRows(NamedTuple):

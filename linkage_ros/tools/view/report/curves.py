@@ -62,6 +62,16 @@ _FEWEST, _MOST_TICKS = 32, 4096
 _NONE = 2**62
 """In [ns]: stands for the minimum of no values."""
 
+MOST_LINKAGES = 16
+"""Number of linkages of a run that move in the animation."""
+
+UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
+"""Unit of each quantity, for a revolute and for a prismatic joint."""
+
+NO_ROOM = 'curves for which there is no room'
+
+LATENESS, AGE = CurveColumn('tick', 'lateness', 'ms'), CurveColumn('input', 'age', 'ms')
+
 
 class Lateness:
     """Computes the lateness of ticks as they come, at a rate in [Hz], more than 0."""
@@ -137,17 +147,6 @@ def _least_around(values: Times, window: int) -> tuple[Times, Times]:
     before = onward[:n].copy()
     before[window:] = np.minimum(before[window:], back[: max(0, n - window)])
     return before, after
-
-
-MOST_LINKAGES = 16
-"""Kinds of bodies that move in the animation."""
-
-UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
-"""Unit of each quantity, for a revolute and for a prismatic joint."""
-
-NO_ROOM = 'curves for which there is no room'
-
-LATENESS, AGE = CurveColumn('tick', 'lateness', 'ms'), CurveColumn('input', 'age', 'ms')
 
 
 class BoundedCurves:

@@ -67,6 +67,13 @@ _FARTHEST = 1e30
 Places = Any
 """Array of complex numbers: positions in [m], or directions."""
 
+_Found = dict[str, tuple[Places, Places]]
+"""For each link the position of its frame, and its direction."""
+
+Plot = dict[str, Any]
+
+_NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
+
 
 class Poses(NamedTuple):
     """Poses of the links."""
@@ -78,10 +85,6 @@ class Poses(NamedTuple):
     # Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
     apart: Numbers
     reason: str  # Why the loops were closed instead; '' if recorded joints determine every link
-
-
-_Found = dict[str, tuple[Places, Places]]
-"""For each link the position of its frame, and its direction."""
 
 
 def link_poses(
@@ -191,9 +194,6 @@ def _loop_gaps(closure: Closure, found: _Found, count: int) -> Numbers:
     return worst
 
 
-Plot = dict[str, Any]
-
-
 def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
     """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
@@ -238,9 +238,6 @@ def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
         merged.count = sum(lane.count for lane in silent)
         shown['silent'] = merged
     return {key: shown[key] for key in EVENT_TRACKS if key in shown and shown[key].count}
-
-
-_NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
 
 
 def time_plots(run: ReportedRun) -> list[Plot]:

@@ -72,6 +72,15 @@ _DISORDER = 1_000_000_000
 _MORE_TOPICS = f'topics of joint states beyond the first {_MOST_TOPICS}'
 _LATER_JOINTS = 'messages with joints that turn up later'
 
+_TOGETHER = 20_000_000
+"""Events of a kind that are closer than this form one span, in [ns]."""
+
+_ALIKE = ('open', 'toggle')
+_MOST_SILENCES = 400
+_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
+
+_NEVER = 2**62
+
 
 class ForeignRun:
     """Reads the window of a bag without a scene, block by block."""
@@ -201,14 +210,6 @@ def _find_open_loop_spans(
             position = linkage.closure.position(*given)
             text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
         track.add(time, time, f'{linkage.name} {text}'.strip())
-
-
-_TOGETHER = 20_000_000
-"""Events of a kind that are closer than this form one span, in [ns]."""
-
-_ALIKE = ('open', 'toggle')
-_MOST_SILENCES = 400
-_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
 
 
 class SceneRun:
@@ -412,6 +413,3 @@ class SceneRun:
         """Return which joint states contain a linkage."""
         present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
         return present
-
-
-_NEVER = 2**62

@@ -37,6 +37,14 @@ APART = -1
 _LONGEST_TEXT = 120
 _MORE = ', and others'
 
+_SILENCE_FACTOR = 5
+"""A gap of so many usual periods is a silence."""
+
+_SHORTEST_SILENCE = 2_000_000
+"""Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
+
+_MESSAGES_FOR_A_USUAL = 8
+
 
 @dataclass(slots=True)
 class EventSpan:
@@ -123,15 +131,6 @@ class EventTrack:
 def _extend_span(last: EventSpan, end: int, count: int) -> None:
     last.end = max(last.end, end)
     last.count += count
-
-
-_SILENCE_FACTOR = 5
-"""A gap of so many usual periods is a silence."""
-
-_SHORTEST_SILENCE = 2_000_000
-"""Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
-
-_MESSAGES_FOR_A_USUAL = 8
 
 
 class Silences:
