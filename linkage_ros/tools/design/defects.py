@@ -9,7 +9,7 @@
 """
 The defects that make a design useless in practice, and the requirements on a design.
 
-Every design is checked for the defects. Their names are those of the textbooks (R. L. Norton,
+Every design is checked for the defects. Their names are the textbooks' (R. L. Norton,
 Design of Machinery, ch. 5; J. M. McCarthy and G. S. Soh, Geometric Design of Linkages, ch. 4):
 branch, circuit and order.
 """
@@ -135,7 +135,7 @@ def assess(design: Design) -> Assessment:
     defects = _find_defects(design, met, path)
     if defects:
         travel = None
-        # Only at the positions; there is no way between them.
+        # Only at the positions: the crank cannot move between them.
         ends = path.directions, path.directions
     else:
         travel = moved[0].crank, moved[-1].crank

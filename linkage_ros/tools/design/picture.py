@@ -64,7 +64,7 @@ _BEHIND = '#a3a3a3'
 _BEHIND_TEXT = '#5f5f5f'
 
 _EVERY = 6
-"""Every so many places of a path are obstacles for a number."""
+"""One in this many places of a path is an obstacle for a number."""
 
 _DRAWN, _DRAWN_OF_PATH = 6, 4
 """Most positions that are drawn; fewer for a path, which should be visible between them."""

@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 """Smaller errors, relative to the linkage's size, count as none."""
 
 _EVERY = 6
-"""Every so many points of a curve are obstacles for a number."""
+"""One in this many points of a curve is an obstacle for a number."""
 
 _NUMBERED = 12
 """With more positions only every second is numbered, or every third, and so on."""

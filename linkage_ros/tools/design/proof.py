@@ -20,7 +20,7 @@ branches of single-degree-of-freedom planar linkages, Journal of Mechanical Desi
 223-230). Circuits touch where a linkage can fold flat: at a change point.
 
 The functions of the course take any number of linkages at once. A direction of the crank is that
-of the vector O2→A minus that of O2→O4, in [rad].
+of the vector O2→A minus the direction of O2→O4, in [rad].
 """
 
 from __future__ import annotations
@@ -256,7 +256,7 @@ def prove(design: Design) -> tuple[AchievedPosition, ...]:
 
 
 def assemble(design: Design) -> Design:
-    """Return a design on the assembly that meets most positions; on a tie, that of the first."""
+    """Return a design on the assembly that meets most positions; on a tie, the first one's."""
     size = sum(design.four_bar.lengths)
     left, right = prove_both_sides(design)
     better = [_better_side(one, other, size) for one, other in zip(left, right, strict=True)]

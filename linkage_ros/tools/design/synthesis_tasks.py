@@ -35,7 +35,7 @@ CANDIDATES = 200_000
 """Default number of candidates of a search."""
 
 _SHIFT = 0.01
-"""Error of an angle for which the sensitivity is shown, in degrees: that of a good protractor."""
+"""Error of an angle for which the sensitivity is shown, in degrees: a good protractor's."""
 
 Angles = Sequence[float]
 

@@ -47,8 +47,6 @@ from linkage_ros.tools.design.synthesis_tasks import (
     find_answers,
 )
 
-# Tables of a designed four-bar: its links, its proof, its quality.
-
 _NOT_MET = 1
 """Exit code if there are solutions, but none meets the requirements."""
 
@@ -56,6 +54,9 @@ _LISTED = 3
 """Default number of solutions that a search lists."""
 
 EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
+
+
+# Tables of a designed four-bar: its links, its proof, its quality.
 
 
 def solution_tables(

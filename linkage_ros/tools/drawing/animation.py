@@ -79,7 +79,7 @@ _STYLE = (
     '@media (prefers-reduced-motion: reduce) {{ .moving {{ animation: none }} }}\n'
 )
 _STEP = 2
-"""One of so many pictures is a key of the SVG; it moves evenly between them."""
+"""One in this many pictures is a key of the SVG; it moves evenly between them."""
 
 Advance = Callable[[int, int], Any]
 """Called with the number of pictures that are painted, and of all."""

@@ -48,7 +48,7 @@ _SETTINGS: Any = {
     'font.size': 8.0,
     'svg.hashsalt': 'linkage_ros',
     'axes.linewidth': 0.6,
-    'text.parse_math': False,  # a name between dollar signs is no formula
+    'text.parse_math': False,  # a name between dollar signs is not a formula
 }
 
 
@@ -210,7 +210,7 @@ def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> Non
     """
     Write the names of lines at their right ends, beside the axes.
 
-    The axes' limits are final. The heights of the axes are those of the last drawing.
+    The axes' limits are final. The heights of the axes are from the last drawing.
     """
     low, high = axes.get_ylim()
     height = axes.get_window_extent().height / axes.figure.dpi * 72.0  # in points, as the font
@@ -237,7 +237,7 @@ def show_lengths(axis: Any, name: str, size: float) -> None:
 
 
 def degree_step(ends: tuple[float, float], most: int = 8) -> float:
-    """Return the step of an axis between two angles, in [°], for so many steps at most."""
+    """Return the step of an axis between two angles, in [°], for at most ``most`` steps."""
     low, high = ends
     turns = 360.0 * ceil((high - low) / (360.0 * most))
     return next((step for step in _STEPS if (high - low) / step <= most), turns)

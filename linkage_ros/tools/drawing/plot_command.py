@@ -238,7 +238,7 @@ def crank_curves(
         breaks = begins.copy()
         if turning:
             breaks[1:] |= np.abs(np.diff(values)) > pi
-            # Whatever turn a piece was recorded in, it is drawn in that of the ideal motion.
+            # Whatever turn a piece was recorded in, it is drawn in the ideal motion's turn.
             near = np.interp(crank, ideal[place].x, ideal[place].y) if ideal else 0.0 * crank
             turns = np.round((values - near) / tau)
             for piece in np.split(np.arange(len(values)), np.flatnonzero(breaks)):

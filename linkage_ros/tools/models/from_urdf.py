@@ -63,7 +63,7 @@ _MANY = 10
 """Maximum number of dyads whose sides are tried together; each further one doubles the time."""
 
 _FOUND = 0.05
-"""Maximum angle between the links of a pose and those of the closed linkage, in [rad]."""
+"""Maximum angle between a link in a pose and in the closed linkage, in [rad]."""
 
 _MOST_TRIED = 200
 """Most choices of mimics that are tried as ratios."""

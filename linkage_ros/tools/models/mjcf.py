@@ -11,7 +11,7 @@ Export of a linkage as MJCF, the format of MuJoCo.
 
 Bodies are nested, and equality constraints hold the pins that are cut. The axes of a body are
 parallel to its link's own; its origin lies at the pin or slider that connects it to its parent.
-Springs are spatial tendons, which pull as those of `linkage_ros.dynamics` do.
+Springs are spatial tendons, which pull as in `linkage_ros.dynamics`.
 """
 
 from __future__ import annotations
@@ -44,11 +44,6 @@ from linkage_ros.tools.models.xml import (
     xml_comment,
     xml_document,
 )
-
-# The linkage as a tree of its physical pins and sliders, published or not, and the pins cut.
-#
-# Inputs and sliders stay in the tree, since an engine closes a pin most easily. Of the other
-# pins, published joints have priority. A pin in a slot gets a block of its own, which slides.
 
 DENSITY = 7850.0
 """Density of links without a given mass: steel, in [kg/m³]."""
@@ -84,6 +79,12 @@ Friction, tolerances and other effects of a scene are not here, nor its loads on
 its gravity and its springs between points are."""
 
 
+# The linkage as a tree of its physical pins and sliders, published or not, and the pins cut.
+#
+# Inputs and sliders stay in the tree, since an engine closes a pin most easily. Of the other
+# pins, published joints have priority. A pin in a slot gets a block of its own, which slides.
+
+
 class TreeBranch(NamedTuple):
     """A joint of the tree."""
 
@@ -116,8 +117,8 @@ def physical_tree(closure: Closure) -> PhysicalTree:
     """
     Return a linkage as a tree of pins and sliders.
 
-    Every loop has a pin that is no input, and is cut there. A loop of sliders alone would fix an
-    angle twice, and one whose pins are all driven could not move: neither is a valid linkage.
+    Every loop has a pin that is not an input, and is cut there. A loop of sliders alone would fix
+    an angle twice, and one whose pins are all driven could not move: neither is a valid linkage.
     """
     links = closure.structure.links
     part_of = {link: link for link in links}
@@ -230,8 +231,8 @@ class Bodies:
         """
         Return the approximate inertia that an input moves at the start, in [kg·m²] or [kg].
 
-        The kinetic energy at a rate of 1 is half of it. Rates come from finite differences, and
-        each link's mass is spread over its points.
+        The kinetic energy at a rate of 1 is half the inertia. Rates come from finite differences,
+        and each link's mass is spread over its points.
         """
         closure = self._closure
         step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)

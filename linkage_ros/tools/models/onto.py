@@ -78,7 +78,7 @@ class _RobotNames(PrefixedNames):
 
     def __init__(self, prefix: str, names: ModelNames) -> None:
         super().__init__(prefix, names)
-        self.links: dict[str, str] = {}  # Links of the linkage, with those of the robot
+        self.links: dict[str, str] = {}  # Links of the linkage, and the robot's links
 
     def own_name(self, name: str) -> str:
         return self.links.get(name) or super().own_name(name)

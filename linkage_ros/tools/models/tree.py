@@ -28,8 +28,6 @@ from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.tools.models.orientation import named_joints, Orientations, Turn
 from linkage_ros.tools.models.part import free_name, ModelNames, PrefixedNames
 
-# The remedy if the published joints do not determine the position of a link.
-
 Kind = Literal['revolute', 'prismatic', 'fixed']
 
 _DEAR = 9

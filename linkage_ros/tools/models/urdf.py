@@ -47,12 +47,6 @@ from linkage_ros.tools.models.xml import (
     xml_document,
 )
 
-# The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
-#
-# Frames named PIN_on_LINK mark the pin on each of its links: in a correct model they coincide. So
-# do those of a slider whose slide is published; otherwise the x axis of SLIDER_line_on_LINK lies
-# along the line.
-
 EFFORT, VELOCITY = 1000.0, 100.0
 """Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
 
@@ -73,6 +67,13 @@ A limit is as the linkage gives it; else what the joint comes to over the range 
 the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
 angles, the reach for slides. An angle that passes pi has none either, since it is published as it
 begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+
+
+# The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
+#
+# Frames named PIN_on_LINK mark the pin on each of its links: in a correct model they coincide. So
+# do those of a slider whose slide is published; otherwise the x axis of SLIDER_line_on_LINK lies
+# along the line.
 
 
 class LoopJoint(NamedTuple):

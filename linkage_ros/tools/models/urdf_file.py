@@ -88,7 +88,7 @@ class UrdfFile(NamedTuple):
 
     file: str  # Name of the file, for messages
     name: str  # Name of the robot
-    root: str  # The link that is no joint's child
+    root: str  # The link that is not a child
     links: Mapping[str, UrdfLink]  # Links by name
     joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
     order: tuple[str, ...]  # Names of the joints in the order of the file

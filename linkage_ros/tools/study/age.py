@@ -142,7 +142,7 @@ def errors_in_use(
 
 
 def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
-    """Return times of ticks, each with those of its use, in [ns] (ticks, 1 + parts)."""
+    """Return times of ticks, each with the times of its use, in [ns] (ticks, 1 + parts)."""
     count = max(1, int(horizon * rate) - 1)
     numbers = np.unique(np.round(np.linspace(0, count, periods + 1)))
     uses = numbers[:, None] + np.array((0.0, *_PARTS))
@@ -239,7 +239,7 @@ class _CommandSamples:
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 
     def measure_error(self, use: TopicParameters, factor: float) -> JointError | None:
-        """Return the error of a use, with so many times the samples; 0 for samples at once."""
+        """Return the error of a use, with ``factor`` times the samples; 0 for samples at once."""
         cranks: list[Crank | None] = []
         if self._motion.samples:
             cranks = self._crank_states(use, self._recorded_samples(factor > 0.0), self._ticks)

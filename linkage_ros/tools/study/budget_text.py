@@ -10,7 +10,7 @@
 A budget as text: what is off, by how much, what to write for less; and the table behind that.
 
 A time is a median with half the distance of its quartiles; one that is smaller than that distance
-is within noise, and no number is told of it.
+is within noise, and has no number.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ def compare_runs(
     ticks: int,
     progress: Progress = lambda _: None,
 ) -> list[Difference]:
-    """Return how far the published joints of a scene are from those of each of the others."""
+    """Return how far the published joints of a scene are from each of the others."""
     turning = turning_joints(scene)
     sizes = {
         joint: scene_linkage.closure.scale

@@ -12,7 +12,7 @@ The error that the step of a torque drive makes, for its methods and steps.
 The drive runs as in the node, with the same commands at the same times, and its joints at the
 ticks are compared with the exact ones. These come from `linkage_ros.tools.study.exact_drive`, and
 their own error from a second run at ten times the tolerance: it falls as the power 7/8 of the
-tolerance at least, so a sixth of the difference is no less than the error of the first. Where
+tolerance at least, so a sixth of the difference is at least the error of the first. Where
 scipy is not installed or a winding adds a state, the exact motion is that of the drive itself at a
 sixteenth of its step, or what there is time for; its own error is a third of the difference from
 twice that step, as for a method of order 2.

@@ -9,7 +9,7 @@
 """
 The exact motion of a torque drive, by another integrator than the drive's.
 
-The forces are those of the scene's own equation of motion. What integrates them is scipy's DOP853
+The forces are from the scene's own equation of motion. What integrates them is scipy's DOP853
 (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993,
 II.5) at a tolerance of 1e-13, from one jump of a force to the next: it begins anew where a command
 comes, where a rate with friction becomes 0, at an impact, and where motor and crank meet or part.
@@ -52,7 +52,7 @@ _MOST_PIECES = 100_000
 """Most pieces of a motion, so that its work is bounded."""
 
 _FASTEST = 1e10
-"""Values and rates beyond this, per [s], are no motion any more."""
+"""Values and rates beyond this, per [s], are not a motion any more."""
 
 State = tuple[float, float]
 """Value and rate."""

@@ -68,7 +68,7 @@ class PlainFourBar(NamedTuple):
     turn: float  # What the input is multiplied by, ±1, to be a crank that turns counter-clockwise
     offset: float  # What is added then, to be measured from the line of the ground, in [rad]
     # For each published joint the numbers of two directions and a constant: the first less the
-    # second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
+    # second, and the constant. The directions are of ground (0), crank, coupler, rocker.
     terms: tuple[tuple[int, int, float], ...]
 
     def joint_angles(self, directions: Sequence[Any]) -> tuple[Any, ...]:
@@ -107,7 +107,7 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     numbers = {link: k for k, link in enumerate(arms)}
     level = arms[ground]
     turn = 1.0 if linkage.inputs[0].child == crank else -1.0
-    # The angle of a link is its direction less that of its arm; of the ground it is 0.
+    # The angle of a link is its direction less its arm's; 0 for the ground.
     constants = {link: level - arm for link, arm in arms.items()}
     return PlainFourBar(
         *found[0].lengths,

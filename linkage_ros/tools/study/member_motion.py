@@ -9,7 +9,7 @@
 """
 What one linkage of a scene does: its inputs at any time, and the commands that move it.
 
-Whatever noise, delay or fault the scene adds is no part of its motion: that is asked for.
+Whatever noise, delay or fault the scene adds is not part of its motion: it is wanted.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class LinkageMotion(NamedTuple):
     samples: Sequence[tuple[int, int]] = ()
     sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
     length: float = inf  # How long it is known, in [s]
-    note: str = ''  # What is assumed of it, in a sentence; '' for nothing
+    note: str = ''  # The assumption, in a sentence; '' for none
 
 
 def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The cheapest settings whose errors together are no more than what somebody needs.
+The cheapest settings whose errors together do not exceed a need.
 
 Errors of different sources are added at their worst: all at once and in one direction. So what is
 said to meet a need does. Prices add up, too; one within noise costs nothing.

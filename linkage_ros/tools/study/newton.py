@@ -139,7 +139,7 @@ class ConstraintEquations:
 
 def solve_by_newton(linkage: Linkage, tolerance: float) -> Callable[..., Sequence[Any]]:
     """
-    Return Newton's method from a state a little behind, as from that of the last tick.
+    Return Newton's method from a state a little behind, as from the last tick.
 
     It ends at a last correction of at most the tolerance, in [rad] and [m]. The starts are kept,
     so a second call with the same inputs only iterates.

@@ -42,7 +42,7 @@ _LEAST = 1e-18
 """Smaller errors are drawn on the lower edge: no double can have them."""
 
 _MOST = 1e3
-"""Greater errors are drawn on the upper edge, such as that of a step that runs away, in [rad]."""
+"""Greater errors are drawn on the upper edge, as of a step that runs away, in [rad]."""
 
 _FAINT = '#6b7782'
 _HALO = 'stroke="#ffffff" stroke-width="3" paint-order="stroke"'
@@ -165,7 +165,7 @@ class _Picture:
         ]
 
     def place_labels(self) -> list[PlacedLabel]:
-        """Return the labels that have a free place; those of the scene's settings come first."""
+        """Return the labels that have a free place; the scene's settings come first."""
         taken = [mark.box for marks in self.curves for mark in marks]
         segments = [
             ((one.x, one.y), (other.x, other.y))

@@ -164,7 +164,7 @@ class TimedScene:
         for now, message in block:
             if injection is not None:
                 injection.advance(now)
-                now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
+                now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the time)
             if message:
                 offer(message, now)
             if tick(now).message:

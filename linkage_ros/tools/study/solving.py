@@ -9,8 +9,8 @@
 """
 The error of solving the loops, and what other ways to solve them cost.
 
-The exact joints are those of `linkage_ros.tools.study.enclosure`: balls that are proved to hold
-the solution. The states are those of the scene's own motion. What a scene cannot ask for stands
+The exact joints are from `linkage_ros.tools.study.enclosure`: balls that are proved to hold
+the solution. The states are from the scene's own motion. What a scene cannot ask for stands
 beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
 spline through a table, thirty digits.
 """
@@ -51,7 +51,7 @@ _BITS = 104
 """Precision of thirty digits."""
 
 _FAR = 0.1
-"""Larger errors, in [rad], are those of another pose: the method has failed."""
+"""Larger errors, in [rad], mean another pose: the method has failed."""
 
 DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
@@ -287,7 +287,7 @@ class HardCase(NamedTuple):
     place: str  # 'toggle of double_rocker'
     solver: str
     worst: float  # Greatest error where it answers, in [rad]
-    failed: int  # States without an answer, or with that of another pose
+    failed: int  # States without an answer, or with another pose
     states: int  # All states, `DISTANCES` from the singular pose
 
 

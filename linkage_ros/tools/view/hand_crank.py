@@ -26,7 +26,7 @@ _QUICKNESS = 40.0
 """Natural frequency ω of the filter, in [rad/s]: it lags by 50 ms."""
 
 HELD = 1.0
-"""Time after the last word of a hand when the crank is let go, in [s]."""
+"""Time after the last message of a hand when the crank is released, in [s]."""
 
 
 class HandCrank:

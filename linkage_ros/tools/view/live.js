@@ -3,7 +3,7 @@
  * The page of a running node: what the node says, and hands on its crank, faults and recording.
  *
  * All that is shown comes by a WebSocket, and only the newest state is drawn. A switch shows what
- * the node says, not what was asked of it.
+ * the node says, not what was asked.
  */
 
 const Live = (() => {

@@ -297,7 +297,7 @@ class LiveBridge:
         self._last_told = -inf
 
     def _follow_run(self, run: FollowedRun) -> None:
-        """Subscribe to the topics of a run, and forget those of the run before."""
+        """Subscribe to the topics of a run, and forget the topics of the run before."""
         node = self._node
         for subscription in self._run_subscriptions:
             node.destroy_subscription(subscription)

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The model of a linkage: all that the page of `linkage view` needs of it, as JSON holds it.
+The model of a linkage: all that the page of `linkage view` needs, as JSON.
 
 The page moves it by the program: JavaScript that `kinematics.compiling` writes.
 """
@@ -49,7 +49,7 @@ from linkage_ros.tools.models.source_code import JavaScript, STATUSES, Subject, 
 _STATUSES = {name: index for index, name in enumerate(STATUSES)}
 
 _SAMPLES = 180
-"""Number of inputs at which transmission angle and margin are told."""
+"""Number of inputs at which transmission angle and margin are computed."""
 
 _MOST_GHOSTS = 7
 """Most other assemblies."""
@@ -104,7 +104,7 @@ def build_model(
 
 
 def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
-    """Return the model of a linkage without a file, whose other assemblies are not told."""
+    """Return the model of a linkage without a file, without its other assemblies."""
     inputs = usual_inputs(closure)
     drawn = drawn_in_frames(prepare_view(closure, inputs))
     return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {

@@ -42,7 +42,7 @@ def window_of(since: float | None, until: float | None) -> Window:
     """
     Return the part of a run between two times, in [s].
 
-    A LinkageError is raised if they are no times, or in the wrong order.
+    A LinkageError is raised if they are not times, or in the wrong order.
     """
     ends = []
     for option, value, default in (('--since', since, 0), ('--until', until, Window().until)):

@@ -59,7 +59,7 @@ class Request(NamedTuple):
 
 
 class RequestError(LinkageError):
-    """A message that is no request."""
+    """A message that is not a request."""
 
     def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
         super().__init__('message', reason, remedy)
@@ -175,7 +175,7 @@ class _RequestFields(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Return half the width of the bars that are shown, in [m]; 0 if it is not told."""
+        """Return half the width of the bars that are shown, in [m]; 0 if not given."""
         (size,) = _read_numbers('size', [self.content.get('size', 0.0)], 1)
         return max(0.0, size)
 
@@ -185,7 +185,7 @@ class _RequestFields(NamedTuple):
         return closure_of(self.text, self.name)
 
     def read_numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return a list of so many numbers."""
+        """Return a list of ``count`` numbers."""
         return _read_numbers(key, self.content.get(key), count)
 
 
@@ -273,7 +273,7 @@ _HANDLERS: dict[str, Callable[[_RequestFields], dict[str, Any]]] = {
 
 @lru_cache(maxsize=4)
 def closure_of(text: str, name: str) -> Closure:
-    """Return the closure of a linkage file's text; errors are those of `linkage_ros.load`."""
+    """Return the closure of a linkage file's text; errors are as in `linkage_ros.load`."""
     return read_closure(parse_yaml(encode_text(text, name), name), name)
 
 

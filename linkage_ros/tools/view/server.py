@@ -192,7 +192,7 @@ class Server:
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
         """Answer only what comes from the page itself."""
         own = [[f'http://{host}'] for host in self._hosts]
-        # Browsers name the origin of every WebSocket, but not that of every page.
+        # Browsers name the origin of every WebSocket, but not of every page.
         unnamed: list[list[str]] = [] if 'Upgrade' in request.headers else [[]]
         if request.headers.getall('Host', []) not in [[host] for host in self._hosts]:
             return self._refuse(403, 'a request that names another host')

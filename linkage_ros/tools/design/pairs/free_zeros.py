@@ -69,7 +69,7 @@ Moved = Literal['rocker', 'crank', 'both']
 Lost = Literal['imaginary', 'infinite', 'vague']
 
 NOISE = 8.0
-"""Multiple of the effect of rounding the angles: smaller values cannot be told from zero."""
+"""Multiple of the effect of rounding the angles: smaller values may be zero."""
 
 _UNKNOWNS: dict[Moved, list[int]] = {'crank': [0, 1, 2], 'rocker': [0, 1, 3], 'both': [0, 1, 2, 3]}
 """Indices of the unknowns among k1, k2, α, β."""
@@ -352,7 +352,7 @@ def four_pairs(
     check_pairs(crank, rocker, ground)
     rows = equation_differences(crank, rocker)
     sizes = np.linalg.svd(_real_rows(rows), compute_uv=False)
-    # Rounding error of a determinant: that of one row times the largest area of the others.
+    # Rounding error of a determinant: the error of one row times the largest area of the others.
     noise = NOISE * np.sum(rows.noise) * sizes[0] * sizes[1]
     directions: list[tuple[Moved, float, float]] = []
     imaginary = vague = 0
@@ -389,7 +389,7 @@ def five_pairs(
     """
     Return all four-bars for five pairs with the zeros of crank and rocker free.
 
-    The best conditioned comes first. Units and errors are those of `four_pairs`.
+    The best conditioned comes first. Units and errors are as in `four_pairs`.
     """
     check_pairs(crank, rocker, ground)
     rows = equation_differences(crank, rocker)

@@ -28,7 +28,7 @@ The differences are products,
 of angles that are sums of two or four doubles, and are computed so. Determinants, lengths and the
 coupler are computed in sums of two doubles too, so that they lose no more than rounding the angles
 loses: at a change point, in a parallelogram or with a short coupler, terms cancel whatever the
-angles are. So the error of the lengths is that of the angles: each length is within 4·2⁻⁵³ of its
+angles are. So only the error of the angles remains: each length is within 4·2⁻⁵³ of its
 sensitivity κ, the sum of its relative changes with each angle (`length_gradient`); if κ is too
 large for any digit, no digit is trusted. More pairs are met by least squares. The coupler is real
 whenever the angles are: b² is the mean, over the pairs, of the squared distance of crank pin and
@@ -90,12 +90,12 @@ class System(NamedTuple):
     # Angles of crank and rocker, in [rad]; (3, n).
     theta: Array
     phi: Array
-    # cos φ, cos θ and cos(θ − φ) of the second and third pair minus those of the first, divided by
+    # cos φ, cos θ and cos(θ − φ) of the second and third pair minus the first, divided by
     # −2; (2, n).
     P: Array
     Q: Array
     R: Array
-    last: Array  # P and Q of the third pair minus those of the second; (2, n)
+    last: Array  # P and Q of the third pair minus the second; (2, n)
     determinant: Array  # P0·Q1 − P1·Q0; (n,)
     k: Array  # k1, k2 and k3; (3, n)
     lengths: Array  # Lengths of crank, coupler and rocker, the first and the last signed; (3, n)

@@ -21,7 +21,7 @@ pivot, x = (b² + |D|² − c²)/2b and y = √(|D|² − x²) along and across 
     e^{iβ} = D·(x ± i·y)/|D|²,   + where the rocker's pin is on the left of D.
 
 Its derivatives follow from |a·e^{iθ} + b·e^{iβ} − d| = c.
-Lengths along a curve are those of its chords.
+Lengths along a curve are sums of chords.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ class PathTask:
         Crank angles at the points, in [rad], all increasing or all decreasing, within a turn; None
         if they are free.
     zero_free
-        Whether only the differences of these angles count. Otherwise they are those of the crank's
-        pin itself, from the x axis.
+        Whether only the differences of these angles count. Otherwise they are angles of the
+        crank's pin itself, from the x axis.
     full_turn
         Whether the crank shall turn fully even if the path is open.
     links
@@ -140,7 +140,7 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
             'write on beyond 360° or below 0° where they wrap',
         )
     travel = abs(timing[-1] - timing[0])
-    # A few rounding errors of degrees are no more than a turn.
+    # A few rounding errors of degrees do not exceed a turn.
     if not travel < tau * (1.0 + 1e-12) or (closed and travel > tau * (1.0 - 1e-12)):
         raise SynthesisError(
             'timing',

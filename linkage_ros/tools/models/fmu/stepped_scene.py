@@ -7,9 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-A scene that another program steps: inputs in, so many ticks, outputs.
+A scene that another program steps: inputs, ticks, outputs.
 
-The clock is that of the other program, counted in ticks: tick n is at n/rate seconds after the
+The other program keeps the clock, counted in ticks: tick n is at n/rate seconds after the
 first. No other clock is read.
 """
 
@@ -40,7 +40,7 @@ FIRST_TICK = NANOSECONDS
 """Time of the first tick, in [ns]; not 0, since a sample stamped 0 is rejected as unstamped."""
 
 NO_CRANK = 0
-"""Status where no state of the crank is known; those of `Status` count from 1, in their order."""
+"""Status without a known state of the crank; the members of `Status` count from 1, in order."""
 
 STATUS_NUMBERS: Mapping[Status, int] = {status: n for n, status in enumerate(Status, 1)}
 
@@ -275,7 +275,7 @@ class SteppedScene:
 
     def step(self, ticks: int, inputs: Sequence[float]) -> None:
         """
-        Take the values of the inputs at the end of the last step, then do so many ticks.
+        Take the values of the inputs at the end of the last step, then do these ticks.
 
         A drive takes them once, as one message.
         """

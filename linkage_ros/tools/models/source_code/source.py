@@ -163,7 +163,7 @@ class Language(ABC):
         )  # fmt: skip
 
     def function_name(self, derivatives: int) -> str:
-        """Return the name of the function with so many derivatives."""
+        """Return the name of the function with this number of derivatives."""
         return FUNCTIONS[derivatives]
 
     @abstractmethod

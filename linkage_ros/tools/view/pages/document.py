@@ -96,7 +96,7 @@ def plotting_library() -> str:
 
 
 def _join_files(name: str, parts: Parts) -> str:
-    """Return the file that all pages share, followed by those of this page."""
+    """Return the file that all pages share, followed by this page's."""
     texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
     return '\n'.join(file.read_text('utf-8') for file in texts)
 

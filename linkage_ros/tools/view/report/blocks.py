@@ -11,7 +11,7 @@ The messages of a bag in blocks of some thousands, with the run time of each.
 
 Run time begins at 0 and never goes back. When the recorder's clock jumps back, run time stands
 still and then goes on from there. In a bag of another program, messages on several topics may be
-slightly out of order; that is no jump.
+slightly out of order; that is not a jump.
 """
 
 from __future__ import annotations

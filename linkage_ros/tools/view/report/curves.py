@@ -134,7 +134,7 @@ class Lateness:
 
 
 def _least_around(values: Times, window: int) -> tuple[Times, Times]:
-    """Return the minimum of each value and so many before it, and of it and so many after it."""
+    """Return each value's minimum with ``window`` values before it, and after it."""
     size = window + 1
     n = len(values)
     padded = np.full(-(-n // size) * size + size, _NONE)
@@ -235,7 +235,7 @@ class SceneCurves:
         for names, angles in inputs:
             if names[0] in self._places:
                 values[:, [self._places[name] for name in names]] = angles
-        # Published values have priority over those of samples.
+        # Published values have priority over samples.
         positions = numbers[:, 0, : len(self._joints)]
         there = ~np.isnan(positions)
         under = values[:, self._joints]
@@ -340,7 +340,7 @@ class PinForces:
         self.left_out: Counter[str] = Counter()
 
     def add(self, times: Times, messages: Sequence[bytes]) -> None:
-        """Add messages at run times in [ns]; those of one time, of several linkages, are a row."""
+        """Add messages at run times in [ns]; several linkages at one time are a row."""
         good: list[tuple[int, MessageContent]] = []
         for time, message in zip(times.tolist(), messages, strict=True):
             values = self._reader.read(message)

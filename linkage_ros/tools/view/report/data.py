@@ -78,7 +78,7 @@ _NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
 class Poses(NamedTuple):
     """Poses of the links."""
 
-    links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are no links
+    links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are not links
     # Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape (instants, links,
     # 3); NaN where it is unknown.
     frames: Numbers
@@ -226,7 +226,7 @@ def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
     shown = dict(run.event_tracks)
     silent = [each.silent for each in run.linkages]
     if silent:
-        # Each linkage has its own silences; one lane shows those of all.
+        # Each linkage has its own silences; one lane shows all.
         merged = EventTrack(APART)
         spans = [
             (s.begin, s.end, each.name, s.count)

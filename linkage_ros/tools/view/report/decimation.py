@@ -81,7 +81,7 @@ def most_columns(space: int) -> int:
 
 
 def interval_capacity(columns: int, space: int) -> int:
-    """Return the number of intervals of so many curves for a size limit, in [bytes]."""
+    """Return the number of intervals of each curve for a size limit, in [bytes]."""
     # Per interval two times, and per curve two values, of 8 bytes each.
     most = space // (16 * columns + 16)
     return 1 << (most.bit_length() - 1)

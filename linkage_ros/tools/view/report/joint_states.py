@@ -31,7 +31,7 @@ _MOST_LAYOUTS = 64
 """Maximum number of layouts per message length in a block; a publisher has a handful."""
 
 MOST_JOINTS = 64
-"""Maximum number of joints of a topic; more is no machine that a page could show."""
+"""Maximum number of joints of a topic; a page could not show more."""
 
 NOTHING = 'no joints or no numbers'
 TWICE = 'a joint named twice'

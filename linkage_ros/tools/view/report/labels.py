@@ -73,7 +73,7 @@ CLOSED_NOTE = (
 
 
 def shorten_text(text: str, most: int = LONGEST_NAME) -> str:
-    """Return a text of at most so many characters."""
+    """Return a text of at most ``most`` characters."""
     return text if len(text) <= most else f'{text[: most - 1]}…'
 
 

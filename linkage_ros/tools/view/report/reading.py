@@ -301,7 +301,7 @@ class SceneRun:
         self._examine_states(states, read)
         self._forces.add(rows['forces'].passed, rows['forces'].data)
         for topic, kind in self._loaded.items():
-            if kind in rows:  # unless its name is that of another topic of the run
+            if kind in rows:  # unless another topic of the run has its name
                 self._loads.add(topic, rows[kind].passed, rows[kind].data)
         self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
         for time, message in zip(health.passed.tolist(), health.data, strict=True):

@@ -38,7 +38,7 @@ _LONGEST_TEXT = 120
 _MORE = ', and others'
 
 _SILENCE_FACTOR = 5
-"""A gap of so many usual periods is a silence."""
+"""A gap of this many usual periods is a silence."""
 
 _SHORTEST_SILENCE = 2_000_000
 """Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
@@ -222,7 +222,7 @@ class LinkageRun(NamedTuple):
 class Frames(NamedTuple):
     """Instants of a run at which all joints are known, for the animation."""
 
-    step: int  # One joint state of so many is kept
+    step: int  # One in this many joint states is kept
     times: Times  # Run times, in [ns]
     # Joint values by name in messages, in [rad] or [m]; NaN if missing.
     values: Mapping[str, Numbers]

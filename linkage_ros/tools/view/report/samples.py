@@ -10,7 +10,7 @@
 Crank samples of a run: the accepted ones, the rejected ones with reasons, and the crank angle.
 
 Each sample is offered to the scene's own pipeline, as in the run, so that it is rejected for the
-same reason. The crank angle is that of the last accepted sample, extrapolated by its rate.
+same reason. The crank angle is the last accepted sample's, extrapolated by its rate.
 """
 
 from __future__ import annotations
