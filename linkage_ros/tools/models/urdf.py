@@ -59,8 +59,8 @@ _EXPRESSION = re.compile(r'\$[{(]')
 """Text that xacro evaluates (https://wiki.ros.org/xacro)."""
 
 _HEAD = f"""\
-A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
-the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
+published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
 Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
 iyy = izz/2.
 A limit is as the linkage gives it; else what the joint comes to over the range of the input that

@@ -273,7 +273,7 @@ const Live = (() => {
     }
     const note = element('p', { className: 'note' });
     note.textContent = hands.length
-      ? 'Without “hold”, the crank is let go one second after the last movement. It can be turned in the picture, too.'
+      ? 'Without “hold”, the crank is released one second after the last movement. It can be turned in the picture, too.'
       : `The scene drives the crank itself (${live.drive}).`;
     if (live.drive === 'torque') note.textContent = 'Without “hold”, the effort ends after one second.';
     at('hands').replaceChildren(...hands.map((hand) => hand.box), note);

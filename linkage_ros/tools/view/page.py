@@ -92,7 +92,7 @@ def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
     editing = mode == 'edit'
     yield from _header(title, editing, can_save)
     yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
-    yield 'The linkage still moves; it is tried again.</p>'
+    yield 'The linkage still moves; the page tries again.</p>'
     yield '<p id="wrong" role="alert" hidden></p>'
     yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
     yield '<main><section class="player" aria-label="The linkage">'
