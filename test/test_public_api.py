@@ -186,7 +186,7 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: lr.generate_function('x', *RANGES, points=2), lr.SynthesisError,
         'points: there are 2',
     ),
-    (lambda: lr.generate_function(abs, *RANGES), TypeError, 'is not a text; write it as'),
+    (lambda: lr.generate_function(abs, *RANGES), TypeError, 'is not a string; write it as'),
     (lambda: lr.generate_function('log10(', *RANGES), lr.SynthesisError, 'log10('),
 ]  # fmt: skip
 

@@ -79,7 +79,7 @@ def test_the_answer_comes_first(by_hand: Any, capsys: Any) -> None:
 
 def test_a_need_that_nothing_meets_is_an_exit_code(by_hand: Any, capsys: Any) -> None:
     assert run('demo', '--need', '1e-12') == 1
-    assert 'stands in the way' in capsys.readouterr().out.splitlines()[0]
+    assert 'prevents it' in capsys.readouterr().out.splitlines()[0]
 
 
 def test_the_tuned_scene_has_the_lines_of_the_answer(
@@ -109,13 +109,13 @@ def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (['--only', 'error'], "--only error: there is no such part; did you mean 'errors'?"),
-        (['--only', 'x'], f'--only x: there is no such part; known: {", ".join(PARTS)}'),
+        (['--only', 'error'], "--only error: is not a part to measure; did you mean 'errors'?"),
+        (['--only', 'x'], f'--only x: is not a part to measure; known: {", ".join(PARTS)}'),
         (
             ['--only', 'effects', '--set', 'effects={}'],
             '--only effects: the scene has none, and no fault; leave it out',
         ),
-        (['-o', 'x.yaml'], '-o: is the scene that meets a need; say it: --need 1e-3'),
+        (['-o', 'x.yaml'], '-o: is the scene that meets a need; add --need 1e-3'),
         (['--need', '1', '--only', 'effects'],
          '--need: is for errors; write --only errors,effects'),
     ],
@@ -132,7 +132,7 @@ SHORT_COUPLER = 'four_bar: {a: 0.12, b: 0.04, c: 0.08, d: 0.1}\n'
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (['demo'], r'drive: topic has no motion of its own; .*--like sine'),
+        (['demo'], r'drive: topic has no own motion; .*--like sine'),
         (['stuck.yaml'], 'moves the linkage nowhere where its loops close; see linkage check'),
         (['nowhere.yaml'], r'nowhere.yaml: '),
         (['demo', '--like', 'no_bag'], r'no_bag: '),

@@ -45,15 +45,15 @@ def refused(linkage: Run, *typed: str) -> str:
         (['-o', 'a'], 'a: has no ending; name a file that ends in .c or .h or .js or .py'),
         (
             ['-o', 'a.c', '--joints', 'rocker_joint,coupler'],
-            "--joints: 'coupler' is no published joint; did you mean 'coupler_joint'?",
+            "--joints: 'coupler' is not a published joint; did you mean 'coupler_joint'?",
         ),
         (
             ['-o', 'a.c', '--joints', ''],
-            "--joints: '' is no published joint; name some of coupler_joint, rocker_joint",
+            "--joints: '' is not a published joint; name some of coupler_joint, rocker_joint",
         ),
         (
             ['-o', 'a.c', '--name', 'four-bar'],
-            "--name: 'four-bar' makes no name in C; write one, as --name four_bar",
+            "--name: 'four-bar' cannot be a name in C; write one, as --name four_bar",
         ),
         (
             ['-o', 'no/a.c'],
@@ -67,7 +67,7 @@ def test_what_is_typed_wrong_is_said_in_a_line(linkage: Run, typed, said) -> Non
 
 def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: Path) -> None:
     shutil.copy(FOUR_BAR, tmp_path / '4.yaml')
-    said = "4.yaml: '4' makes no name in C; write one, as --name four_bar"
+    said = "4.yaml: '4' cannot be a name in C; write one, as --name four_bar"
     assert refused(linkage, '4.yaml', '-o', 'a.c') == said
     assert linkage('compile', '4.yaml', '-o', 'a.c', '--name', 'four').stdout == 'a.c\n'
     assert 'four_motion(' in (tmp_path / 'a.c').read_text()

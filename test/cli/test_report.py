@@ -157,10 +157,19 @@ def test_a_link_stays_a_link(bag: Path, tmp_path: Path) -> None:
 
 
 TIMES = {
-    'negative': (['--since', '-1'], '--since: -1.0 is no time in a run; write seconds from 0 on'),
-    'nan': (['--until', 'nan'], '--until: nan is no time in a run; write seconds from 0 on'),
-    'infinite': (['--until', 'inf'], '--until: inf is no time in a run; write seconds from 0 on'),
-    'too far': (['--since', '1e10'], '--since: 10000000000.0 is no time in a run; write seconds'),
+    'negative': (
+        ['--since', '-1'],
+        '--since: -1.0 is not a time in a run; write seconds from 0 on',
+    ),
+    'nan': (['--until', 'nan'], '--until: nan is not a time in a run; write seconds from 0 on'),
+    'infinite': (
+        ['--until', 'inf'],
+        '--until: inf is not a time in a run; write seconds from 0 on',
+    ),
+    'too far': (
+        ['--since', '1e10'],
+        '--since: 10000000000.0 is not a time in a run; write seconds',
+    ),
     'reversed': (['--since', '2', '--until', '1'], '--until: 1.0 is not after --since; write a'),
     'nothing': (['--since', '1', '--until', '1'], '--until: 1.0 is not after --since; write a'),
 }
@@ -268,7 +277,7 @@ def test_a_damaged_chunk_is_told_as_far_as_it_goes(longer: Path, tmp_path: Path)
     assert answer(command, bag) == 0
     (warning,) = warnings_of(tmp_path / 'bag.html')
     assert warning.startswith('Damaged: ')
-    assert warning.endswith('; what lies before is told.')
+    assert warning.endswith('; the page shows what lies before.')
 
 
 def test_a_damaged_attachment_is_a_line(bag: Path) -> None:

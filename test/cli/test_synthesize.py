@@ -218,7 +218,7 @@ def test_what_is_not_met_is_said_with_the_nearest_and_nothing_is_written(
     )
     assert made.returncode == 1
     assert made.stdout.startswith('None of 1 solution(s) has what is needed. Nearest to it:')
-    for words in ('branch defect', 'no crank-rocker', 'not 30°'):
+    for words in ('branch defect', 'not crank-rocker', 'not 30°'):
         assert words in made.stdout
     assert not (tmp_path / 'x.yaml').exists()
 
@@ -284,14 +284,14 @@ def test_an_error_in_radians_is_told_in_radians(linkage: Run) -> None:
 
 WRONG = [
     # what is typed, what the answer names
-    ([], 'the task: is not said; name one of --pair'),
+    ([], 'the task: is not given; name one of --pair'),
     (['--pair', '1', '2'], 'pairs: there are 1; three make a four-bar'),
     ([*SOURCE_003, *POSES], '--pair and --pose: stand for two tasks'),
     (['--pair', '25', '30', '--pair', '25', '30', '--pair', '1', '2'], 'pairs 1 and 2: are the'),
     (['--pair', '25', '30', '--pair', '385', '30', '--pair', '1', '2'], 'pairs 1 and 2'),
     (['--pair', '0', '0', '--pair', '20', '20', '--pair', '40', '40'], 'pairs'),
     (['--pair', '0', '0', '--pair', '20', 'nan', '--pair', '40', '40'], 'pair 2'),
-    ([*SOURCE_003, '--ground', '-1'], 'ground: -1.0 m is no length; give it one from 1e-12 to'),
+    ([*SOURCE_003, '--ground', '-1'], 'ground: -1.0 m is not a length; give it one from 1e-12 to'),
     *(([*SOURCE_003, '--ground', each], 'ground: ') for each in ('0', '1e-320', '1e10', 'nan')),
     ([*SOURCE_003, '--need', 'crankrocker'], "did you mean 'crank-rocker'?"),
     ([*SOURCE_003, '--min-transmission', 'nan'], 'transmission angle: nan° is not in'),

@@ -175,7 +175,7 @@ def typed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 @pytest.mark.parametrize(
     ('line', 'words'),
     [
-        ('synthesize', 'the task: is not said; name one of --pair'),
+        ('synthesize', 'the task: is not given; name one of --pair'),
         ('solve four_bar --at 40,5', 'a decimal has a point, not a comma'),
         ('synthesize --pair 0 0 --pair 30 17 --pair 60 38,5', "'38,5' is not a number; a decimal"),
         ('simulate demo -o x.csv --seconds 0,5', "'0,5' is not a number; a decimal has a point"),

@@ -143,10 +143,10 @@ def test_joints_that_do_not_tell_all_are_said_in_a_line(write_scene, start):
         'joints: {rocker_joint: {parent: ground, child: rocker}}\n'
     )
     scene = write_scene('untold', TURNING + 'robot_description: true', linkage)
-    node = start(scene, ready='do not tell')
+    node = start(scene, ready='do not determine')
     assert node.process.wait(20) == 2
-    line = next(line for line in node.log.splitlines() if 'do not tell' in line)
+    line = next(line for line in node.log.splitlines() if 'do not determine' in line)
     assert line.endswith(
-        "untold_linkage.yaml:8: joints: the published ones do not tell where link 'coupler' "
-        'stands; add to joints: coupler_joint: {parent: crank, child: coupler}'
+        'untold_linkage.yaml:8: joints: the published joints do not determine where link '
+        "'coupler' stands; add to joints: coupler_joint: {parent: crank, child: coupler}"
     )

@@ -181,7 +181,9 @@ def folded(crank, arm, **options):
 
 
 def test_a_start_in_which_two_assemblies_meet():
-    with pytest.raises(FileError, match='two ways to close it meet where all joints are 0; give'):
+    with pytest.raises(
+        FileError, match='several assemblies close the loops where all joints are 0; give'
+    ):
         folded(0, 0)
     at = {'crank_joint': 1.0, 'rod_joint': -1.0, 'arm_joint': 1.0}
     linkage = folded(0, 0, at=at).linkage
@@ -295,7 +297,7 @@ UNREAD = {
     SDF_JOINT.replace(
         '<pose>', '<pose relative_to="base">'
     ): 'joint pin of <gazebo>, between rocker and coupler',
-    LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is no pin',
+    LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is not a pin',
     '<constraint type="ball"/>': '<constraint>',
 }
 
@@ -323,7 +325,7 @@ FLAT = joint('j', 'base', 'a', '0 0 0', axis='0 0 1')
 BAD = {
     'a loop tag of no link': (
         robot(TREE, LOOP_CONSTRAINT.replace('"coupler"', '"rod"')),
-        "x.urdf: loop_constraint pin: its child 'rod' is no link; name a link",
+        "x.urdf: loop_constraint pin: its child 'rod' is not a link; name a link",
     ),
     'a loop tag without a place': (
         robot(TREE, LOOP_CONSTRAINT.replace('0.2 0 0', '0.2')),
@@ -331,13 +333,13 @@ BAD = {
     ),
     'a pin of gazebo on no link': (
         robot(TREE, SDF_JOINT.replace('>rocker<', '>rod<')),
-        "x.urdf: joint pin of <gazebo>: its parent 'rod' is no link; name a link",
+        "x.urdf: joint pin of <gazebo>: its parent 'rod' is not a link; name a link",
     ),
     'a pin of gazebo nowhere': (
         robot(TREE, SDF_JOINT.replace('0.2 0 0 0 0 0', '0.2 0 inf 0 0 0')),
         "x.urdf: joint pin of <gazebo>: pose='0.2 0 inf 0 0 0' is not 6 finite numbers; correct",
     ),
-    'no XML': ('<robot', 'x.urdf:1: is no XML (unclosed token: line 1, column 0); name a URDF'),
+    'no XML': ('<robot', 'x.urdf:1: is not XML (unclosed token: line 1, column 0); name a URDF'),
     'another file': ('<sdf/>', 'x.urdf: holds <sdf>, not <robot>; name a URDF file'),
     'xacro': (
         robot('<link name="${prefix}a"/>'),
@@ -359,17 +361,17 @@ BAD = {
     'a planar joint': (
         robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='planar')),
         (
-            'x.urdf: joint j: is planar, which no pin or slider of a planar linkage is; write '
+            'x.urdf: joint j: type planar cannot be a pin or slider of a planar linkage; write '
             'revolute, continuous, prismatic or fixed, or leave it out with what hangs on it'
         ),
     ),
     'a floating joint in a loop': (
         robot(A_B, FLAT, joint('free', 'a', 'b', '0 0 0', kind='floating')),
-        'x.urdf: joint free: is floating, which no pin',
+        'x.urdf: joint free: type floating cannot be a pin',
     ),
     'a joint to nothing': (
         robot(A_B, joint('j', 'base', 'c', '0 0 0')),
-        "x.urdf: joint j: its child 'c' is no link; name a link",
+        "x.urdf: joint j: its child 'c' is not a link; name a link",
     ),
     'no number': (
         robot(A_B, joint('j', 'base', 'a', '0 nan 0')),
@@ -382,9 +384,8 @@ BAD = {
     'two parents': (
         robot(A_B, FLAT, joint('k', 'b', 'a', '0 0 0')),
         (
-            'x.urdf: link a: is the child of two joints, j and k; end one of them in a frame of '
-            'its own, '
-            'and close it by --close'
+            'x.urdf: link a: is the child of two joints, j and k; let one end in its own '
+            'frame, and close it by --close'
         ),
     ),
     'two roots': (robot(A_B, FLAT), 'x.urdf: has 2 roots (base, b); join all links by joints'),
@@ -399,7 +400,7 @@ BAD = {
             frame('a', 'c', '0 0 0'),
             joint('k', 'a', 'b', '0 0 0'),
         ),
-        "x.urdf: joint j: mimics 'q', which is no joint; name a joint",
+        "x.urdf: joint j: mimics 'q', which is not a joint; name a joint",
     ),
     'no such frame': (
         robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
@@ -497,7 +498,7 @@ class TestCommand:
             (['urdf', 'nowhere.yaml'], 'linkage urdf: nowhere.yaml: '),
             (['mjcf', 'nowhere.yaml'], 'linkage mjcf: nowhere.yaml: '),
             (['import', 'nowhere.urdf'], 'linkage import: nowhere.urdf: cannot be read (No such'),
-            (['import', '.'], 'linkage import: .: is a folder, and no URDF; name a URDF'),
+            (['import', '.'], 'linkage import: .: is a folder, not a URDF; name a URDF'),
         ],
     )
     def test_a_file_that_is_not_there(self, typed, message, capsys, tmp_path, monkeypatch):
@@ -514,7 +515,7 @@ class TestCommand:
         assert main(['urdf', str(file)]) == 2
         err = capsys.readouterr().err
         line = text.count('\n') + 1
-        told = f'joints: the published ones do not tell where {remedy}'
+        told = f'joints: the published joints do not determine where {remedy}'
         assert err == f'linkage urdf: {file}:{line}: {told}\n'
 
     def test_where_it_cannot_be_written(self, tmp_path, capsys):

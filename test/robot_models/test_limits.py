@@ -158,7 +158,7 @@ def test_limits_of_a_urdf_that_cross_are_refused(lower, upper):
         read_urdf(ET.tostring(robot), 'it.urdf')
     assert str(error.value) == (
         f'it.urdf: joint rocker_joint: its limits, {lower} to {upper}, leave nothing between '
-        'them; put <limit> right, or import with --no-limits'
+        'them; correct <limit>, or import with --no-limits'
     )
 
 

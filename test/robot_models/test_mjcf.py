@@ -170,7 +170,7 @@ def test_linkages_of_two_gravities_are_refused():
         ModelPart(closure, 'a_', Loads((0.0, -9.81))),
         ModelPart(closure, 'b_', Loads((0.0, 9.81))),
     ]
-    with pytest.raises(LinkageError, match=r'\[0 9.81\] is another than that of the first .*one'):
+    with pytest.raises(LinkageError, match=r'\[0 9.81\] differs from the first .*one'):
         mujoco_model('it', parts)
 
 

@@ -213,7 +213,7 @@ def test_joints_that_do_not_tell_all(name):
     linkage = linkage_of(text)
     with pytest.raises(PartError) as caught:
         urdf_model('it', [ModelPart(Closure(linkage))])
-    assert str(caught.value) == f'joints: the published ones do not tell where {remedy}'
+    assert str(caught.value) == f'joints: the published joints do not determine where {remedy}'
     # What the remedy says is one.
     added = str(caught.value).partition('add to joints: ')[2]
     whole = text.replace('joints: {', f'joints: {{{added}, ')

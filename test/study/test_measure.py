@@ -49,7 +49,7 @@ TOPIC = 'linkage: four_bar'
     [
         (NEVER, None, 'drive: moves the linkage nowhere where its loops close'),
         (RUNAWAY, None, 's the input runs away and passes'),
-        (TOPIC, None, 'topic has no motion of its own; say what its crank does: --like sine'),
+        (TOPIC, None, 'topic has no own motion; choose a motion of its crank: --like sine'),
         (TOPIC, 'nowhere', 'nowhere: does not exist'),
     ],
 )  # fmt: skip

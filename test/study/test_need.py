@@ -81,7 +81,7 @@ def test_the_answer_is_the_cheapest_of_all_that_reach_it(seed):
     assert answer.is_met is bool(good)
     if not good:
         assert answer.error == pytest.approx(min(error for _, error, _ in choices_of(budget)))
-        assert 'stands in the way' in answer.text
+        assert 'prevents it' in answer.text
         return
     assert answer.error <= need * (1.0 + 1e-9)
     wanted = dict(answer.changes)

@@ -65,7 +65,7 @@ def test_what_no_crank_rocker_does_is_refused(task):
     [
         ('--swing 80', '--time-ratio is missing'),
         ('--time-ratio 1.1', '--swing is missing'),
-        ('--swing 80 --time-ratio 1/0', 'is no ratio; write 10/9 or 1.2'),
+        ('--swing 80 --time-ratio 1/0', 'is not a ratio; write 10/9 or 1.2'),
         ('--swing 190 --time-ratio 10/9', 'give one between 0 and 180°'),
         ('--swing 80 --time-ratio 10/9 --pose 0 0 0', 'stand for two tasks'),
     ],

@@ -254,11 +254,12 @@ def test_texts_name_positions_and_angles():
             'only taking it apart leads from one to the other'
         ),
         'out of order in a turn': (
-            'a crank that goes one way comes by the positions as 1 (20°), 3 (90°), 2 (150°), '
-            '4 (200°)'
+            'a crank that turns one way passes the positions in the order '
+            '1 (20°), 3 (90°), 2 (150°), 4 (200°)'
         ),
         'out of order across 180°': (
-            'a crank that goes one way comes by the positions as 2 (100°), 1 (190°), 3 (200°)'
+            'a crank that turns one way passes the positions in the order '
+            '2 (100°), 1 (190°), 3 (200°)'
         ),
         'a parallelogram through its change point': (
             'coupler and rocker are in line at a crank angle of 180°, and the rocker may go '

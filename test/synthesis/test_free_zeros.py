@@ -447,7 +447,7 @@ def test_a_rocker_that_stands_still_is_refused(solve_for):
 def test_pairs_that_are_one_spot_are_refused():
     theta = [1.0 + 1e-9 * step for step in range(5)]
     phi = [0.5 + 1.2e-9 * step + 1e-10 * step**2 for step in range(5)]
-    with pytest.raises(SynthesisError, match='too near each other to tell'):
+    with pytest.raises(SynthesisError, match='too close to decide'):
         five_pairs(theta, phi, 1.0)
 
 

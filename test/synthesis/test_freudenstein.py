@@ -268,14 +268,14 @@ REFUSED: dict[str, tuple[Angles, Angles, str]] = {
     'no number': (
         (25, nan, 50),
         (30, 40, 60),
-        'pair 2: nan° → 40° is no pair of angles; write two numbers of at most 6e+10°',
+        'pair 2: nan° → 40° is not a pair of angles; write two numbers of at most 6e+10°',
     ),
     'mirrored': (
         (25, -25, 50),
         (30, -30, 60),
         (
             'pairs 1 and 2: 25° → 30° and -25° → -30° are mirror images in the ground line: a '
-            'four-bar that has one has the other; give another pair in place of one of them'
+            'four-bar that has one has the other; replace one of the pairs'
         ),
     ),
     'parallel': (

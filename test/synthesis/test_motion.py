@@ -306,8 +306,8 @@ OFF_THE_POLE = 1e-15 + 1e-15j
         r'\(0.0, nan\), 0.0 is not a pose',
     ),
     ('fixed', [START, pose(0, 0, inf), OVER], (0j, 1j), 'pose 2', 'inf is not a pose'),
-    ('fixed', [START, RAISED, OVER], (0j, complex(inf, 0)), 'O4', r'\(inf, 0.0\) is no place'),
-    ('moving', [START, RAISED, OVER], (nan + 0j, 0j), 'A', 'no place'),
+    ('fixed', [START, RAISED, OVER], (0j, complex(inf, 0)), 'O4', r'\(inf, 0.0\) is not a place'),
+    ('moving', [START, RAISED, OVER], (nan + 0j, 0j), 'A', 'is not a place'),
     ('moving', [OVER, START, OVER], (0j, 1j), 'poses 1 and 3', r'the same, \(2, 1\) m at 50°'),
     ('fixed', [pose(1, 0, 350), pose(1, 0, -10), OVER], (0j, 1j), 'poses 1 and 2', 'at 350°'),
     ('moving', [START, RAISED, OVER], (1j, 1j), 'A and B', 'are the same place'),
@@ -327,7 +327,7 @@ OFF_THE_POLE = 1e-15 + 1e-15j
     ),
     (
         'moving', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, -1 + 1e-14j), 'B',
-        'so near a pole that not a digit of its fixed pivot',
+        'so near a pole that its fixed pivot has no certain digit',
     ),
 ])  # fmt: skip
 def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):

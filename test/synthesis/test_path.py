@@ -312,7 +312,7 @@ WHOLE = (
     'the last before the first again'
 )
 NEITHER = (
-    'timing: the crank angles go neither up nor down all the way; '
+    'timing: the crank angles neither increase nor decrease throughout; '
     'write on beyond 360° or below 0° where they wrap'
 )
 
@@ -320,8 +320,8 @@ NEITHER = (
 @pytest.mark.parametrize(('arguments', 'line'), [
     ({'points': (0j, 1j)}, 'path: 2 points; give three at least'),
     ({'points': (0j, 1j, 1j)}, 'points 2 and 3: both at (0, 1); leave one out'),
-    ({'points': (0j, 1j, complex(inf, 0.0))}, 'point 3: (inf, 0) is no place; correct it'),
-    ({'points': (0j, 1j, complex(0.0, nan))}, 'point 3: (0, nan) is no place; correct it'),
+    ({'points': (0j, 1j, complex(inf, 0.0))}, 'point 3: (inf, 0) is not a place; correct it'),
+    ({'points': (0j, 1j, complex(0.0, nan))}, 'point 3: (0, nan) is not a place; correct it'),
     (
         {'points': (*HOOK, 0j), 'closed': True},
         'point 4: is the first one again; leave it out: a closed path returns by itself',
@@ -343,7 +343,7 @@ NEITHER = (
     ({'points': HOOK, 'timing': (0.0, 1.0, tau), 'closed': True}, WHOLE),
     (
         {'points': HOOK, 'timing': UP, 'links': (2.0, 1.0)},
-        'links: from 2 to 1 of the path; say e.g. 0.2 to 4',
+        'links: from 2 to 1 of the path; write e.g. 0.2 to 4',
     ),
     (
         {'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},

@@ -297,14 +297,14 @@ def test_a_word_stands_for_kinds_of_four_bars(word, name):
 def test_an_unknown_word_is_refused(word, remedy):
     with pytest.raises(SynthesisError) as caught:
         Needs(word).check()
-    assert str(caught.value) == f'{word}: is no kind of four-bar; {remedy}'
+    assert str(caught.value) == f'{word}: is not a kind of four-bar; {remedy}'
 
 
 def test_misses_say_what_was_found_and_what_was_wanted():
     """At 60° on a ground of 6, s² = 28: cos μ = (49 + 81 − 28)/126, so that μ = 35.95°."""
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     assert unmet_needs(found, Needs('double-crank', radians(40.0), 4.0)) == (
-        'a crank-rocker, no double-crank',
+        'a crank-rocker, not double-crank',
         'a transmission angle of 35.95°, not 40°',
         'a link ratio of 4.5, not 4',
     )

@@ -212,5 +212,5 @@ def test_where_all_have_a_defect_it_is_said():
         found_for(seed=seed, count=1)
     assert str(caught.value) == (
         'pairs 25° → 30°, 35° → 40°, 50° → 60°: none of 1 zeros of crank and rocker gives a '
-        'four-bar without a defect; try more of them, or move an angle'
+        'four-bar without a defect; try more zeros, or move an angle'
     )

@@ -200,7 +200,7 @@ def test_what_changes_nothing_leaves_the_text_to_the_last_letter() -> None:
 # What is wrong.
 
 REFUSED = {
-    'no edit': ({}, r'^edit: \{\} is no edit; send pin, length'),
+    'no edit': ({}, r'^edit: \{\} is not an edit; send pin, length'),
     'no such pin': ({'pin': 'C', 'to': [0, 0]}, "^pin: 'C' is not there; "),
     'a place of one number': ({'pin': 'B', 'to': [0.1]}, r'^to: \[0\.1\] is not 2 numbers; '),
     'a place that is no number': (
@@ -214,18 +214,21 @@ REFUSED = {
     ),
     'no length': (
         {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.0}},
-        '^links.crank.A: 0 m is no length; type one above 0',
+        '^links.crank.A: 0 m is not a length; type one above 0',
     ),
     'no such link': (
         {'length': {'link': 'crnk'}},
         "^link: 'crnk' is not there; did you mean",
     ),
-    'no object': ({'length': 3}, '^length: 3 is no object; send an object'),
+    'no object': ({'length': 3}, '^length: 3 is not an object; send an object'),
     'a name that is taken': (
         {'trace': {'link': 'rocker', 'at': [0.05, 0.02], 'name': 'B'}},
-        "^name: 'B' is taken, or no name",
+        "^name: 'B' is taken, or is not a name",
     ),
-    'no side': ({'side': {'B': 'up'}}, "^assembly.B: 'up' is no side of it; choose left or right"),
+    'no side': (
+        {'side': {'B': 'up'}},
+        "^assembly.B: 'up' is not one of its sides; choose left or right",
+    ),
     'a link without a pin on the ground': (
         {'input': {'link': 'coupler'}},
         '^coupler: has no pin on the ground; ',

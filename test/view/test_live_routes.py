@@ -112,7 +112,7 @@ def test_what_is_no_request_is_counted_and_the_page_goes_on() -> None:
     with served([live(script)]) as server:
         assert asyncio.run(page(server.address))['said'] == 'did reset'
         refused = server.server.refused
-    assert refused == {'a message that is no request': 2 * len(bad) - 1}
+    assert refused == {'a message that is not a request': 2 * len(bad) - 1}
 
 
 def test_a_page_that_never_reads_is_sent_no_more_than_fits_and_holds_nobody_up() -> None:

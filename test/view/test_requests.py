@@ -58,8 +58,8 @@ def error(do: str, **content: Any) -> str:
         ('[' * 100_000, 'is not JSON'),
         ('{"id": NaN, "do": "names"}', 'is not JSON'),
         ('{"id": 1, "do": "names", "x": ' + '9' * 10_000 + '}', 'is not JSON'),
-        ('[]', 'is no object'),
-        ('"names"', 'is no object'),
+        ('[]', 'is not an object'),
+        ('"names"', 'is not an object'),
         ('{"do": "names"}', 'has no id'),
         ('{"id": "1", "do": "names"}', 'has no id'),
         ('{"id": true, "do": "names"}', 'has no id'),
@@ -108,7 +108,7 @@ def test_a_shipped_linkage_is_opened_by_its_name() -> None:
 
 @pytest.mark.parametrize('name', ['jansen_legs', '../scenes/demo', '/etc/passwd', '', None, 3, []])
 def test_nothing_but_a_shipped_linkage_is_opened(name: Any) -> None:
-    assert 'is no shipped linkage; ' in error('open', name=name)
+    assert 'is not a shipped linkage; ' in error('open', name=name)
 
 
 def frames_of(closure: Closure, position: Position) -> list[tuple[float, float, float]]:

@@ -294,7 +294,7 @@ def test_ten_thousand_bad_messages_are_counted_and_the_next_good_one_is_answered
             assert ok(await page.ask('model', text=FOUR_BAR))['text'] == FOUR_BAR
 
     asyncio.run(run())
-    assert server.server.refused == {'a message that is no request': count + 1}
+    assert server.server.refused == {'a message that is not a request': count + 1}
 
 
 @pytest.mark.parametrize(
@@ -665,7 +665,7 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
         (['jansen_legs'], 'jansen_legs: is neither a file nor a name of what comes with '),
         (['bad.yaml'], 'bad.yaml:1: links: 1 is not a mapping; '),
         ([], 'FILE: is missing; name a linkage, a scene or a bag, or --node'),
-        (['four_bar', '--port', '70000'], '--port 70000: is no port; name one below 65536'),
+        (['four_bar', '--port', '70000'], '--port 70000: is not a port; name one below 65536'),
         (['four_bar', '--port', '{taken}'], '--port {taken}: is taken; name another one, or '),
         (['four_bar', '--node', 'x'], '--node: shows a node, not a file; leave four_bar out'),
         (['--node', '-o', 'x.html'], '-o: cannot hold a node that runs; leave it out'),

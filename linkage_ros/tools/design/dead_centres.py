@@ -48,15 +48,10 @@ class DeadCentreTask(NamedTuple):
 
 def crank_rockers(task: DeadCentreTask, count: int) -> list[Design]:
     """
-    Return crank-rockers with these dead centres, that of the best transmission first.
+    Return crank-rockers with these dead centres, the best transmission first.
 
-    The others follow at equal steps of the free parameter, from those with the best transmission.
-
-    Raises
-    ------
-    SynthesisError
-        If the task is none, or there is no such crank-rocker.
-
+    The others follow at equal steps of the free parameter. A SynthesisError is raised if the task
+    is not one or has no crank-rocker.
     """
     if not 0.0 < task.swing < pi:
         raise SynthesisError('the swing', f'is {task.swing:g} rad', 'give one between 0 and 180°')

@@ -9,7 +9,7 @@
 """
 The defects that make a design useless in practice, and the requirements on a design.
 
-Every design is checked for the defects. Their names are those of the textbooks (R. L. Norton,
+Every design is checked for the defects. Their names are the textbooks' (R. L. Norton,
 Design of Machinery, ch. 5; J. M. McCarthy and G. S. Soh, Geometric Design of Linkages, ch. 4):
 branch, circuit and order.
 """
@@ -48,6 +48,27 @@ import numpy as np
 _IN_LINE = 1e-5
 """Below this transmission angle coupler and rocker are in line, in [rad]; near a toggle the angle
 is the root of the rounding error of the lengths."""
+
+# For each word the ends of Barker's codes that match it.
+_KINDS = {
+    'crank-rocker': ('CRR',),
+    'rocker-crank': ('RRC',),
+    'double-crank': ('CCC',),
+    'drag-link': ('CCC',),
+    'double-rocker': ('GRCR', 'SRCR'),
+    'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
+}
+_TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
+_WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
+
+# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
+# shortest at a change point. No word selects equal links, as in a parallelogram.
+_CODES = tuple(
+    tuple(code for code, _ in names) for names in (GRASHOF, TRIPLE_ROCKERS, CHANGE_POINTS)
+)
+
+_FAR = 10.0
+"""Weight of a defect, relative to a number that misses its requirement by its own size."""
 
 
 class Defect(NamedTuple):
@@ -114,7 +135,7 @@ def assess(design: Design) -> Assessment:
     defects = _find_defects(design, met, path)
     if defects:
         travel = None
-        # Only at the positions; there is no way between them.
+        # Only at the positions: the crank cannot move between them.
         ends = path.directions, path.directions
     else:
         travel = moved[0].crank, moved[-1].crank
@@ -200,7 +221,9 @@ def _order_defect(design: Design, path: Traversal) -> Defect:
     directions: Array = path.directions - path.directions[0]
     visited = np.argsort(np.mod(directions, tau) if path.turns else directions)
     visits = ', '.join(f'{i + 1} ({_degrees_text(design.wanted[i].crank)})' for i in visited)
-    return Defect('order', f'a crank that goes one way comes by the positions as {visits}')
+    return Defect(
+        'order', f'a crank that turns one way passes the positions in the order {visits}'
+    )
 
 
 def _sides_text(met: tuple[AchievedPosition, ...]) -> str:
@@ -220,28 +243,6 @@ def _positions_text(numbers: Iterable[int]) -> str:
 
 def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.6g}°'
-
-
-# For each word the ends of Barker's codes that match it.
-_KINDS = {
-    'crank-rocker': ('CRR',),
-    'rocker-crank': ('RRC',),
-    'double-crank': ('CCC',),
-    'drag-link': ('CCC',),
-    'double-rocker': ('GRCR', 'SRCR'),
-    'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
-}
-_TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
-_WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
-
-# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
-# shortest at a change point. No word selects equal links, as in a parallelogram.
-_CODES = tuple(
-    tuple(code for code, _ in names) for names in (GRASHOF, TRIPLE_ROCKERS, CHANGE_POINTS)
-)
-
-_FAR = 10.0
-"""Weight of a defect, relative to a number that misses its requirement by its own size."""
 
 
 class Needs(NamedTuple):
@@ -275,7 +276,7 @@ class Needs(NamedTuple):
         if self.kind and self.kind not in _WORDS:
             raise SynthesisError(
                 self.kind,
-                'is no kind of four-bar',
+                'is not a kind of four-bar',
                 did_you_mean(self.kind, _WORDS, f'name one of {list_names(_WORDS)}'),
             )
 
@@ -295,7 +296,7 @@ def _missed_needs(assessment: Assessment, needs: Needs) -> list[tuple[str, float
     if needs.usable:
         missed += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
     if needs.kind and not _is_kind(assessment, needs.kind):
-        missed.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
+        missed.append((f'a {assessment.kind.name}, not {needs.kind}', 1.0))
     if assessment.transmission < needs.transmission:
         angle, wanted = degrees(assessment.transmission), degrees(needs.transmission)
         text = f'a transmission angle of {angle:.4g}°, not {wanted:.4g}°'
@@ -314,15 +315,8 @@ def needs_penalties(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
     Return `needs_penalty` for many four-bars without defects.
 
-    Parameters
-    ----------
-    lengths
-        Lengths of crank, coupler, rocker and ground, above 0; (…, 4).
-    transmission
-        The least angle over the travel, in [rad]; (…).
-    needs
-        The requirements.
-
+    ``lengths``: crank, coupler, rocker and ground, above 0, (…, 4). ``transmission``: the least
+    angle over the travel, in [rad], (…).
     """
     total = np.zeros(transmission.shape)
     if needs.kind:

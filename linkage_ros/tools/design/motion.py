@@ -53,6 +53,19 @@ from numpy.typing import ArrayLike
 SAME = 1e-12
 """Angles nearer than this count as equal, in [rad], and places, relative to the motion."""
 
+Place: TypeAlias = tuple[Twofold, Twofold]
+"""Its x and y coordinates."""
+
+TRUSTED = 2.0
+"""Bound of a pivot's error, in units of roundoff times sensitivity: one for the rounding of the
+inputs, and one for the computation, whose measured error is a third of that."""
+
+_LONGEST = 1e9
+"""In chords: the length of a longer link is indistinguishable from infinite."""
+
+_NEAR = 1e-3
+"""Places nearer than this, relative to the motion, are at the pole rather than on a line."""
+
 
 class Pose(NamedTuple):
     """A wanted pose of the coupler: the origin of its frame, in [m], and its angle, in [rad]."""
@@ -65,11 +78,7 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
     """
     Refuse poses and pivots that no four-bar can have.
 
-    Raises
-    ------
-    SynthesisError
-        With the numbers of the poses, counted from 1, or the names of the pivots.
-
+    The SynthesisError has the numbers of the poses, counted from 1, or the names of the pivots.
     """
     if len(poses) != 3:
         raise SynthesisError('poses', f'{len(poses)} were given', 'give three')
@@ -82,7 +91,9 @@ def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
             )
     for name, place in pivots.items():
         if not abs(place) <= FARTHEST:
-            raise SynthesisError(name, f'({place.real}, {place.imag}) is no place', 'give numbers')
+            raise SynthesisError(
+                name, f'({place.real}, {place.imag}) is not a place', 'give numbers'
+            )
     spread = max(abs(one.place - other.place) for one, other in combinations(poses, 2))
     for (i, one), (j, other) in combinations(enumerate(poses, 1), 2):
         if (
@@ -114,10 +125,6 @@ def split_poses(poses: Sequence[Pose]) -> tuple[Complex, Array]:
 def place_text(place: complex) -> str:
     """Return a place as text for a user."""
     return f'({place.real:.6g}, {place.imag:.6g}) m'
-
-
-Place: TypeAlias = tuple[Twofold, Twofold]
-"""Its x and y."""
 
 
 class PoleCircle(NamedTuple):
@@ -153,17 +160,9 @@ def centre_sensitivity(found: PoleCircle, own: Complex, shared: Complex) -> Arra
     """
     Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
 
-    Times 2⁻⁵³ it bounds the error of the centre that rounding the inputs alone causes.
-
-    Parameters
-    ----------
-    found
-        The circle.
-    own
-        x·∂A/∂x of each place by the inputs that move only this place, (…, 3, k).
-    shared
-        x·∂A/∂x of each place by the inputs that move all three, (…, 3, m).
-
+    Times 2⁻⁵³ it bounds the error of the centre that rounding the inputs alone causes. ``own`` and
+    ``shared`` are x·∂A/∂x of each place: by the inputs that move only this place, (…, 3, k), and
+    by the inputs that move all three, (…, 3, m).
     """
     with np.errstate(all='ignore'):
         back = np.conj(found.spokes)[..., None]
@@ -187,11 +186,6 @@ def _place_at(places: Place, index: int) -> Place:
 
 def _subtract_places(one: Place, other: Place) -> Place:
     return subtract(one[0], other[0]), subtract(one[1], other[1])
-
-
-TRUSTED = 2.0
-"""Bound of a pivot's error, in units of roundoff times sensitivity: one for the rounding of the
-inputs, and one for the computation, whose measured error is a third of that."""
 
 
 class MotionLinks(NamedTuple):
@@ -223,15 +217,10 @@ class MotionLinks(NamedTuple):
 
 def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> MotionLinks:
     """
-    Return the links that carry moving pivots (…) through poses (…, 3), without raising errors.
+    Return the links that carry moving pivots through poses, without raising errors.
 
-    Parameters
-    ----------
-    places, angles
-        Places and angles of the coupler, in [m] and [rad].
-    moving
-        Pivots in the frame of the coupler, in [m].
-
+    The poses are places and angles of the coupler, in [m] and [rad], (…, 3). The pivots are in the
+    frame of the coupler, in [m], (…).
     """
     point = np.asarray(moving, np.complex128)[..., None]
     sine, cosine = sine_cosine(_as_twofold(angles))
@@ -247,15 +236,10 @@ def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> MotionLin
 
 def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> MotionLinks:
     """
-    Return the links that lead from fixed pivots (…) to poses (…, 3), without raising errors.
+    Return the links that lead from fixed pivots to poses, without raising errors.
 
-    Parameters
-    ----------
-    places, angles
-        Places and angles of the coupler, in [m] and [rad].
-    fixed
-        Pivots in the frame of the ground, in [m].
-
+    The poses are places and angles of the coupler, in [m] and [rad], (…, 3). The pivots are in the
+    frame of the ground, in [m], (…).
     """
     point = np.asarray(fixed, np.complex128)[..., None]
     sine, cosine = sine_cosine(_as_twofold(-angles))
@@ -286,13 +270,6 @@ def _as_twofold(numbers: ArrayLike) -> Twofold:
 
 def _broadcast_all(*numbers: ArrayLike) -> list[Any]:
     return list(np.broadcast_arrays(*numbers))
-
-
-_LONGEST = 1e9
-"""In chords: the length of a longer link is indistinguishable from infinite."""
-
-_NEAR = 1e-3
-"""Places nearer than this, relative to the motion, are at the pole rather than on a line."""
 
 
 def from_moving_pivots(
@@ -399,12 +376,12 @@ def _check_link(
         raise SynthesisError(
             name,
             f'its three places{seen} lie on a line at {slope:.4g}°, so that its {kind} pivot is '
-            f'infinitely far: a slider along that line{slider} does it, not a link',
+            f'infinitely far: a slider along that line{slider} guides it, not a link',
             'choose another place for it, or turn a pose',
         )
     raise SynthesisError(
         name,
-        f'is so near a pole that not a digit of its {kind} pivot is certain',
+        f'is so near a pole that its {kind} pivot has no certain digit',
         'choose another place for it',
     )
 

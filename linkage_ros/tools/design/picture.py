@@ -64,7 +64,15 @@ _BEHIND = '#a3a3a3'
 _BEHIND_TEXT = '#5f5f5f'
 
 _EVERY = 6
-"""Every so many places of a path are obstacles for a number."""
+"""One in this many places of a path is an obstacle for a number."""
+
+_DRAWN, _DRAWN_OF_PATH = 6, 4
+"""Most positions that are drawn; fewer for a path, which should be visible between them."""
+
+_TINY = 1.0 / 25.0
+"""A link shorter than this, relative to the picture, is drawn again, enlarged."""
+
+_MAGNIFIED = 4
 
 
 def paint_wanted(axes: Any, design: Design, shown: Sequence[DesignPose], picture: float) -> None:
@@ -255,15 +263,6 @@ def _link_length(pose: DesignPose, link: str) -> float:
     return abs(other - one)
 
 
-_DRAWN, _DRAWN_OF_PATH = 6, 4
-"""Most positions that are drawn; fewer for a path, which should be visible between them."""
-
-_TINY = 1.0 / 25.0
-"""A link shorter than this, relative to the picture, is drawn again, enlarged."""
-
-_MAGNIFIED = 4
-
-
 def draw_design(
     design: Design,
     title: str,
@@ -272,26 +271,11 @@ def draw_design(
     error: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> None:
     """
-    Paint a design to a file.
+    Paint a design to a PNG, SVG or PDF file.
 
-    Parameters
-    ----------
-    design
-        The four-bar and its wanted positions.
-    title
-        Title of the picture.
-    file
-        PNG, SVG or PDF.
-    error
-        Error of the rocker's angle over a range: crank angles, and the errors there, in [rad];
-        (n,) each.
-
-    Raises
-    ------
-    LinkageError
-        If the design closes at none of its positions, matplotlib is not installed, or the file
-        cannot be written.
-
+    ``error`` is the error of the rocker's angle over a range: crank angles and the errors there,
+    in [rad], (n,) each. A LinkageError is raised if the design closes at none of its positions,
+    matplotlib is not installed, or the file cannot be written.
     """
     context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load

@@ -33,29 +33,25 @@ Array = NDArray[np.float64]
 _SAMPLES = 481
 _TURNS = (False, False)
 
+_UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
+_ROUNDING = 1e-9
+"""Smaller errors, relative to the linkage's size, count as none."""
+
+_EVERY = 6
+"""One in this many points of a curve is an obstacle for a number."""
+
+_NUMBERED = 12
+"""With more positions only every second is numbered, or every third, and so on."""
+
 
 class DesignPose(NamedTuple):
-    """
-    A design at one of its positions, in the assembly that meets it.
+    """A design at one of its positions, in the assembly that meets it."""
 
-    Attributes
-    ----------
-    number
-        Number of the position, from 1.
-    wanted, met
-        The wanted position, and the actual one.
-    own
-        Whether it is on the design's own assembly.
-    closure, position
-        The linkage in that assembly, and its position there.
-
-    """
-
-    number: int
+    number: int  # Number of the position, from 1
     wanted: DesignRequest
     met: AchievedPosition
-    own: bool
-    closure: Closure
+    own: bool  # Whether it is on the design's own assembly
+    closure: Closure  # The linkage in the assembly that meets the position
     position: Position
 
     @property
@@ -150,17 +146,6 @@ def _sweep_branch(
     relative, rocker = np.unwrap(np.array(joints), axis=0).T
     at = np.array(crank)
     return DesignBranch(side == own, limited, at, rocker, relative + at, tuple(trace))
-
-
-_UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
-_ROUNDING = 1e-9
-"""Smaller errors, relative to the linkage's size, count as none."""
-
-_EVERY = 6
-"""Every so many points of a curve are obstacles for a number."""
-
-_NUMBERED = 12
-"""With more positions only every second is numbered, or every third, and so on."""
 
 
 def is_numbered(number: int, count: int) -> bool:

@@ -20,7 +20,7 @@ branches of single-degree-of-freedom planar linkages, Journal of Mechanical Desi
 223-230). Circuits touch where a linkage can fold flat: at a change point.
 
 The functions of the course take any number of linkages at once. A direction of the crank is that
-of the vector O2→A minus that of O2→O4, in [rad].
+of the vector O2→A minus the direction of O2→O4, in [rad].
 """
 
 from __future__ import annotations
@@ -39,6 +39,12 @@ Flags = NDArray[np.bool_]
 
 SAME = 1e-9
 """Angles nearer than this count as equal, in [rad]; the lengths' error is far below."""
+
+SIDES: tuple[Assembly, Assembly] = ('left', 'right')
+
+_MARKEDLY = 2.0
+"""An assembly is better if the error of the other is this many times larger. At a toggle, where
+the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
 
 
 class Mobility(NamedTuple):
@@ -83,17 +89,10 @@ def mobility(lengths: Array) -> Mobility:
 
 def traverse_positions(lengths: Array, directions: Array, left: Flags) -> Traversal:
     """
-    Return the course of four-bars through their positions.
+    Return the traversal of four-bars through their positions.
 
-    Parameters
-    ----------
-    lengths
-        Of crank, coupler, rocker and ground, above 0; (…, 4).
-    directions
-        Directions of the crank at each position, in [rad]; (…, n).
-    left
-        Whether the position is on the left assembly; (…, n).
-
+    ``lengths``: crank, coupler, rocker and ground, above 0, (…, 4). ``directions`` of the crank at
+    each position are in [rad], (…, n); ``left`` marks positions on the left assembly, (…, n).
     """
     excess, turns = mobility(lengths)
     one_branch = (left == left[..., :1]).all(-1)
@@ -150,17 +149,10 @@ def transmission_angle(lengths: Array, direction: Array) -> Array:
     """
     Return the angle between coupler and rocker, acute, in [rad]; 0 where the loop is open.
 
-    With s the distance from A to O4, tan²(μ/2) = (s² − (b − c)²)/((b + c)² − s²), and
-    s² = (d − a)² + 4ad·sin²(δ/2) = (d + a)² − 4ad·cos²(δ/2), so that neither root loses digits
-    near a toggle.
-
-    Parameters
-    ----------
-    lengths
-        Of crank, coupler, rocker and ground; (…, 4).
-    direction
-        Direction of the crank, in [rad]; (…).
-
+    With s the distance from A to O4, tan²(μ/2) = (s² − (b − c)²)/((b + c)² − s²), and s² = (d −
+    a)² + 4ad·sin²(δ/2) = (d + a)² − 4ad·cos²(δ/2), so that neither root loses digits near a
+    toggle. The lengths, (…, 4), are crank, coupler, rocker and ground; the direction of the crank,
+    (…), is in [rad].
     """
     a, b, c, d = (lengths[..., i] for i in range(4))
     half = 0.5 * direction
@@ -180,15 +172,8 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
     Return the least transmission angle of a travel, in [rad], and its direction of the crank.
 
     Between two passes of the ground line, at direction 0 or π, the distance s is monotonic, and
-    the angle with it; so the least is at one of the ends or of these.
-
-    Parameters
-    ----------
-    lengths
-        Of crank, coupler, rocker and ground; (…, 4).
-    start, end
-        Directions of the crank, in [rad], at most a turn apart; (…).
-
+    the angle with it; so the least is at one of the ends or of these. The lengths, (…, 4), are
+    crank, coupler, rocker and ground; the travel's ends, (…), are in [rad], at most a turn apart.
     """
     low, high = np.minimum(start, end), np.maximum(start, end)
     first = np.ceil(low / np.pi) * np.pi
@@ -200,13 +185,6 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
         np.take_along_axis(angles, least, -1)[..., 0],
         np.take_along_axis(places, least, -1)[..., 0],
     )
-
-
-SIDES: tuple[Assembly, Assembly] = ('left', 'right')
-
-_MARKEDLY = 2.0
-"""An assembly is better if the error of the other is this many times larger. At a toggle, where
-the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
 
 
 class AchievedPosition(NamedTuple):
@@ -257,7 +235,7 @@ def prove(design: Design) -> tuple[AchievedPosition, ...]:
 
 
 def assemble(design: Design) -> Design:
-    """Return a design on the assembly that meets most positions; on a tie, that of the first."""
+    """Return a design on the assembly that meets most positions; on a tie, the first one's."""
     size = sum(design.four_bar.lengths)
     left, right = prove_both_sides(design)
     better = [_better_side(one, other, size) for one, other in zip(left, right, strict=True)]

@@ -28,13 +28,6 @@ from linkage_ros.errors import check_installed
 import numpy as np
 from numpy.typing import NDArray
 
-
-def scipy_optimize() -> Any:
-    """Return scipy.optimize, for fits."""
-    check_installed('scipy', "pip install 'linkage_ros[design]'")
-    return import_module('scipy.optimize')
-
-
 Array = NDArray[np.float64]
 
 CHUNK = 16384
@@ -45,6 +38,12 @@ _MOST_CHUNKS = 16
 
 _FEWEST_TASKS = 16
 """Tasks for each thread before they grow, so that the last thread does not finish far behind."""
+
+
+def scipy_optimize() -> Any:
+    """Return scipy.optimize, for fits."""
+    check_installed('scipy', "pip install 'linkage_ros[design]'")
+    return import_module('scipy.optimize')
 
 
 class Problem(Protocol):
@@ -89,28 +88,11 @@ def search(
     address: str = '',
 ) -> list[DesignFound]:
     """
-    Return the best candidates of a problem, the best first.
+    Return the best ``keep`` of ``count`` candidates with a finite score, the best first.
 
-    Parameters
-    ----------
-    problem
-        Draws and scores candidates.
-    seed
-        Seed of the study, 0 or above.
-    count
-        Number of candidates to draw.
-    keep
-        Number of candidates to return; fewer if fewer have a finite score.
-    progress
-        Called with the number of candidates that are done, and their total.
-    address
-        Address of a Dask scheduler, such as ``tcp://host:8786``; '' to search in this process.
-
-    Raises
-    ------
-    LinkageError
-        If the scheduler or its workers fail.
-
+    The seed is 0 or above. ``progress`` is called with the number of finished candidates and the
+    total. ``address`` names a Dask scheduler, such as ``tcp://host:8786``; '' searches in this
+    process. A LinkageError is raised if the scheduler or its workers fail.
     """
     work = partial(_search_part, problem, seed, keep)
     results = (

@@ -35,9 +35,11 @@ CANDIDATES = 200_000
 """Default number of candidates of a search."""
 
 _SHIFT = 0.01
-"""Error of an angle for which the sensitivity is shown, in degrees: that of a good protractor."""
+"""Error of an angle for which the sensitivity is shown, in degrees: a good protractor's."""
 
 Angles = Sequence[float]
+
+_LINKS = ('crank', 'coupler', 'rocker')
 
 
 class DesignAnswer(NamedTuple):
@@ -84,7 +86,7 @@ def find_answers(typed: argparse.Namespace, search: DesignSearch) -> list[Design
     if len(named) != 1:
         raise LinkageError(
             list_names(named, ' and ') or 'the task',
-            'stand for two tasks' if named else 'is not said',
+            'stand for two tasks' if named else 'is not given',
             f'name one of {list_names(tasks)}',
         )
     work = {
@@ -137,9 +139,6 @@ def _pairs_facts(pairs: ThreePairs) -> list[tuple[str, str]]:
         ('digits to trust', f'{", ".join(digits)}, of lengths worked out from these angles'),
         (f'{_SHIFT}° on one angle', f'moves {" %, ".join(moves)} %, at most'),
     ]
-
-
-_LINKS = ('crank', 'coupler', 'rocker')
 
 
 def _search_answers(

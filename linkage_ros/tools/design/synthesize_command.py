@@ -47,6 +47,15 @@ from linkage_ros.tools.design.synthesis_tasks import (
     find_answers,
 )
 
+_NOT_MET = 1
+"""Exit code if there are solutions, but none meets the requirements."""
+
+_LISTED = 3
+"""Default number of solutions that a search lists."""
+
+EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
+
+
 # Tables of a designed four-bar: its links, its proof, its quality.
 
 
@@ -132,17 +141,6 @@ def _assessment_facts(
         yield 'defects', 'none: order, branch and circuit are right'
     for missed in unmet_needs(assessment, needs):
         yield 'lacks what is needed', angles.convert_text(missed)
-
-
-_NOT_MET = 1
-"""Exit code if there are solutions, but none meets the requirements."""
-
-
-_LISTED = 3
-"""Default number of solutions that a search lists."""
-
-
-EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -291,7 +289,7 @@ def _read_ratio(text: str) -> float:
     try:
         return float(Fraction(text))
     except (ValueError, ZeroDivisionError, OverflowError):
-        raise argparse.ArgumentTypeError(f'{text!r} is no ratio; write 10/9 or 1.2') from None
+        raise argparse.ArgumentTypeError(f'{text!r} is not a ratio; write 10/9 or 1.2') from None
 
 
 def _add_freedoms(parser: argparse.ArgumentParser) -> None:
@@ -337,8 +335,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     except LinkageError as error:
         if arguments.angles.in_degrees:
             raise
-        told = arguments.angles.convert_text
-        raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
+        parts = map(arguments.angles.convert_text, (error.where, error.reason, error.remedy))
+        raise LinkageError(*parts) from None
 
 
 def _run_design(arguments: argparse.Namespace) -> int:
@@ -412,8 +410,8 @@ def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
-    told = arguments.angles.convert_text
-    lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
+    convert = arguments.angles.convert_text
+    lines = [convert(f'Designed: {answer.title}'), command, *map(convert, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
     names = ' and '.join(one.name for one in answer.assessment.defects)
     print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)

@@ -79,7 +79,7 @@ _STYLE = (
     '@media (prefers-reduced-motion: reduce) {{ .moving {{ animation: none }} }}\n'
 )
 _STEP = 2
-"""One of so many pictures is a key of the SVG; it moves evenly between them."""
+"""One in this many pictures is a key of the SVG; it moves evenly between them."""
 
 Advance = Callable[[int, int], Any]
 """Called with the number of pictures that are painted, and of all."""
@@ -182,25 +182,11 @@ def animate(
     compact: bool = False,
 ) -> None:
     """
-    Write a moving picture.
+    Write a moving picture: GIF, MP4 or SVG.
 
-    Parameters
-    ----------
-    motion
-        The motion.
-    file
-        A GIF, MP4 or SVG.
-    advance
-        Called after each picture.
-    compact
-        Whether it is to be read at a width of 400 pixels: smaller, but for its letters, and the
-        plane without axes.
-
-    Raises
-    ------
-    LinkageError
-        As `check_kind`; or the file cannot be written.
-
+    ``advance`` is called after each picture. A ``compact`` picture is read at a width of 400
+    pixels: it is smaller, except its letters, and the plane has no axes. Errors are those of
+    `check_kind`, or a LinkageError if the file cannot be written.
     """
     check_kind(file)
     kind = file.suffix.lower()
@@ -467,19 +453,8 @@ def _keyframe_rules(
     """
     Return the rules that move the groups of a class, and the transform at their first known place.
 
-    Parameters
-    ----------
-    name
-        The class.
-    times
-        Times of the keys, in [%].
-    places
-        Places at the keys, in [px], of shape (keys, 2); NaN hides the group.
-    turns
-        Angles at the keys, in [°], of shape (keys,).
-    jumps
-        After which keys it does not move evenly to the next one.
-
+    Keys have times in [%], places in [px], (keys, 2), and angles in [°], (keys,); a place of NaN
+    hides the group. ``jumps`` marks the keys after which it does not move evenly to the next one.
     """
     known = np.isfinite(places).all(axis=1)
     if not known.any():

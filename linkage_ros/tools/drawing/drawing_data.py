@@ -63,13 +63,8 @@ def pose_in_frames(closure: Closure, position: Position, size: float) -> dict[st
     """
     Return the drawing of a linkage of pins without its motion: it takes a tenth of the time.
 
-    Parameters
-    ----------
-    closure, position
-        The linkage, which has no slider, and a position that closes.
-    size
-        Half the width of a bar, in [m].
-
+    The linkage has no slider, and the position closes. ``size`` is half the width of a bar, in
+    [m].
     """
     drawn = carried_shapes(closure, position, size, {})
     return _carried_shapes(closure, position, size, drawn)

@@ -60,20 +60,9 @@ def links_dxf(closure: Closure, *, width: float | None = None, hole: float | Non
     """
     Return the links as a DXF file.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    width
-        Width of a bar, in [m]; by default that of the drawing.
-    hole
-        Diameter of a hole, and width of a slot, in [m]; by default 0.4 of the width.
-
-    Raises
-    ------
-    LinkageError
-        If ezdxf is not installed, or a hole does not fit into a bar.
-
+    ``width`` is the width of a bar, in [m]; by default the drawing's. ``hole`` is the diameter of
+    a hole and the width of a slot, in [m]; by default 0.4 of the width. A LinkageError is raised
+    if ezdxf is not installed, or a hole does not fit into a bar.
     """
     check_installed('ezdxf', "pip install 'linkage_ros[view]'")
     from ezdxf import filemanagement, units  # local import: an extra, and slow to load

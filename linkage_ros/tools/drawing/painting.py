@@ -32,6 +32,25 @@ _ROUNDS = 3
 _GAP = 4.0
 """Smallest distance between two names, in pixels."""
 
+WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
+"""Colours in a design: wanted values, path of a point, other assembly."""
+
+OTHER_TEXT = '#a86b00'
+"""Colour of text about the other assembly, dark enough to read."""
+
+NAME_INK = '#35608a'
+GHOST = '#cfcfcf'
+LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
+
+_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+_SETTINGS: Any = {
+    'font.size': 8.0,
+    'svg.hashsalt': 'linkage_ros',
+    'axes.linewidth': 0.6,
+    'text.parse_math': False,  # a name between dollar signs is not a formula
+}
+
 
 class Label(NamedTuple):
     """A name to be placed; all sizes in one unit, such as pixels."""
@@ -58,15 +77,8 @@ def place_labels(
     """
     Place labels one after the other, each where it hides least.
 
-    Parameters
-    ----------
-    labels
-        The labels; the first ones are placed first.
-    obstacles
-        Points of lines and shapes that should not be hidden.
-    frame
-        The lower left and the upper right corner of the drawing.
-
+    The obstacles are points of lines and shapes; the frame is the lower left and the upper right
+    corner of the drawing.
     """
     placed: list[PlacedText] = []
     for label in labels:
@@ -147,26 +159,6 @@ def _is_outside(
     )
 
 
-WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
-"""Colours in a design: wanted values, path of a point, other assembly."""
-
-OTHER_TEXT = '#a86b00'
-"""Colour of text about the other assembly, dark enough to read."""
-
-NAME_INK = '#35608a'
-GHOST = '#cfcfcf'
-LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
-
-_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
-STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
-_SETTINGS: Any = {
-    'font.size': 8.0,
-    'svg.hashsalt': 'linkage_ros',
-    'axes.linewidth': 0.6,
-    'text.parse_math': False,  # a name between dollar signs is no formula
-}
-
-
 def picture_settings() -> Any:
     """Return the matplotlib context of a picture; a LinkageError without matplotlib."""
     check_installed('matplotlib', "pip install 'linkage_ros[report]', or apt its package")
@@ -218,7 +210,7 @@ def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> Non
     """
     Write the names of lines at their right ends, beside the axes.
 
-    The axes' limits are final. The heights of the axes are those of the last drawing.
+    The axes' limits are final. The heights of the axes are from the last drawing.
     """
     low, high = axes.get_ylim()
     height = axes.get_window_extent().height / axes.figure.dpi * 72.0  # in points, as the font
@@ -245,7 +237,7 @@ def show_lengths(axis: Any, name: str, size: float) -> None:
 
 
 def degree_step(ends: tuple[float, float], most: int = 8) -> float:
-    """Return the step of an axis between two angles, in [°], for so many steps at most."""
+    """Return the step of an axis between two angles, in [°], for at most ``most`` steps."""
     low, high = ends
     turns = 360.0 * ceil((high - low) / (360.0 * most))
     return next((step for step in _STEPS if (high - low) / step <= most), turns)
@@ -315,11 +307,7 @@ class NameLabels:
     """
     Texts placed together, each where it hides little.
 
-    Parameters
-    ----------
-    axes
-        Axes of a figure with a final layout: before it a text has no size.
-
+    The figure of the axes has its final layout: before it a text has no size.
     """
 
     def __init__(self, axes: Any) -> None:

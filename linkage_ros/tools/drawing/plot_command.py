@@ -97,15 +97,8 @@ def draw_bag(
     Draw a bag: each published joint, and its rate if recorded, over the crank or over time.
 
     Angles are continuous over the range of the crank, as in `linkage draw`, in whichever turn they
-    were recorded.
-
-    Raises
-    ------
-    LinkageError
-        If matplotlib is not installed, or the bag holds nothing to draw.
-    StoppedError
-        The event was set.
-
+    were recorded. A LinkageError is raised if matplotlib is not installed, or the bag holds
+    nothing to draw; a StoppedError if the event was set.
     """
     picture_settings()  # without matplotlib, say so before the bag is read
     bag = open_bag(bag_path, stop)
@@ -154,13 +147,7 @@ def is_after_gap(times: Floats, *, steady: bool) -> Bools:
     """
     Return for each joint state whether ticks were lost before it, or nothing was published.
 
-    Parameters
-    ----------
-    times
-        Times of the joint states, in [s].
-    steady
-        Whether the ticks have a rate; else they come with samples, at any times.
-
+    The times are in [s]. Ticks that are not ``steady`` come with samples, at any times.
     """
     steps = np.diff(times)
     longest = (_STEADY if steady else _UNSTEADY) * float(np.median(steps)) if len(steps) else 0.0
@@ -221,17 +208,9 @@ def crank_curves(
     """
     Return the joints over the crank, and their rates if they were recorded.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    cranks
-        Its inputs at each joint state, in [rad] or [m].
-    positions, rates
-        Its joints, in [rad] or [m], and per second; () for rates that were not recorded.
-    gaps
-        For each joint state whether its curve begins anew there, as after lost ticks.
-
+    For each joint state ``cranks`` has the inputs, ``positions`` the joints, in [rad] or [m],
+    ``rates`` their rates per second, or () if not recorded. ``gaps`` marks the joint states at
+    which a curve begins anew, as after lost ticks.
     """
     driven = linkage.inputs[0]
     input_sweep = InputSweep(Closure(linkage), cranks[0])
@@ -259,7 +238,7 @@ def crank_curves(
         breaks = begins.copy()
         if turning:
             breaks[1:] |= np.abs(np.diff(values)) > pi
-            # Whatever turn a piece was recorded in, it is drawn in that of the ideal motion.
+            # Whatever turn a piece was recorded in, it is drawn in the ideal motion's turn.
             near = np.interp(crank, ideal[place].x, ideal[place].y) if ideal else 0.0 * crank
             turns = np.round((values - near) / tau)
             for piece in np.split(np.arange(len(values)), np.flatnonzero(breaks)):

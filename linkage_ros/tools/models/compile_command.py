@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--joints', metavar='NAMES', help='only these joints, with commas between them'
     )
     parser.add_argument(
-        '--name', help="what the names in C begin with (default: the linkage file's name)"
+        '--name', help="prefix of the names in C (default: the linkage file's name)"
     )
 
 
@@ -76,7 +76,7 @@ def _source_name(file: Path, typed: str | None) -> str:
     if not C_NAME.fullmatch(name):
         where, wrong = (str(file), file.stem) if typed is None else ('--name', typed)
         raise LinkageError(
-            where, f'{quote(wrong)} makes no name in C', 'write one, as --name four_bar'
+            where, f'{quote(wrong)} cannot be a name in C', 'write one, as --name four_bar'
         )
     return name
 
@@ -91,7 +91,7 @@ def _requested_joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
         if name not in published:
             raise LinkageError(
                 '--joints',
-                f'{quote(name)} is no published joint',
+                f'{quote(name)} is not a published joint',
                 did_you_mean(name, published, f'name some of {", ".join(published)}'),
             )
     return names

@@ -63,7 +63,7 @@ _MANY = 10
 """Maximum number of dyads whose sides are tried together; each further one doubles the time."""
 
 _FOUND = 0.05
-"""Maximum angle between the links of a pose and those of the closed linkage, in [rad]."""
+"""Maximum angle between a link in a pose and in the closed linkage, in [rad]."""
 
 _MOST_TRIED = 200
 """Most choices of mimics that are tried as ratios."""
@@ -73,27 +73,17 @@ _SAME = 1e-6
 
 _REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE, for each joint'
 
+_MET = 1e-3
+"""Maximum distance between pins that meet in a pose, as a fraction of the linkage's size."""
+
 
 def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
     """
-    Return a linkage with the sides that give a pose.
+    Return a linkage with the sides that give a pose, from a linkage without sides.
 
-    Parameters
-    ----------
-    linkage
-        The linkage, without sides.
-    inputs
-        Inputs of the pose, in [rad] or [m].
-    poses
-        Poses of its links there.
-    where
-        The pose in words, for messages.
-
-    Raises
-    ------
-    DefinitionError
-        If it is no valid linkage, or if no sides or several combinations give the pose.
-
+    ``poses`` are the poses of its links at the inputs, in [rad] or [m]; ``where`` names the pose
+    in messages. A DefinitionError is raised if the linkage is not valid, or if no sides or several
+    combinations give the pose.
     """
     groups = assur_groups(linkage).groups
     # Where a side changes at change points, it is that at the pose.
@@ -115,9 +105,9 @@ def assemble(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: s
     candidates.sort(key=lambda each: each[0])
     least, closure = candidates[0]
     if least > _FOUND:
-        raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
+        raise DefinitionError('assembly', f'no assembly closes the loops {where}', _REMEDY)
     if len(candidates) > 1 and candidates[1][0] < least + _SAME:
-        raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
+        raise DefinitionError('assembly', f'several assemblies close the loops {where}', _REMEDY)
     if closure.linkage.pose == AssemblyPose(inputs, {}):
         bare = Closure(replace(closure.linkage, pose=None))
         if _are_near(usual_inputs(bare), inputs) and _largest_error(bare, inputs, poses) <= _FOUND:
@@ -155,10 +145,6 @@ def _are_near(one: Sequence[float], other: Sequence[float]) -> bool:
     return all(abs(p - q) < _SAME for p, q in zip(one, other, strict=True))
 
 
-_MET = 1e-3
-"""Maximum distance between pins that meet in a pose, as a fraction of the linkage's size."""
-
-
 class ImportedLinkage(NamedTuple):
     """
     A linkage, and the parts of the URDF that it leaves out, in words.
@@ -181,25 +167,12 @@ def linkage_from_urdf(
     """
     Make a linkage of a URDF.
 
-    Parameters
-    ----------
-    urdf
-        The robot.
-    close
-        Pairs of links whose origins coincide, beside those that frame names and loop tags define.
-    inputs
-        Names of driven joints; by default those that the file names.
-    at
-        Values of joints in a pose in which the loops close, in [rad] or [m]; by default those of
-        the file, or 0.
-    limits
-        Whether to keep the limits of the joints.
+    ``close`` has pairs of links whose origins coincide, beside the pairs that frame names and loop
+    tags define. ``inputs`` names driven joints; by default the ones that the file names. ``at``
+    has values of joints, in [rad] or [m], in a pose in which the loops close; by default the
+    file's values, or 0. With ``limits`` the joints keep their limits.
 
-    Raises
-    ------
-    FileError
-        If it does not give a linkage; the message has a remedy.
-
+    A FileError with a remedy is raised if the URDF does not give a linkage.
     """
     made = _Import(urdf, close, inputs, at or {}).make_linkage()
     if not limits:

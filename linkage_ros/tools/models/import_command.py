@@ -33,9 +33,7 @@ EXAMPLE = 'linkage import four_bar.urdf --input crank_joint -o my_four_bar.yaml'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        'file', type=Path, metavar='URDF', help='the URDF; of xacro, what xacro makes of it'
-    )
+    parser.add_argument('file', type=Path, metavar='URDF', help='the URDF, or the output of xacro')
     parser.add_argument(
         '--close',
         action='append',
@@ -58,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '(default: 0)',
     )
     parser.add_argument(
-        '--no-limits', action='store_true', help='leave out what <limit> says of the joints'
+        '--no-limits', action='store_true', help='leave out the limits of the joints (<limit>)'
     )
     add_output(parser, LINKAGES, 'the linkage file is printed')
 
@@ -84,7 +82,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 def _read_pair(text: str) -> tuple[str, str]:
     one, equal, other = text.partition('=')
     if not (one and equal and other):
-        raise argparse.ArgumentTypeError(f'{text!r} is no pair; write FRAME=FRAME')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a pair; write FRAME=FRAME')
     return one, other
 
 
@@ -95,5 +93,5 @@ def _read_value(text: str) -> tuple[str, float]:
     except ValueError:
         number = float('nan')
     if not (joint and equal and isfinite(number)):
-        raise argparse.ArgumentTypeError(f'{text!r} is no value; write JOINT=0.5')
+        raise argparse.ArgumentTypeError(f'{text!r} is not a value; write JOINT=0.5')
     return joint, number

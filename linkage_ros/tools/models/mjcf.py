@@ -11,7 +11,7 @@ Export of a linkage as MJCF, the format of MuJoCo.
 
 Bodies are nested, and equality constraints hold the pins that are cut. The axes of a body are
 parallel to its link's own; its origin lies at the pin or slider that connects it to its parent.
-Springs are spatial tendons, which pull as those of `linkage_ros.dynamics` do.
+Springs are spatial tendons, which pull as in `linkage_ros.dynamics`.
 """
 
 from __future__ import annotations
@@ -44,6 +44,40 @@ from linkage_ros.tools.models.xml import (
     xml_comment,
     xml_document,
 )
+
+DENSITY = 7850.0
+"""Density of links without a given mass: steel, in [kg/m³]."""
+
+LIGHT = 10.0
+"""Density of the blocks of pins in slots, in [kg/m³]: negligible."""
+
+_DIFFERENCE = 1e-4
+"""Step of the finite differences, in [rad] or as a fraction of a length."""
+
+_FARTHEST = 1e9
+"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
+
+_LEAST_INERTIA = 1e-12
+"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
+
+_STEP = 5e-4
+"""Step of the integration, in [s]."""
+
+_STIFF = {'solref': f'{format_number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
+"""Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
+
+_PACE = 30.0
+"""Bandwidth of the position servo of an input, in [rad/s]."""
+
+_HEAD = f"""\
+A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
+are equality constraints between sites. A hinge or slide that is a published joint has its name,
+sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
+Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
+pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
+Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
+its gravity and its springs between points are."""
+
 
 # The linkage as a tree of its physical pins and sliders, published or not, and the pins cut.
 #
@@ -83,8 +117,8 @@ def physical_tree(closure: Closure) -> PhysicalTree:
     """
     Return a linkage as a tree of pins and sliders.
 
-    Every loop has a pin that is no input, and is cut there. A loop of sliders alone would fix an
-    angle twice, and one whose pins are all driven could not move: neither is a valid linkage.
+    Every loop has a pin that is not an input, and is cut there. A loop of sliders alone would fix
+    an angle twice, and one whose pins are all driven could not move: neither is a valid linkage.
     """
     links = closure.structure.links
     part_of = {link: link for link in links}
@@ -150,35 +184,11 @@ def _joint_name(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple
     return '', 1
 
 
-DENSITY = 7850.0
-"""Density of links without a given mass: steel, in [kg/m³]."""
-
-LIGHT = 10.0
-"""Density of the blocks of pins in slots, in [kg/m³]: negligible."""
-
-_DIFFERENCE = 1e-4
-"""Step of the finite differences, in [rad] or as a fraction of a length."""
-
-_FARTHEST = 1e9
-"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
-
-_LEAST_INERTIA = 1e-12
-"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
-
-
 class Bodies:
     """
-    The bodies of a linkage, written into a model.
+    The bodies of a linkage, written into the ``world`` element of a model.
 
-    Parameters
-    ----------
-    world
-        Element of the model that receives them.
-    part, names
-        The linkage, and the names of its parts.
-    first_layer
-        Number of layers that other linkages occupy below.
-
+    ``first_layer`` is the number of layers that other linkages occupy below.
     """
 
     def __init__(
@@ -221,8 +231,8 @@ class Bodies:
         """
         Return the approximate inertia that an input moves at the start, in [kg·m²] or [kg].
 
-        The kinetic energy at a rate of 1 is half of it. Rates come from finite differences, and
-        each link's mass is spread over its points.
+        The kinetic energy at a rate of 1 is half the inertia. Rates come from finite differences,
+        and each link's mass is spread over its points.
         """
         closure = self._closure
         step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
@@ -382,25 +392,6 @@ def _write_geoms(element: ET.Element, body: LinkBody, origin: complex) -> None:
         ET.SubElement(element, 'geom', where, type='box', size=size)
 
 
-_STEP = 5e-4
-"""Step of the integration, in [s]."""
-
-_STIFF = {'solref': f'{format_number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
-"""Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
-
-_PACE = 30.0
-"""Bandwidth of the position servo of an input, in [rad/s]."""
-
-_HEAD = f"""\
-A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
-are equality constraints between sites. A hinge or slide that is a published joint has its name,
-sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
-Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
-pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
-Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
-its gravity and its springs between points are."""
-
-
 def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     """
     Return a model of linkages for MuJoCo.
@@ -451,7 +442,7 @@ def _refuse_massless(parts: Sequence[ModelPart]) -> None:
                     count,
                     f'masses.{link}.mass',
                     'is 0, and MuJoCo moves no massless body',
-                    'write a small mass, or omit it for that of its shape',
+                    'write a small mass, or omit it: its shape then has one',
                 )
 
 
@@ -462,7 +453,7 @@ def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, float]:
             raise PartError(
                 count,
                 'loads.gravity',
-                f'[{format_numbers(*gravity)}] is another than that of the first linkage',
+                f'[{format_numbers(*gravity)}] differs from the first linkage',
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )

@@ -54,20 +54,8 @@ def urdf_onto(robot: UrdfFile, data: bytes, parts: Sequence[ModelPart]) -> bytes
     """
     Return a robot's URDF, with what closes the loops of linkages added at its end.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    data
-        The content of its file.
-    parts
-        Linkages, with joint names of the robot.
-
-    Raises
-    ------
-    FileError
-        If the robot is not the one that a linkage came from; the message names the joint.
-
+    ``data`` is the content of the robot's file; the linkages have joint names of the robot. A
+    FileError names the joint if the robot is not the one that a linkage came from.
     """
     end = data.rfind(_END)
     if end < 0:
@@ -90,7 +78,7 @@ class _RobotNames(PrefixedNames):
 
     def __init__(self, prefix: str, names: ModelNames) -> None:
         super().__init__(prefix, names)
-        self.links: dict[str, str] = {}  # Links of the linkage, with those of the robot
+        self.links: dict[str, str] = {}  # Links of the linkage, and the robot's links
 
     def own_name(self, name: str) -> str:
         return self.links.get(name) or super().own_name(name)

@@ -39,9 +39,14 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics import Array
 
 
+_SAMPLES = 2880
+_MARGIN = 1e-3
+"""Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
+
+
 # The orientation of one link relative to another, as a sum of published joints.
 #
-# A published angle is that of its child minus that of its parent, whether or not a pin joins the
+# A published angle is its child's angle minus its parent's, whether or not a pin joins the
 # two; a block keeps its angle to the link it slides along. So the links whose angles messages
 # determine form a connected graph with the ground, and the path between two links is the sum.
 
@@ -84,7 +89,7 @@ class Orientations:
 
     def angle_between(self, link: str, other: str) -> tuple[Turn, ...] | None:
         """
-        Return the angle of ``other`` minus that of ``link``, with the fewest joints.
+        Return the angle of ``other`` minus the angle of ``link``, with the fewest joints.
 
         None if messages do not determine it. Each partial sum is the orientation of some link.
         """
@@ -111,11 +116,6 @@ class Orientations:
                     more = joints + bool(turn.joint)
                     heappush(ahead, (more, count, other, (*turns, turn)))
         return paths
-
-
-_SAMPLES = 2880
-_MARGIN = 1e-3
-"""Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
 
 
 class AngleSpan(NamedTuple):

@@ -32,6 +32,17 @@ import numpy as np
 
 _LINE = '_line'
 
+_NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+_PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
+
+_ZERO = (0.0, 0.0, 0.0)
+
+Array = Any
+"""A vector of 3, or a matrix of 3 × 3."""
+
+_PARALLEL = 1e-6
+"""Sine of the largest angle between a joint and the plane that still counts as planar."""
+
 
 class Closing(NamedTuple):
     """Frames that coincide."""
@@ -78,10 +89,6 @@ def find_closings(
     return closings, alone
 
 
-_NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
-_PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
-
-
 def find_pinned(urdf: UrdfFile) -> Iterator[tuple[str, str]]:
     """Yield pairs of places that meet, LINK.x,y,z, of joints that Gazebo closes loops by."""
     frames = {urdf.root: (np.eye(3), np.zeros(3))}
@@ -112,9 +119,6 @@ def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
             name, 'fixed', found[1], name, (x, y, z), _ZERO, _ZERO, '', 1.0, 0.0, NO_LIMITS
         )
     return urdf._replace(links=links, joints=joints)
-
-
-_ZERO = (0.0, 0.0, 0.0)
 
 
 class UrdfLoops(NamedTuple):
@@ -154,13 +158,6 @@ def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str
         left_out.append(f'link {body}')
     kept = frozenset(edge[2] for edge in edges if edge[2])
     return UrdfLoops(bodies[0], kept, tuple(left_out))
-
-
-Array = Any
-"""A vector of 3, or a matrix of 3 × 3."""
-
-_PARALLEL = 1e-6
-"""Sine of the largest angle between a joint and the plane that still counts as planar."""
 
 
 class Frame(NamedTuple):

@@ -30,20 +30,8 @@ def make_scene_model(scene: Scene, closures: Sequence[Closure], write: Write) ->
     """
     Return the robot model of a scene, with joint names as in its messages.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    closures
-        Closures of its linkages, with the deviations of their parts.
-    write
-        `urdf_model` or the writer of MJCF.
-
-    Raises
-    ------
-    FileError
-        A linkage cannot be a robot model; the error has the remedy.
-
+    The closures have the deviations of their parts; ``write`` is `urdf_model` or the writer of
+    MJCF. A FileError with a remedy is raised if a linkage cannot be a robot model.
     """
     parts = [
         ModelPart(closure, scene_linkage.prefix, scene_linkage.loads, scene.wrapped)

@@ -28,7 +28,10 @@ from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.tools.models.orientation import named_joints, Orientations, Turn
 from linkage_ros.tools.models.part import free_name, ModelNames, PrefixedNames
 
-# The remedy if the published joints do not determine the position of a link.
+Kind = Literal['revolute', 'prismatic', 'fixed']
+
+_DEAR = 9
+"""Cost of using a joint that another link may need."""
 
 
 def suggest_joint(
@@ -59,9 +62,6 @@ def joint_text(name: str, joint: RevoluteJoint | SlideJoint) -> str:
     if isinstance(joint, SlideJoint):
         return f'{name}: {{slider: {joint.slider}}}'
     return f'{name}: {{parent: {joint.parent}, child: {joint.child}}}'
-
-
-Kind = Literal['revolute', 'prismatic', 'fixed']
 
 
 class TreeJoint(NamedTuple):
@@ -117,18 +117,8 @@ def grow_tree(linkage: Linkage, names: PrefixedNames) -> Tree:
     """
     Attach all links of a linkage to its ground.
 
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    names
-        Provides names for frames and joints without a name in messages.
-
-    Raises
-    ------
-    DefinitionError
-        If the published joints do not determine a link's position; it names a joint that would.
-
+    ``names`` provides names for frames and joints without a name in messages. A DefinitionError is
+    raised if the published joints do not determine a link's position; it names a joint that would.
     """
     growth = _Growth(linkage, names)
     if len(growth.attach_links()) < len(linkage.links):
@@ -264,10 +254,6 @@ class _Growth:
             yield TreeJoint('', 'fixed', '', '', 0j, constant)
 
 
-_DEAR = 9
-"""Cost of using a joint that another link may need."""
-
-
 def _missing_error(linkage: Linkage) -> DefinitionError:
     """Return the error that names the joints that a complete tree would need."""
     whole, lost, added = linkage, dict[str, None](), dict[str, RevoluteJoint | SlideJoint]()
@@ -283,7 +269,7 @@ def _missing_error(linkage: Linkage) -> DefinitionError:
     several = len(lost) > 1
     return DefinitionError(
         'joints',
-        f'the published ones do not tell where link{"s" if several else ""} '
+        f'the published joints do not determine where link{"s" if several else ""} '
         f'{list_names(map(quote, lost), " and ")} {"stand" if several else "stands"}',
         f'add to joints: {", ".join(joint_text(name, joint) for name, joint in added.items())}',
     )

@@ -47,6 +47,28 @@ from linkage_ros.tools.models.xml import (
     xml_document,
 )
 
+EFFORT, VELOCITY = 1000.0, 100.0
+"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+FARTHEST = 1e9
+"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
+
+_ROOT = 'world'
+
+_EXPRESSION = re.compile(r'\$[{(]')
+"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
+
+_HEAD = f"""\
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
+published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
+iyy = izz/2.
+A limit is as the linkage gives it; else what the joint comes to over the range of the input that
+the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. An angle that passes pi has none either, since it is published as it
+begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+
+
 # The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
 #
 # Frames named PIN_on_LINK mark the pin on each of its links: in a correct model they coincide. So
@@ -156,18 +178,6 @@ class _FrameAdding:
         return joint.child
 
 
-EFFORT, VELOCITY = 1000.0, 100.0
-"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
-
-FARTHEST = 1e9
-"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
-
-_ROOT = 'world'
-
-_EXPRESSION = re.compile(r'\$[{(]')
-"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
-
-
 class _Model(NamedTuple):
     """A linkage with its tree, ready to be written."""
 
@@ -181,21 +191,10 @@ class _Model(NamedTuple):
 
 def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     """
-    Return a robot model.
+    Return a robot model of some linkages.
 
-    Parameters
-    ----------
-    name
-        Name of the robot.
-    parts
-        Its linkages.
-
-    Raises
-    ------
-    PartError
-        If the published joints of a linkage do not determine all its links, or xacro would
-        evaluate one of its names.
-
+    A PartError is raised if the published joints of a linkage do not determine all its links, or
+    xacro would evaluate one of its names.
     """
     names, own = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
     models = []
@@ -269,17 +268,6 @@ def _head_lines(models: Sequence[_Model]) -> Iterator[str]:
             yield f'{what} {cut.name} is cut, {how}'
         if spare := ', '.join(map(model.names.own_name, model.tree.spare)):
             yield f'no link hangs by {spare}'
-
-
-_HEAD = f"""\
-A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
-the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
-Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
-iyy = izz/2.
-A limit is as the linkage gives it; else what the joint comes to over the range of the input that
-the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
-angles, the reach for slides. An angle that passes pi has none either, since it is published as it
-begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
 
 
 def _write_linkage(robot: ET.Element, model: _Model) -> None:

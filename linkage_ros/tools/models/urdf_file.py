@@ -26,6 +26,25 @@ Vector = tuple[float, float, float]
 
 MOVING = ('revolute', 'continuous', 'prismatic')
 
+_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
+_FARTHEST = 1e9
+
+_LOOP_TAGS = {
+    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
+    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
+}
+"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
+
+_PINS = ('', 'revolute', 'continuous', 'spherical')
+"""Types of a loop joint that are a pin in the plane; without a type it is one."""
+
+_USUAL_TAGS = (
+    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
+    *_LOOP_TAGS,
+)  # fmt: skip
+
+_LARGEST_FILE = 10_000_000
+
 
 class Inertial(NamedTuple):
     """Mass [kg], its centre [m], rotation of its axes [rad], and ixx ixy ixz iyy iyz izz."""
@@ -69,7 +88,7 @@ class UrdfFile(NamedTuple):
 
     file: str  # Name of the file, for messages
     name: str  # Name of the robot
-    root: str  # The link that is no joint's child
+    root: str  # The link that is not a child
     links: Mapping[str, UrdfLink]  # Links by name
     joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
     order: tuple[str, ...]  # Names of the joints in the order of the file
@@ -83,33 +102,12 @@ class UrdfFile(NamedTuple):
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
 
 
-_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
-_FARTHEST = 1e9
-
-_LOOP_TAGS = {
-    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
-    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
-}
-"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
-
-_PINS = ('', 'revolute', 'continuous', 'spherical')
-"""Types of a loop joint that are a pin in the plane; without a type it is one."""
-
-_USUAL_TAGS = (
-    'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
-    *_LOOP_TAGS,
-)  # fmt: skip
-
-
-_LARGEST_FILE = 10_000_000
-
-
 def read_urdf_file(file: Path) -> bytes:
     """Return the content of a URDF; a LinkageError has the reason why it cannot be read."""
     try:
         data = read_regular(file, _LARGEST_FILE)
     except IsADirectoryError:
-        reason = f'is {kind_of_folder(file).noun}, and no URDF'
+        reason = f'is {kind_of_folder(file).noun}, not a URDF'
         raise LinkageError(file, reason, 'name a URDF file') from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -126,11 +124,11 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
     except ET.ParseError as error:
         noun = kind_of_bytes(data).noun
         if noun not in ('a URDF', 'an XML file'):
-            raise FileError(file, '', f'is {noun}, and no URDF', 'name a URDF file') from None
+            raise FileError(file, '', f'is {noun}, not a URDF', 'name a URDF file') from None
         line, _ = error.position
-        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file', line) from None
+        raise FileError(file, '', f'is not XML ({error})', 'name a URDF file', line) from None
     except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration
-        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file') from None
+        raise FileError(file, '', f'is not XML ({error})', 'name a URDF file') from None
     return _Reader(file).read(root)
 
 
@@ -206,7 +204,7 @@ class _Reader:
             for end, link in (('parent', parent), ('child', child)):
                 if link not in links:
                     raise self._file_error(
-                        where, f'its {end} {quote(link)} is no link', 'name a link'
+                        where, f'its {end} {quote(link)} is not a link', 'name a link'
                     )
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
             values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
@@ -296,7 +294,7 @@ class _Reader:
         if kind in ('floating', 'planar'):
             raise self._file_error(
                 where,
-                f'is {kind}, which no pin or slider of a planar linkage is',
+                f'type {kind} cannot be a pin or slider of a planar linkage',
                 f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
             )
         parent, child = (self._read_end(element, end, where, links) for end in ('parent', 'child'))
@@ -348,7 +346,7 @@ class _Reader:
             raise self._file_error(
                 where,
                 f'its limits, {low:g} to {high:g}, leave nothing between them',
-                'put <limit> right, or import with --no-limits',
+                'correct <limit>, or import with --no-limits',
             )
         rates = [told.get(key, 0.0) for key in ('velocity', 'effort')]
         velocity, effort = (value if value > 0.0 else inf for value in rates)
@@ -360,7 +358,7 @@ class _Reader:
         found = element.find(end)
         link = found.get('link', '') if found is not None else ''
         if link not in links:
-            raise self._file_error(where, f'its {end} {quote(link)} is no link', 'name a link')
+            raise self._file_error(where, f'its {end} {quote(link)} is not a link', 'name a link')
         return link
 
     def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
@@ -370,7 +368,7 @@ class _Reader:
             if joint.mimics not in joints:
                 raise self._file_error(
                     f'joint {joint.name}',
-                    f'mimics {quote(joint.mimics)}, which is no joint',
+                    f'mimics {quote(joint.mimics)}, which is not a joint',
                     'name a joint',
                 )
             if joints[joint.mimics].mimics or joints[joint.mimics].kind not in MOVING:
@@ -389,15 +387,13 @@ class _Reader:
                 raise self._file_error(
                     f'link {joint.child}',
                     f'is the child of two joints, {held[joint.child].name} and {joint.name}',
-                    'end one of them in a frame of its own, and close it by --close',
+                    'let one end in its own frame, and close it by --close',
                 )
             held[joint.child] = joint
         roots = [link for link in links if link not in held]
         if len(roots) != 1:
             reason = f'has {len(roots)} roots ({list_names(roots)})' if roots else 'has no root'
-            raise self._file_error(
-                '', reason, 'join all links by joints to one that is held by none'
-            )
+            raise self._file_error('', reason, 'join all links by joints to one root link')
         ordered = list(_joints_below(roots[0], joints))
         for joint in joints.values():
             if joint not in ordered:
@@ -432,7 +428,7 @@ def _unread_tags(root: ET.Element) -> Iterator[str]:
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
     for element in root:
         if element.tag in _LOOP_TAGS and element.get('type', '') not in _PINS:
-            yield f'<{element.tag}> {element.get("name", "")}, which is no pin'
+            yield f'<{element.tag}> {element.get("name", "")}, which is not a pin'
         elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
             yield f'<{element.tag}>'
 

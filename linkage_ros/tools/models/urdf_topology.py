@@ -33,6 +33,12 @@ Symbol = tuple[tuple[tuple[str, float], ...], float]
 
 _PATTERNS = 'R+|P|PR+|R+P'
 
+NEAR = 1e-9
+"""Positions closer than this fraction of the linkage's size are one."""
+
+_TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
+"""Sources of a point's name; the lowest wins."""
+
 
 class Chain(NamedTuple):
     """Joints from one body to another, with no body between them."""
@@ -51,15 +57,8 @@ def find_chains(planar: Planar, marked: Collection[str], near: float) -> list[Ch
     """
     Return the connections of the bodies.
 
-    Parameters
-    ----------
-    planar
-        The URDF.
-    marked
-        Bodies that carry a loop joint: they are kept even without shape or mass.
-    near
-        Positions closer than this are one, in [m].
-
+    ``marked`` are bodies that carry a loop joint: they are kept even without shape or mass.
+    Positions closer than ``near``, in [m], are one.
     """
     hung: dict[str, list[PlanarJoint]] = {}
     for joint in planar.joints:
@@ -119,11 +118,7 @@ class Points:
     """
     Points, in the order in which they are added.
 
-    Parameters
-    ----------
-    near
-        Positions on a body that are closer than this are one point, in [m].
-
+    Positions on a body that are closer than ``near``, in [m], are one point.
     """
 
     def __init__(self, near: float) -> None:
@@ -175,13 +170,6 @@ class Points:
             if body in links:
                 links[body][name] = place
         return links, names
-
-
-NEAR = 1e-9
-"""Positions closer than this fraction of the linkage's size are one."""
-
-_TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
-"""Sources of a point's name; the lowest wins."""
 
 
 class _SliderRail(NamedTuple):

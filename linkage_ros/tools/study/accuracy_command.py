@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Say where the error of the published joints comes from, what each digit costs, what to write.
+Show where the error of the published joints comes from, what each digit costs, what to write.
 
 The first lines answer; the table has a row for each source of error and for what the scene makes
 different on purpose, with its price and its next settings. A bag stands for its scene, moved as
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--need',
         type=bounded_number(1e-15, 10.0),
         metavar='RAD',
-        help='say the cheapest settings with no more error than this, or what stands in the way',
+        help='print the cheapest settings with no more error than this, or what prevents it',
     )
     add_output(parser, LINKAGES, 'the lines are printed; with it, the scene that meets --need')
     parser.add_argument(
@@ -90,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'parts to measure, separated by commas, of {list_names(PARTS)}',
     )
     parser.add_argument(
-        '--quick', action='store_true', help='take 20 s at most, and say what is left out'
+        '--quick', action='store_true', help='take 20 s at most, and print what is left out'
     )
     parser.add_argument('--json', action='store_true', help='the same as JSON, in rad and µs')
     parser.add_argument(
@@ -168,14 +168,14 @@ def _read_parts(text: str) -> list[str]:
     for part in parts:
         if part not in PARTS:
             remedy = did_you_mean(part, PARTS, f'known: {list_names(PARTS)}')
-            raise LinkageError(f'--only {part}', 'there is no such part', remedy)
+            raise LinkageError(f'--only {part}', 'is not a part to measure', remedy)
     return parts
 
 
 def _check_options(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
     """Raise if options do not fit together, before anything is measured."""
     if arguments.output and arguments.need is None:
-        raise LinkageError('-o', 'is the scene that meets a need', 'say it: --need 1e-3')
+        raise LinkageError('-o', 'is the scene that meets a need', 'add --need 1e-3')
     if arguments.need is not None and 'errors' not in parts:
         raise LinkageError('--need', 'is for errors', f'write --only errors,{arguments.only}')
 

@@ -64,6 +64,9 @@ _PHASES = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
 _BEFORE = 20
 """Samples before the newest one that a drive gets, for its differences."""
 
+_BLOCK = 100
+"""Samples that are read together."""
+
 
 def measure_age_in_use(
     scene: Scene, motions: Sequence[LinkageMotion], horizon: float, *, quick: bool = False
@@ -71,11 +74,7 @@ def measure_age_in_use(
     """
     Return the errors of rates of ticks, for a listener who holds and one who carries forward.
 
-    Raises
-    ------
-    LinkageError
-        The loops close at no state of the motion.
-
+    A LinkageError is raised if the loops close at no state of the motion.
     """
     by_sample = not scene.rate
     rate = scene.rate or max(each.sample_rate for each in motions) or USUAL_RATE
@@ -113,11 +112,7 @@ def errors_in_use(
     """
     Return for each rate the errors of a state in use: held, and carried by its rates.
 
-    Raises
-    ------
-    LinkageError
-        The loops close at no state of the motion.
-
+    A LinkageError is raised if the loops close at no state of the motion.
     """
     blocks = [_times_of_use(rate, horizon, periods) for rate in rates]
     # All in one run, since a drive that integrates takes time for it.
@@ -147,7 +142,7 @@ def errors_in_use(
 
 
 def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
-    """Return times of ticks, each with those of its use, in [ns] (ticks, 1 + parts)."""
+    """Return times of ticks, each with the times of its use, in [ns] (ticks, 1 + parts)."""
     count = max(1, int(horizon * rate) - 1)
     numbers = np.unique(np.round(np.linspace(0, count, periods + 1)))
     uses = numbers[:, None] + np.array((0.0, *_PARTS))
@@ -234,10 +229,6 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     return spread.scale(1e6)
 
 
-_BLOCK = 100
-"""Samples that are read together."""
-
-
 class _CommandSamples:
     """Ticks of a linkage, and the samples that come to them."""
 
@@ -248,7 +239,7 @@ class _CommandSamples:
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 
     def measure_error(self, use: TopicParameters, factor: float) -> JointError | None:
-        """Return the error of a use, with so many times the samples; 0 for samples at once."""
+        """Return the error of a use, with ``factor`` times the samples; 0 for samples at once."""
         cranks: list[Crank | None] = []
         if self._motion.samples:
             cranks = self._crank_states(use, self._recorded_samples(factor > 0.0), self._ticks)

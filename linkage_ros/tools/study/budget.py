@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Where the error of the published joints comes from, and what each digit of it costs.
+Where the error of the published joints comes from, and what each digit costs.
 
 A source of error is a knob with settings, such as the step of the drive or the rate of the ticks.
 Each setting has an error, measured against the exact solution of the scene, and a price, measured
@@ -91,7 +91,7 @@ class Knob(NamedTuple):
     settings: Sequence[Setting]
     chosen: int  # Index of the scene's own setting
     after: float | None = None  # For an error that grows: the time that it was taken after, in [s]
-    # Whether the scene asks for the difference: an effect or a fault, which is no error.
+    # Whether the scene asks for the difference: an effect or a fault, which is not an error.
     is_deliberate: bool = False
     note: str = (
         ''  # What is assumed or to be known, below the table; of effects in the last column

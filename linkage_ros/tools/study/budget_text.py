@@ -10,7 +10,7 @@
 A budget as text: what is off, by how much, what to write for less; and the table behind that.
 
 A time is a median with half the distance of its quartiles; one that is smaller than that distance
-is within noise, and no number is told of it.
+is within noise, and has no number.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def _advice_line(budget: Budget, knob: Knob) -> str:
         left = rest + better.error.worst
         cost = _cost_text(budget, knob, better)
         return f'{error_text(left)} rad are left with: {better.instruction} ({cost})'
-    return 'nothing that was measured makes it less'
+    return 'no measured setting reduces it'
 
 
 def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:

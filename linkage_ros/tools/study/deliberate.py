@@ -38,6 +38,8 @@ _MOST_TICKS, _MOST_TICKS_QUICK = 20_000, 2_000
 _SECONDS, _SECONDS_QUICK = 0.8, 0.2
 """Time to price one effect, in [s]."""
 
+FORCES = frozenset(FORCE_EFFECTS)
+
 
 class Difference(NamedTuple):
     """How far two runs of a scene are apart for a listener."""
@@ -83,7 +85,7 @@ def compare_runs(
     ticks: int,
     progress: Progress = lambda _: None,
 ) -> list[Difference]:
-    """Return how far the published joints of a scene are from those of each of the others."""
+    """Return how far the published joints of a scene are from each of the others."""
     turning = turning_joints(scene)
     sizes = {
         joint: scene_linkage.closure.scale
@@ -140,9 +142,6 @@ def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> Scen
     return replace(
         scene_linkage, effects=effects, loads=scene_linkage.loads if has_forces else None
     )
-
-
-FORCES = frozenset(FORCE_EFFECTS)
 
 
 class _Variant(NamedTuple):

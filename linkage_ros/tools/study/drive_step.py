@@ -12,7 +12,7 @@ The error that the step of a torque drive makes, for its methods and steps.
 The drive runs as in the node, with the same commands at the same times, and its joints at the
 ticks are compared with the exact ones. These come from `linkage_ros.tools.study.exact_drive`, and
 their own error from a second run at ten times the tolerance: it falls as the power 7/8 of the
-tolerance at least, so a sixth of the difference is no less than the error of the first. Where
+tolerance at least, so a sixth of the difference is at least the error of the first. Where
 scipy is not installed or a winding adds a state, the exact motion is that of the drive itself at a
 sixteenth of its step, or what there is time for; its own error is a third of the difference from
 twice that step, as for a method of order 2.
@@ -55,6 +55,9 @@ _LONGEST, _SHORTEST = 0.1, 1e-6
 _UNSURE = 1e-3
 """Where the exact motion itself is known no better than this, in [rad], it cannot be foretold."""
 
+_EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
+"""Evaluations of the equation of motion in a step, about."""
+
 
 def measure_drive_step(
     motion: LinkageMotion,
@@ -69,28 +72,12 @@ def measure_drive_step(
     """
     Return the errors of methods and steps, and what was left out for lack of time.
 
-    Parameters
-    ----------
-    motion
-        What the linkage of a torque drive does.
-    rate
-        Ticks per second.
-    horizon
-        How long it runs, in [s].
-    key
-        Key of the drive in the scene.
-    quick
-        Whether to measure a few settings only.
-    seconds
-        Processor time that the measurement may take, in [s].
-    progress
-        Called with the fraction that is done.
+    The linkage has a torque drive; ``key`` is its key in the scene. The rate is in [Hz],
+    ``horizon`` is the duration of the run, in [s], and ``seconds`` the processor time that the
+    measurement may take. A ``quick`` measurement has few settings; ``progress`` gets the fraction
+    that is done.
 
-    Raises
-    ------
-    LinkageError
-        The input runs away, or stops at a toggle, before the horizon.
-
+    A LinkageError is raised if the input runs away, or stops at a toggle, before the horizon.
     """
     begun = process_time()
     use: TorqueParameters = motion.scene_linkage.drive[1]
@@ -137,10 +124,6 @@ def measure_drive_step(
     return Knob(NAME, settings, 0, horizon, note=note), left_out
 
 
-_EVALUATIONS = {'semi_implicit_euler': 1.0, 'rk4': 4.0, 'gauss_legendre': 14.0}
-"""Evaluations of the equation of motion in a step, about."""
-
-
 def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: float) -> Price:
     """Return what the drive takes of a tick, with its commands."""
     period = NANOSECONDS / rate
@@ -159,13 +142,8 @@ def exact_cranks(
     """
     Return the exact motion at some times, in [ns], and its own error.
 
-    Where the drive itself stands in for it, its step is divided by up to ``finest``.
-
-    Raises
-    ------
-    LinkageError
-        The motion ends before the last time.
-
+    Where the drive itself stands in for it, its step is divided by up to ``finest``. A
+    LinkageError is raised if the motion ends before the last time.
     """
     use: TorqueParameters = motion.scene_linkage.drive[1]
     if _stands_in(use):

@@ -9,7 +9,7 @@
 """
 The exact motion of a torque drive, by another integrator than the drive's.
 
-The forces are those of the scene's own equation of motion. What integrates them is scipy's DOP853
+The forces are from the scene's own equation of motion. What integrates them is scipy's DOP853
 (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993,
 II.5) at a tolerance of 1e-13, from one jump of a force to the next: it begins anew where a command
 comes, where a rate with friction becomes 0, at an impact, and where motor and crank meet or part.
@@ -52,7 +52,13 @@ _MOST_PIECES = 100_000
 """Most pieces of a motion, so that its work is bounded."""
 
 _FASTEST = 1e10
-"""Values and rates beyond this, per [s], are no motion any more."""
+"""Values and rates beyond this, per [s], are not a motion any more."""
+
+State = tuple[float, float]
+"""Value and rate."""
+
+Margin = Callable[[float, Any], float]
+"""A function of time and state that is 0 or more before an event, and negative after it."""
 
 
 class NoMotionError(Exception):
@@ -115,13 +121,6 @@ class _MovingMass:
         return terms
 
 
-State = tuple[float, float]
-"""Value and rate."""
-
-Margin = Callable[[float, Any], float]
-"""A function of time and state that is 0 or more before an event, and negative after it."""
-
-
 def exact_motion(
     start: Any,
     acting: Sequence[AppliedEffort],
@@ -129,24 +128,11 @@ def exact_motion(
     tolerance: float = TOLERANCE,
 ) -> list[State]:
     """
-    Return values and rates of the input at some times.
+    Return values and rates of the input at some times, in [s] and in order.
 
-    Parameters
-    ----------
-    start
-        The state of the mechanism at 0: a `Motion`, or a `PlayMotion`.
-    acting
-        What acts, from 0 on.
-    times
-        Times, in [s], in order.
-    tolerance
-        Relative and absolute tolerance of a step.
-
-    Raises
-    ------
-    NoMotionError
-        The motion ends before the last time.
-
+    ``start`` is the state of the mechanism at 0, a `Motion` or a `PlayMotion`; ``acting`` are the
+    efforts from 0 on; ``tolerance`` is the relative and absolute tolerance of a step. A
+    NoMotionError is raised if the motion ends before the last time.
     """
     found: list[State] = []
     run = _ExactRun(start, tolerance)

@@ -48,6 +48,11 @@ from linkage_ros.kinematics import (
 )
 import numpy as np
 
+Solve = Callable[..., Sequence[Any]]
+"""Takes the inputs of a state; returns the published joints, or nothing where it has no answer."""
+
+_Single = np.float32
+
 
 class PlainFourBar(NamedTuple):
     """A linkage that is a single four-bar with its crank on the ground."""
@@ -63,7 +68,7 @@ class PlainFourBar(NamedTuple):
     turn: float  # What the input is multiplied by, ±1, to be a crank that turns counter-clockwise
     offset: float  # What is added then, to be measured from the line of the ground, in [rad]
     # For each published joint the numbers of two directions and a constant: the first less the
-    # second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
+    # second, and the constant. The directions are of ground (0), crank, coupler, rocker.
     terms: tuple[tuple[int, int, float], ...]
 
     def joint_angles(self, directions: Sequence[Any]) -> tuple[Any, ...]:
@@ -102,7 +107,7 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     numbers = {link: k for k, link in enumerate(arms)}
     level = arms[ground]
     turn = 1.0 if linkage.inputs[0].child == crank else -1.0
-    # The angle of a link is its direction less that of its arm; of the ground it is 0.
+    # The angle of a link is its direction less its arm's; 0 for the ground.
     constants = {link: level - arm for link, arm in arms.items()}
     return PlainFourBar(
         *found[0].lengths,
@@ -115,10 +120,6 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
             if isinstance(j, RevoluteJoint)
         ),
     )
-
-
-Solve = Callable[..., Sequence[Any]]
-"""Takes the inputs of a state; returns the published joints, or nothing where it has no answer."""
 
 
 def solve_by_textbook(shape: PlainFourBar) -> Solve:
@@ -141,9 +142,6 @@ def solve_by_textbook(shape: PlainFourBar) -> Solve:
         return joints((0.0, theta, atan2(by - ay, bx - ax), atan2(by, bx - d)))
 
     return position
-
-
-_Single = np.float32
 
 
 def solve_in_single_precision(shape: PlainFourBar) -> Solve:

@@ -32,14 +32,10 @@ def size_of(linkage: Linkage) -> float:
 
 def joints_at(closure: Closure, cranks: Sequence[Crank | None]) -> tuple[Any, Any]:
     """
-    Return joints and their rates for some states of the crank.
+    Return joints and their rates for some states of the crank, (joints, states) each.
 
-    Returns
-    -------
-    joints, rates : ndarray
-        Of shape (joints, states), in [rad] or [m] and per [s]; NaN where there is no crank or the
-        loops do not close.
-
+    The units are [rad] or [m], and per [s]; NaN where the crank is unknown or the loops do not
+    close.
     """
     count = len(closure.linkage.inputs)
     nothing = ((nan,) * count, (nan,) * count)

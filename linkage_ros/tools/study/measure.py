@@ -54,31 +54,14 @@ def measure_budget(
     """
     Measure a scene on this machine.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    horizon
-        How long its motion is followed, in [s].
-    like
-        What a topic drive's crank does, or which commands a torque drive gets: 'sine', or the path
-        of a bag.
-    quick
-        Whether to take less than 20 s, with fewer settings.
-    parts
-        What to measure, of `PARTS`.
-    folder
-        Folder on the disk on which recording is measured; the present one by default.
-    progress
-        Called now and then with the fraction that is done; an exception from it ends the
-        measurement.
+    Its motion is followed for ``horizon``, in [s]. ``like`` says what a topic drive's crank does,
+    or which commands a torque drive gets: 'sine', or the path of a bag. A ``quick`` measurement
+    takes less than 20 s, with fewer settings; ``parts`` are among `PARTS`. Recording is measured
+    on the disk of ``folder``, by default the present one. ``progress`` is called now and then with
+    the fraction that is done; an exception from it ends the measurement.
 
-    Raises
-    ------
-    LinkageError
-        The scene has no motion, it runs away before the horizon, its loops do not close, or a
-        package is not installed.
-
+    A LinkageError is raised if the scene has no motion, it runs away before the horizon, its loops
+    do not close, or a package is not installed.
     """
     left_out: list[str] = [_QUICK_LEFT_OUT] if quick else []
     motions = motions_of(scene, like, horizon) if ERRORS in parts or like else []

@@ -36,6 +36,18 @@ Item = TypeVar('Item')
 Progress = Callable[[float], None]
 """Takes the fraction of a measurement that is done, 0 to 1; an exception ends the measurement."""
 
+BLOCK = 1e-3
+"""Minimum duration of a block, in [s]: hundreds of times the duration of reading the clock."""
+
+_FINE = 20e-6
+"""Coarsest acceptable resolution of a clock, in [s]."""
+
+FEWEST, MOST = 5, 200
+"""Minimum number of rounds."""
+
+_CPU = Path('/proc/cpuinfo')
+_GOVERNOR = Path('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor')
+
 
 class Spread(NamedTuple):
     """The quartiles of repeated measurements."""
@@ -71,16 +83,6 @@ def spread_of(values: Sequence[float]) -> Spread:
     return Spread(*(percentile(values, percent) for percent in (25.0, 50.0, 75.0)))
 
 
-BLOCK = 1e-3
-"""Minimum duration of a block, in [s]: hundreds of times the duration of reading the clock."""
-
-_FINE = 20e-6
-"""Coarsest acceptable resolution of a clock, in [s]."""
-
-FEWEST, MOST = 5, 200
-"""Minimum number of rounds."""
-
-
 class Candidate(NamedTuple):
     """A call to be timed, and the number of states that it solves."""
 
@@ -95,19 +97,11 @@ def time_in_turn(
     clock: Callable[[], float] | None = None,
 ) -> list[Spread]:
     """
-    Return the time that each contender takes per state, in [s].
+    Return the time that each candidate takes per state, in [s]; each is run once before.
 
-    Parameters
-    ----------
-    candidates
-        The contenders; each is run once before.
-    seconds
-        Approximate duration of all; the minimum number of rounds is made even if it takes longer.
-    progress
-        Called after each block with the fraction that is done, 0 to 1.
-    clock
-        Returns the time, in [s]; by default the processor time of the thread.
-
+    The whole takes about ``seconds``, or longer if the minimum number of rounds does. ``progress``
+    is called after each block with the fraction that is done, 0 to 1. ``clock`` returns the time,
+    in [s]; by default the processor time of the thread.
     """
     clock = clock or thread_clock()
     repeats, block_time = [], 0.0
@@ -147,10 +141,6 @@ def thread_clock() -> Callable[[], float]:
         if perf_counter() - begun > _FINE:
             return perf_counter
     return thread_time
-
-
-_CPU = Path('/proc/cpuinfo')
-_GOVERNOR = Path('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor')
 
 
 def describe_machine() -> list[tuple[str, str]]:

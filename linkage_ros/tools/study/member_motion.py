@@ -9,7 +9,7 @@
 """
 What one linkage of a scene does: its inputs at any time, and the commands that move it.
 
-Whatever noise, delay or fault the scene adds is no part of its motion: that is asked for.
+Whatever noise, delay or fault the scene adds is not part of its motion: it is wanted.
 """
 
 from __future__ import annotations
@@ -62,27 +62,15 @@ class LinkageMotion(NamedTuple):
     samples: Sequence[tuple[int, int]] = ()
     sample_rate: float = 0.0  # Samples of a topic drive per second; 0 for other drives
     length: float = inf  # How long it is known, in [s]
-    note: str = ''  # What is assumed of it, in a sentence; '' for nothing
+    note: str = ''  # The assumption, in a sentence; '' for none
 
 
 def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> list[Crank | None]:
     """
     Return the crank at some times since the first tick, in [ns] and in order.
 
-    Parameters
-    ----------
-    motion
-        What the linkage does.
-    times
-        The times.
-    **changes
-        Parameters of a torque drive that differ from the scene's: its method, or its step.
-
-    Raises
-    ------
-    LinkageError
-        The input runs away before the last time.
-
+    ``changes`` are parameters of a torque drive that differ from the scene's: its method, or its
+    step. A LinkageError is raised if the input runs away before the last time.
     """
     if motion.path is not None:
         return [motion.path(time) for time in times]

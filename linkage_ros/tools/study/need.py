@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The cheapest settings whose errors together are no more than what somebody needs.
+The cheapest settings whose errors together do not exceed a need.
 
 Errors of different sources are added at their worst: all at once and in one direction. So what is
 said to meet a need does. Prices add up, too; one within noise costs nothing.
@@ -126,7 +126,7 @@ def _unmet_answer(budget: Budget, choices: Sequence[_SettingChoice], before: str
     pairs = zip(_error_knobs(budget), best.settings, strict=True)
     knob, setting = max(pairs, key=lambda pair: pair[1].error.worst)
     text = (
-        f'{before}nothing that was measured reaches it; {knob.name} stands in the way: '
+        f'{before}no measured setting reaches it; {knob.name} prevents it: '
         f'{error_text(setting.error.worst)} rad with {setting.label}'
     )
     return NeedAnswer(False, best.error, [], text)

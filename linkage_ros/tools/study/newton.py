@@ -35,6 +35,12 @@ from linkage_ros.kinematics import (
 )
 import numpy as np
 
+_MOST = 50
+"""Most iterations; more mean no convergence."""
+
+_BEHIND = 0.01
+"""How far behind a state its iteration starts, in [rad] or parts of the size."""
+
 
 class ConstraintEquations:
     """The constraint equations in the angles and positions of the links, without dyads."""
@@ -131,16 +137,9 @@ class ConstraintEquations:
         return BodyDirection(self._bodies.get(link, -1), 0, direction)
 
 
-_MOST = 50
-"""Most iterations; more mean no convergence."""
-
-_BEHIND = 0.01
-"""How far behind a state its iteration starts, in [rad] or parts of the size."""
-
-
 def solve_by_newton(linkage: Linkage, tolerance: float) -> Callable[..., Sequence[Any]]:
     """
-    Return Newton's method from a state a little behind, as from that of the last tick.
+    Return Newton's method from a state a little behind, as from the last tick.
 
     It ends at a last correction of at most the tolerance, in [rad] and [m]. The starts are kept,
     so a second call with the same inputs only iterates.

@@ -42,11 +42,17 @@ _LEAST = 1e-18
 """Smaller errors are drawn on the lower edge: no double can have them."""
 
 _MOST = 1e3
-"""Greater errors are drawn on the upper edge, such as that of a step that runs away, in [rad]."""
+"""Greater errors are drawn on the upper edge, as of a step that runs away, in [rad]."""
 
 _FAINT = '#6b7782'
 _HALO = 'stroke="#ffffff" stroke-width="3" paint-order="stroke"'
 """So that no line of the grid runs through letters."""
+
+_DIRECTIONS = (
+    *((side, up) for up in (0.0, -0.6, 0.6, -1.0, 1.0) for side in (1.0, -1.0)),
+    *((side, up) for side in (0.0, 0.5, -0.5) for up in (-1.4, 1.4)),
+)
+"""Where a label may be, seen from its mark: to the right and up."""
 
 
 class Box(NamedTuple):
@@ -159,7 +165,7 @@ class _Picture:
         ]
 
     def place_labels(self) -> list[PlacedLabel]:
-        """Return the labels that have a free place; those of the scene's settings come first."""
+        """Return the labels that have a free place; the scene's settings come first."""
         taken = [mark.box for marks in self.curves for mark in marks]
         segments = [
             ((one.x, one.y), (other.x, other.y))
@@ -289,13 +295,6 @@ def _legend_places(names: Sequence[str]) -> Iterator[tuple[float, int]]:
             x, row = 12.0, row + 1
         yield x, row
         x += width
-
-
-_DIRECTIONS = (
-    *((side, up) for up in (0.0, -0.6, 0.6, -1.0, 1.0) for side in (1.0, -1.0)),
-    *((side, up) for side in (0.0, 0.5, -0.5) for up in (-1.4, 1.4)),
-)
-"""Where a label may be, seen from its mark: to the right and up."""
 
 
 def _places_beside(mark: Mark, text: str) -> Iterator[Box]:

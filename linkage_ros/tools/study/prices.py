@@ -60,6 +60,10 @@ Feed = Callable[[Scene, Pipeline], Iterator[tuple[int, bytes]]]
 Change = tuple[str, object]
 """A dotted key of the scene with its value."""
 
+Path = Callable[[float], tuple[float, float]]
+
+Rounds = list[list[float]]
+
 
 def settings_of(changes: Sequence[Change]) -> list[str]:
     """Return changes as ``--set`` takes them."""
@@ -101,9 +105,6 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
             message = write(now, values, rates, (0.0,) * len(names))
         yield now, message
         count += 1
-
-
-Path = Callable[[float], tuple[float, float]]
 
 
 def _input_paths(linkage: LinkagePipeline) -> list[Path]:
@@ -163,7 +164,7 @@ class TimedScene:
         for now, message in block:
             if injection is not None:
                 injection.advance(now)
-                now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
+                now = injection.tick_time(now)  # noqa: PLW2901 (a clock fault changes the time)
             if message:
                 offer(message, now)
             if tick(now).message:
@@ -171,9 +172,6 @@ class TimedScene:
         taken = clock() - begun
         self.published += published
         return taken * 1e6 / len(block)
-
-
-Rounds = list[list[float]]
 
 
 def time_ticks(

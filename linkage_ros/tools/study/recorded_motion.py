@@ -36,14 +36,9 @@ def follow_samples(
     """
     Return the motion through the samples of a bag: cubics by their values and rates.
 
-    Without a ``topic`` it is that of the run, else that with most samples. With a ``pace``, in
-    [Hz], each tick takes one sample, whatever its time.
-
-    Raises
-    ------
-    BagError
-        The bag has no motion of the input.
-
+    Without a ``topic`` it takes the run's topic, else the topic with most samples. With a
+    ``pace``, in [Hz], each tick takes one sample, whatever its time. A BagError is raised if the
+    bag has no motion of the input.
     """
     samples = _samples_of(motion, bag, topic)
     if pace:

@@ -58,22 +58,11 @@ _STANDS = 1e-9
 
 def motions_of(scene: Scene, like: str | None, horizon: float) -> list[LinkageMotion]:
     """
-    Return what the linkages of a scene do.
+    Return the motions of a scene's linkages over a horizon, in [s].
 
-    Parameters
-    ----------
-    scene
-        The scene.
-    like
-        `SINE`, or the path of a bag with the samples or commands; None for the scene's own.
-    horizon
-        How long it is looked at, in [s].
-
-    Raises
-    ------
-    LinkageError
-        A topic drive has no motion; a bag cannot be read or has no samples.
-
+    ``like`` is `SINE`, or the path of a bag with the samples or commands; None for the scene's
+    own. A LinkageError is raised if a topic drive has no motion, or a bag cannot be read or has no
+    samples.
     """
     scene = without_deliberate(scene)
     pipeline = Pipeline(scene)
@@ -115,8 +104,8 @@ def _linkage_motion(
     if like is None:
         raise scene_linkage.content.error(
             'drive',
-            'topic has no motion of its own',
-            'say what its crank does: --like sine, or --like BAG with its samples',
+            'topic has no own motion',
+            'choose a motion of its crank: --like sine, or --like BAG with its samples',
         )
     return motion._replace(
         path=_sine_path(closure),

@@ -9,8 +9,8 @@
 """
 The error of solving the loops, and what other ways to solve them cost.
 
-The exact joints are those of `linkage_ros.tools.study.enclosure`: balls that are proved to hold
-the solution. The states are those of the scene's own motion. What a scene cannot ask for stands
+The exact joints are from `linkage_ros.tools.study.enclosure`: balls that are proved to hold
+the solution. The states are from the scene's own motion. What a scene cannot ask for stands
 beside the closed form for comparison: numbers of 32 bits, the textbook form, Newton's method, a
 spline through a table, thirty digits.
 """
@@ -51,10 +51,12 @@ _BITS = 104
 """Precision of thirty digits."""
 
 _FAR = 0.1
-"""Larger errors, in [rad], are those of another pose: the method has failed."""
+"""Larger errors, in [rad], mean another pose: the method has failed."""
 
 DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
+
+Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
 
 
 class SolvingMethod(NamedTuple):
@@ -76,26 +78,12 @@ def measure_solving(
     """
     Return the error of solving the linkages of a scene along their motion.
 
-    Parameters
-    ----------
-    motions
-        What the linkages do; the comparisons are those of the first.
-    rate
-        Ticks per second.
-    horizon
-        How long they move, in [s].
-    quick
-        Whether to take fewer states.
-    seconds
-        Time for the prices, in [s].
-    progress
-        Called with the fraction that is done.
+    The comparisons are made for the first of the motions. The rate is in [Hz], the horizon in [s];
+    ``seconds`` is the time for the prices. A ``quick`` measurement takes fewer states;
+    ``progress`` gets the fraction that is done.
 
-    Raises
-    ------
-    LinkageError
-        A package for the proof is missing, or nothing can be proved of the motion.
-
+    A LinkageError is raised if a package for the proof is missing, or nothing can be proved of the
+    motion.
     """
     check_installed('flint')
     count = _QUICK_STATES if quick else _STATES
@@ -299,7 +287,7 @@ class HardCase(NamedTuple):
     place: str  # 'toggle of double_rocker'
     solver: str
     worst: float  # Greatest error where it answers, in [rad]
-    failed: int  # States without an answer, or with that of another pose
+    failed: int  # States without an answer, or with another pose
     states: int  # All states, `DISTANCES` from the singular pose
 
 
@@ -320,9 +308,6 @@ def compare_hard_cases() -> Iterator[HardCase]:
         for solver in (_scene_solver(closure), *comparison_solvers(closure)):
             error, failed = compare_solver(linkage, solver.solve, known, exact, far)
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
-
-
-Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
 
 
 def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:

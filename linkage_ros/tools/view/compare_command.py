@@ -10,7 +10,7 @@
 Compare two runs: the differences of their joints over the time, in numbers and as a picture.
 
 The runs begin at their first joint states. The second is interpolated at the times of the first,
-as long as both last. A difference is no failure.
+as long as both last. A difference is not a failure.
 """
 
 from __future__ import annotations

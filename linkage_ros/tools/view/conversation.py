@@ -129,7 +129,7 @@ class _Page:
                 queue = self._slow if request.do in _SLOW else self._quick
                 dropped = queue.add_request(request, message.data)
             except RequestError as error:
-                self._server.count_refusal('a message that is no request')
+                self._server.count_refusal('a message that is not a request')
                 await self._socket.send_str(failure_answer(error.number, error))
                 continue
             for number in dropped:

@@ -84,29 +84,20 @@ class _LinkageChange(NamedTuple):
 
 def edit_text(text: str, edit: Mapping[str, Any], name: str = _NAME) -> EditResult:
     """
-    Return the text of a linkage file after an edit; whether it still closes, its model tells.
+    Return the text of a linkage file after an edit; `build_model` then shows whether it closes.
 
-    Parameters
-    ----------
-    text
-        The text before.
-    edit
-        One kind with its values, such as ``{'side': {'B': 'right'}}``; and ``inputs``, at which
-        the page shows the linkage. Places and lengths are in [m], angles in [rad].
-    name
-        Name of the file, for errors.
+    The edit is one kind with its values, such as ``{'side': {'B': 'right'}}``, and ``inputs``, at
+    which the page shows the linkage. Places and lengths are in [m], angles in [rad]; ``name`` is
+    for errors.
 
-    Raises
-    ------
-    FileError
-        If the text is not that of a linkage.
-    LinkageError
-        If there is no such edit, or it does not fit to the linkage.
-
+    A FileError is raised if the text is not a linkage, a LinkageError if there is no such edit or
+    it does not fit the linkage.
     """
     kind = next((key for key in edit if key in _KINDS), None)
     if kind is None:
-        raise LinkageError('edit', f'{quote(dict(edit))} is no edit', f'send {list_names(_KINDS)}')
+        raise LinkageError(
+            'edit', f'{quote(dict(edit))} is not an edit', f'send {list_names(_KINDS)}'
+        )
     written, _ = written_linkage(parse_yaml(text.encode(), name))
     closure = Closure(written)
     shown = _shown_linkage(closure, edit.get('inputs'))
@@ -282,7 +273,7 @@ def _set_length(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange
     start, end = complex(*points[one]), complex(*points[other])
     if length <= 0.0 or start == end:
         raise LinkageError(
-            f'links.{link}.{other}', f'{length:g} m is no length', 'type one above 0'
+            f'links.{link}.{other}', f'{length:g} m is not a length', 'type one above 0'
         )
     to = start + (end - start) * (length / abs(end - start))
     return _place_point(shown, link, other, (to.real, to.imag))
@@ -313,7 +304,9 @@ def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
     free = (f'P{index or ""}' for index in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
     if not isinstance(name, str) or name in taken:
-        raise LinkageError('name', f'{quote(name)} is taken, or no name', 'send another name')
+        raise LinkageError(
+            'name', f'{quote(name)} is taken, or is not a name', 'send another name'
+        )
     points = {**points, name: (_rounded_value(shown, x), _rounded_value(shown, y))}
     links = {**linkage.links, link: points}
     return _LinkageChange(replace(linkage, links=links, traced=(*linkage.traced, name)))
@@ -344,7 +337,7 @@ def _choose_input(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChan
     if link == GROUND or not {*points} & {*linkage.links[GROUND]}:
         raise LinkageError(link, 'has no pin on the ground', 'choose a link that has one')
     if old.slider or old.parent != GROUND:
-        raise LinkageError('input', f'{old.joint} is no crank on the ground', 'change the file')
+        raise LinkageError('input', f'{old.joint} is not a crank on the ground', 'change the file')
     if link == old.child:
         return _LinkageChange(linkage)
     joints = {
@@ -373,7 +366,7 @@ def _choose_side(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
         _checked_name('side', key, possible)
         if side not in possible[key]:
             remedy = f'choose {" or ".join(possible[key])}'
-            raise LinkageError(f'assembly.{key}', f'{quote(side)} is no side of it', remedy)
+            raise LinkageError(f'assembly.{key}', f'{quote(side)} is not one of its sides', remedy)
     sides: Any = {**written_sides(shown.closure), **given}
     return _LinkageChange(
         replace(without_drawn_pose(linkage, shown.closure.structure), assembly=sides)
@@ -430,7 +423,7 @@ def _in_pose(
 def _read_mapping(key: str, edit: Mapping[str, Any]) -> Mapping[str, Any]:
     given = edit[key]
     if not isinstance(given, dict):
-        raise LinkageError(key, f'{quote(given)} is no object', 'send an object')
+        raise LinkageError(key, f'{quote(given)} is not an object', 'send an object')
     return given
 
 

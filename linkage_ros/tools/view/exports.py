@@ -49,25 +49,11 @@ def export_linkage(
     kind: str, closure: Closure, text: str, name: str, inputs: Sequence[float] | None = None
 ) -> Export:
     """
-    Return a linkage as a file.
+    Return a linkage as a file of one of `EXPORT_KINDS`.
 
-    Parameters
-    ----------
-    kind
-        One of `KINDS`.
-    closure, text
-        The linkage, and its file as text.
-    name
-        Name of the file without suffix.
-    inputs
-        The pose to draw, in [rad] or [m]; None for the usual one.
-
-    Raises
-    ------
-    LinkageError
-        There is no such kind; the linkage is open in that pose, or cannot be compiled; a library
-        is missing.
-
+    ``name`` is the file's name without suffix; ``inputs`` is the pose to draw, in [rad] or [m],
+    None for the usual one. A LinkageError is raised if there is no such kind, the linkage is open
+    in that pose or cannot be compiled, or a library is missing.
     """
     if kind not in EXPORT_KINDS:
         remedy = did_you_mean(kind, EXPORT_KINDS, f'ask for one of {list_names(EXPORT_KINDS)}')

@@ -67,15 +67,8 @@ class FollowedRun(NamedTuple):
         """
         Return the state of the joints, as a page gets it.
 
-        Parameters
-        ----------
-        joints
-            The published joints.
-        crank
-            The newest inputs of the first linkage; None if they are unknown.
-        now
-            The time, in [ns].
-
+        ``crank`` has the newest inputs of the first linkage; None if they are unknown. ``now`` is
+        in [ns].
         """
         names = self.scene.joint_names
         inputs = self._inputs_at(joints.stamp, crank)
@@ -120,11 +113,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
     """
     Read the message with the scene of a node; user-defined effects are not imported.
 
-    Raises
-    ------
-    LinkageError
-        It cannot be read or drawn.
-
+    A LinkageError is raised if it cannot be read or drawn.
     """
     try:
         announced = read_announced(message, topic)

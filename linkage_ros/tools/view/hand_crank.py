@@ -26,19 +26,15 @@ _QUICKNESS = 40.0
 """Natural frequency ω of the filter, in [rad/s]: it lags by 50 ms."""
 
 HELD = 1.0
-"""Time after the last word of a hand when the crank is let go, in [s]."""
+"""Time after the last message of a hand when the crank is released, in [s]."""
 
 
 class HandCrank:
     """
     The inputs of a linkage, as hands on pages turn them.
 
-    Parameters
-    ----------
-    whole_turns
-        For each input, whether it turns without bounds: its angle is then continued across whole
-        turns, on the shorter way.
-
+    ``whole_turns`` marks inputs that turn without bounds: their angles continue across whole
+    turns, on the shorter way.
     """
 
     def __init__(self, whole_turns: Sequence[bool]) -> None:

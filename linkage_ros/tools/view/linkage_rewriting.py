@@ -26,7 +26,7 @@ from linkage_ros.errors import check_installed
 from linkage_ros.kinematics import Linkage
 
 _DIGITS = 13
-"""Significant digits of a converted number: the last ones are those of the conversion."""
+"""Significant digits of a converted number: the last ones come from the conversion."""
 
 _WIDE = 1_000_000
 """Columns of a line, which are never reached: no line is broken that was whole."""
@@ -41,7 +41,7 @@ _UNITS = {
     'ratio': '',
     'offset': 'rad',
 }
-"""Units of the numbers below a key; those of slides are not changed by edits."""
+"""Units of the numbers below a key; edits do not change the units of slides."""
 
 _SIDES_OF_FOUR_BAR = {'d': ('ground', 'O2', 'O4'), 'a': ('crank', 'O2', 'A'),
                       'b': ('coupler', 'A', 'B'), 'c': ('rocker', 'O4', 'B')}  # fmt: skip
@@ -56,7 +56,7 @@ def rewrite_linkage(text: str, name: str, linkage: Linkage) -> str:
     """
     Return the text of a linkage file, which is bounded, with another linkage in it.
 
-    A FileError says that it is not that of a linkage, a LinkageError that ruamel.yaml is missing.
+    A FileError says that it is not a linkage, a LinkageError that ruamel.yaml is missing.
     """
     check_installed('ruamel.yaml', "pip install 'linkage_ros[view]'")
     from ruamel.yaml import YAML  # local import: an extra

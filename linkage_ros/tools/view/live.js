@@ -3,7 +3,7 @@
  * The page of a running node: what the node says, and hands on its crank, faults and recording.
  *
  * All that is shown comes by a WebSocket, and only the newest state is drawn. A switch shows what
- * the node says, not what was asked of it.
+ * the node says, not what was asked.
  */
 
 const Live = (() => {
@@ -273,7 +273,7 @@ const Live = (() => {
     }
     const note = element('p', { className: 'note' });
     note.textContent = hands.length
-      ? 'Without “hold”, the crank is let go one second after the last movement. It can be turned in the picture, too.'
+      ? 'Without “hold”, the crank is released one second after the last movement. It can be turned in the picture, too.'
       : `The scene drives the crank itself (${live.drive}).`;
     if (live.drive === 'torque') note.textContent = 'Without “hold”, the effort ends after one second.';
     at('hands').replaceChildren(...hands.map((hand) => hand.box), note);

@@ -41,6 +41,46 @@ _MOST_WAITING = 8
 _PATIENCE = 90.0
 """Time limit of a request, in [s]: the file of a snapshot may be large."""
 
+_BODY = """
+<p id="banner" role="alert" hidden></p>
+<main id="live">
+<section class="player">
+<figure><canvas role="img" aria-label="the linkage as the node publishes it"></canvas></figure>
+<p id="age"></p>
+<p id="more" class="note"></p>
+<div id="hands"></div>
+<div class="controls">
+<button type="button" id="record" aria-pressed="false">Record</button>
+<button type="button" id="snapshot" hidden>Snapshot</button>
+<button type="button" id="reset">Reset</button>
+</div>
+<p id="said" role="status"></p>
+</section>
+<section class="told">
+<h2>Joints</h2>
+<div class="scroll"><table>
+<thead><tr><th>joint</th><th class="number">position</th><th class="number">rate</th></tr></thead>
+<tbody id="joints"></tbody>
+</table></div>
+<h2 id="faults-title" hidden>Faults</h2>
+<div id="faults"></div>
+<h2>Node</h2>
+<dl id="facts" class="facts"></dl>
+<h2>Diagnostics</h2>
+<ul id="diagnostics"></ul>
+</section>
+</main>
+"""
+
+_HERE = 'linkage_ros.tools.view'
+_SCRIPTS = [
+    *(
+        ('linkage_ros.tools.view.pages', f'{name}.js')
+        for name in ('angles', 'curves', 'looks', 'picture')
+    ),
+    (_HERE, 'live.js'),
+]
+
 
 class Bridge(Protocol):
     """A running node, as pages see it."""
@@ -75,7 +115,9 @@ def add_live(app: web.Application, bridge: Bridge) -> None:
                     if content is None or len(waiting) >= _MOST_WAITING:
                         refused = content is None
                         server.count_refusal(
-                            'a message that is no request' if refused else 'a haste'
+                            'a message that is not a request'
+                            if refused
+                            else 'a request while too many wait'
                         )
                         continue
                     task = asyncio.create_task(_answer(socket, bridge, content))
@@ -141,47 +183,6 @@ def _news_event(bridge: Bridge) -> Iterator[asyncio.Event]:
         yield news
     finally:
         end()
-
-
-_BODY = """
-<p id="banner" role="alert" hidden></p>
-<main id="live">
-<section class="player">
-<figure><canvas role="img" aria-label="the linkage as the node publishes it"></canvas></figure>
-<p id="age"></p>
-<p id="more" class="note"></p>
-<div id="hands"></div>
-<div class="controls">
-<button type="button" id="record" aria-pressed="false">Record</button>
-<button type="button" id="snapshot" hidden>Snapshot</button>
-<button type="button" id="reset">Reset</button>
-</div>
-<p id="said" role="status"></p>
-</section>
-<section class="told">
-<h2>Joints</h2>
-<div class="scroll"><table>
-<thead><tr><th>joint</th><th class="number">position</th><th class="number">rate</th></tr></thead>
-<tbody id="joints"></tbody>
-</table></div>
-<h2 id="faults-title" hidden>Faults</h2>
-<div id="faults"></div>
-<h2>Node</h2>
-<dl id="facts" class="facts"></dl>
-<h2>Diagnostics</h2>
-<ul id="diagnostics"></ul>
-</section>
-</main>
-"""
-
-_HERE = 'linkage_ros.tools.view'
-_SCRIPTS = [
-    *(
-        ('linkage_ros.tools.view.pages', f'{name}.js')
-        for name in ('angles', 'curves', 'looks', 'picture')
-    ),
-    (_HERE, 'live.js'),
-]
 
 
 def live_page(bridge: Bridge) -> str:

@@ -98,6 +98,11 @@ _NEWEST_QOS = QoSProfile(depth=4, reliability=ReliabilityPolicy.BEST_EFFORT)
 _HAND_QOS = QoSProfile(depth=1)
 """Reliable, for any subscriber; only the newest crank matters."""
 
+_PLAIN = ('snapshot', 'reset')
+"""Requests that are services without an argument."""
+
+_REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
+
 
 @dataclass(slots=True, eq=False)
 class _Call:
@@ -113,27 +118,11 @@ class _Call:
 
 class LiveBridge:
     """
-    Follows a linkage node, on a thread of its own.
+    Follows a linkage node, on its own thread; ``name`` becomes the node's full name.
 
-    Parameters
-    ----------
-    name
-        Name of the node; '' for the only one on the graph.
-    patience
-        How long the node and its scene are waited for, in [s].
-    domain
-        ROS domain; None for the one of the environment.
-
-    Attributes
-    ----------
-    name
-        Full name of the node.
-
-    Raises
-    ------
-    LinkageError
-        There is no such node, or there are several to choose from.
-
+    A name of '' takes the only node on the graph. ``patience`` is how long to wait for the node
+    and its scene, in [s]; a domain of None takes the ROS domain of the environment. A LinkageError
+    is raised if there is no such node, or there are several to choose from.
     """
 
     def __init__(
@@ -241,7 +230,7 @@ class LiveBridge:
             return names[0]
         if wanted:
             remedy = did_you_mean(wanted, names, _node_remedy(names))
-            raise LinkageError(f'--node {name}', 'is no linkage node on this graph', remedy)
+            raise LinkageError(f'--node {name}', 'is not a linkage node on this graph', remedy)
         reason = f'there are {len(names)} linkage nodes' if names else 'there is no linkage node'
         raise LinkageError('--node', f'{reason} on this graph', _node_remedy(names))
 
@@ -308,7 +297,7 @@ class LiveBridge:
         self._last_told = -inf
 
     def _follow_run(self, run: FollowedRun) -> None:
-        """Subscribe to the topics of a run, and forget those of the run before."""
+        """Subscribe to the topics of a run, and forget the topics of the run before."""
         node = self._node
         for subscription in self._run_subscriptions:
             node.destroy_subscription(subscription)
@@ -510,7 +499,9 @@ class LiveBridge:
         number = content.get('input', 0)
         if type(number) is not int or not 0 <= number < len(run.topic_driven.input_names):
             count = len(run.topic_driven.input_names)
-            raise LinkageError('input', f'{quote(number)} is none', f'name one of {count}')
+            raise LinkageError(
+                'input', f'{quote(number)} is not the index of an input', f'name one of {count}'
+            )
         at = [0.0] * len(run.topic_driven.input_names)
         if self._cranks is not None and run.topic_driven is run.drawn_linkage:
             at = list(self._cranks.angles)
@@ -562,12 +553,6 @@ class LiveBridge:
             self._hand_publisher.publish(command)
         else:
             self._hand_timer.cancel()
-
-
-_PLAIN = ('snapshot', 'reset')
-"""Requests that are services without an argument."""
-
-_REQUESTS = ('fault', 'record', *_PLAIN, 'crank', 'effort')
 
 
 def _take_all(subscription: Any) -> list[bytes]:
@@ -636,5 +621,5 @@ def _send_reply(future: Future[str], line: str) -> None:
 
 def _node_remedy(names: Sequence[str]) -> str:
     if names:
-        return f'name one of them: {list_names(names)}'
-    return 'start one, in the same ROS_DOMAIN_ID (linkage run says it)'
+        return f'name one of {list_names(names)}'
+    return 'start one, in the same ROS_DOMAIN_ID (linkage run prints it)'

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The model of a linkage: all that the page of `linkage view` needs of it, as JSON holds it.
+The model of a linkage: all that the page of `linkage view` needs, as JSON.
 
 The page moves it by the program: JavaScript that `kinematics.compiling` writes.
 """
@@ -49,7 +49,7 @@ from linkage_ros.tools.models.source_code import JavaScript, STATUSES, Subject, 
 _STATUSES = {name: index for index, name in enumerate(STATUSES)}
 
 _SAMPLES = 180
-"""Number of inputs at which transmission angle and margin are told."""
+"""Number of inputs at which transmission angle and margin are computed."""
 
 _MOST_GHOSTS = 7
 """Most other assemblies."""
@@ -72,25 +72,13 @@ def build_model(
     text: str, name: str, *, whole: bool = True, shown: ViewState | None = None
 ) -> dict[str, Any]:
     """
-    Return the model of a linkage file.
+    Return the model of a linkage file; the name is for errors and the title.
 
-    Parameters
-    ----------
-    text
-        The file's text.
-    name
-        Its name, for errors and as a title.
-    whole
-        Whether what takes longer is wanted too: other assemblies, ranges, quality, warnings.
-    shown
-        How the page shows the linkage during a drag. Where it closes so, a linkage of pins is not
-        searched for its ranges, and its ``drawn`` has neither ``frame`` nor ``paths``.
+    With ``whole`` it has what takes longer too: other assemblies, ranges, quality, warnings.
+    ``shown`` is how the page shows the linkage during a drag. Where it closes so, a linkage of
+    pins is not searched for its ranges, and its ``drawn`` has neither ``frame`` nor ``paths``.
 
-    Raises
-    ------
-    FileError
-        If the text is not that of a linkage which closes.
-
+    A FileError is raised if the text is not a linkage that closes.
     """
     content = parse_yaml(text.encode(), name)
     written, shorthand = written_linkage(content)
@@ -116,7 +104,7 @@ def build_model(
 
 
 def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
-    """Return the model of a linkage without a file, whose other assemblies are not told."""
+    """Return the model of a linkage without a file, without its other assemblies."""
     inputs = usual_inputs(closure)
     drawn = drawn_in_frames(prepare_view(closure, inputs))
     return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {

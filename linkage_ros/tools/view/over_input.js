@@ -56,7 +56,7 @@ const OverInput = (() => {
   }
 
   /**
-   * Return angles without leaps of whole turns, which are no motion; null where there is none.
+   * Return angles without leaps of whole turns, which are not motion; null where there is none.
    *
    * The one numbered `at` is within half a turn of `now`, where the linkage is.
    */
@@ -88,7 +88,7 @@ const OverInput = (() => {
   }
 
   class Plot {
-    /** `rate` returns that of the first input, in [rad/s] or [m/s]. */
+    /** `rate` returns the rate of the first input, in [rad/s] or [m/s]. */
     constructor(figure, rate) {
       this.rate = rate;
       this.figure = figure;

@@ -64,24 +64,11 @@ def page_html(
     node: str | None = None,
 ) -> str:
     """
-    Return the page.
+    Return the page of a linkage; see `linkage_ros.tools.view.model`.
 
-    Parameters
-    ----------
-    model
-        The linkage; see `linkage_ros.tools.view.model`.
-    mode
-        ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
-    can_save
-        Whether the server may save the user's file.
-    scene, node
-        Name of the scene whose sensors are read, and of the node; None without one.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is not installed.
-
+    The mode is ``edit`` beside a server, ``still`` without one, ``live`` beside a node.
+    ``can_save`` is whether the server may save the user's file. ``scene`` is the name of the scene
+    whose sensors are read. A LinkageError is raised if plotly is not installed.
     """
     data = {
         'mode': mode,
@@ -105,7 +92,7 @@ def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
     editing = mode == 'edit'
     yield from _header(title, editing, can_save)
     yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
-    yield 'The linkage still moves; it is tried again.</p>'
+    yield 'The linkage still moves; the page tries again.</p>'
     yield '<p id="wrong" role="alert" hidden></p>'
     yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
     yield '<main><section class="player" aria-label="The linkage">'

@@ -42,12 +42,14 @@ def window_of(since: float | None, until: float | None) -> Window:
     """
     Return the part of a run between two times, in [s].
 
-    A LinkageError is raised if they are no times, or in the wrong order.
+    A LinkageError is raised if they are not times, or in the wrong order.
     """
     ends = []
     for option, value, default in (('--since', since, 0), ('--until', until, Window().until)):
         if value is not None and (not isfinite(value) or not 0.0 <= value < 1e9):
-            raise LinkageError(option, f'{value} is no time in a run', 'write seconds from 0 on')
+            raise LinkageError(
+                option, f'{value} is not a time in a run', 'write seconds from 0 on'
+            )
         ends.append(default if value is None else round(value * 1e9))
     if ends[0] >= ends[1]:
         raise LinkageError('--until', f'{until} is not after --since', 'write a later one')
@@ -65,13 +67,7 @@ def read_part(
     """
     Read a part of a run; see `read_run`. The layouts of its files say how much there is to read.
 
-    Raises
-    ------
-    LinkageError
-        If the bag cannot be read.
-    StoppedError
-        If the event was set.
-
+    A LinkageError is raised if the bag cannot be read, a StoppedError if the event was set.
     """
     size = max(1, sum(layout.content for layout in layouts) // _MIB)
     with show_progress('read [MiB]') as advance:

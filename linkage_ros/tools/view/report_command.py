@@ -11,7 +11,7 @@ Write a run as one HTML page that needs nothing else: its linkage moving, plots,
 
 The page makes no request to anywhere. Of a long run it holds intervals with their least and
 greatest values; --since and --until show a part of it in full. A bag that is damaged or not
-finished is told as far as it goes; of one without a scene of ours, its joint states alone.
+finished is shown as far as it goes; a bag without a scene, by its joint states alone.
 """
 
 from __future__ import annotations
@@ -148,9 +148,9 @@ def _find_warnings(
     if not account['messages']:
         yield 'The bag holds no messages.'
     if account['damage']:
-        yield f'Damaged: {account["damage"]}; what lies before is told.'
+        yield f'Damaged: {account["damage"]}; the page shows what lies before.'
     if account['unfinished']:
-        yield f'Unfinished: {account["unfinished"]}; what it holds is told.'
+        yield f'Unfinished: {account["unfinished"]}; the page shows what it holds.'
     if account['recording_failure']:
         yield f'The recording failed: {account["recording_failure"]}.'
     if account['beginning_missing']:

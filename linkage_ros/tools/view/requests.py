@@ -59,7 +59,7 @@ class Request(NamedTuple):
 
 
 class RequestError(LinkageError):
-    """A message that is no request."""
+    """A message that is not a request."""
 
     def __init__(self, reason: str, remedy: str, number: float | None = None) -> None:
         super().__init__('message', reason, remedy)
@@ -70,11 +70,7 @@ def read_request(message: str) -> Request:
     """
     Read a message of a page.
 
-    Raises
-    ------
-    RequestError
-        It is too large, no JSON, or no request.
-
+    A RequestError is raised if it is too large, not JSON, or not a request.
     """
     if len(message) > LARGEST or len(message.encode('utf-8', 'surrogatepass')) > LARGEST:
         raise RequestError(f'is larger than {LARGEST} bytes', 'send a smaller linkage')
@@ -83,7 +79,7 @@ def read_request(message: str) -> Request:
     except (ValueError, RecursionError):
         raise RequestError('is not JSON', 'send an object with id and do') from None
     if not isinstance(content, dict):
-        raise RequestError('is no object', 'send an object with id and do')
+        raise RequestError('is not an object', 'send an object with id and do')
     number: Any = content.get('id')
     if type(number) not in (int, float) or not abs(number) <= 2**53:
         raise RequestError('has no id', 'send a number as id')
@@ -101,15 +97,8 @@ class RequestHandler:
     """
     Answers the requests of all pages of a server.
 
-    Parameters
-    ----------
-    name
-        Name of the linkage with which the server was opened.
-    scene
-        The scene with which it was opened; None for a linkage.
-    report
-        Called with the line of each defect of this package.
-
+    The server was opened with the linkage ``name`` and, if not None, the scene. ``report`` is
+    called with one line for each defect of this package.
     """
 
     def __init__(self, name: str, scene: SceneFiles | None, report: Callable[[str], Any]) -> None:
@@ -120,21 +109,10 @@ class RequestHandler:
 
     def answer_request(self, page: int, request: Request) -> str:
         """
-        Return the answer to a request, as JSON.
+        Return the answer to a request of the page with this number, as JSON.
 
-        Parameters
-        ----------
-        page
-            Number of the page that asks.
-        request
-            The request.
-
-        Returns
-        -------
-        answer : str
-            With ``ok``, or with ``error``: its text, one line; the key in the file; and the pin or
-            the link that it concerns. A defect of this package is such an error too.
-
+        It has ``ok``, or ``error``: its text, one line; the key in the file; and the pin or the
+        link concerned. A defect of this package is such an error too.
         """
         fields = _RequestFields(request.content, self._name, partial(self._sensors_of, page))
         try:
@@ -197,7 +175,7 @@ class _RequestFields(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Return half the width of the bars that are shown, in [m]; 0 if it is not told."""
+        """Return half the width of the bars that are shown, in [m]; 0 if not given."""
         (size,) = _read_numbers('size', [self.content.get('size', 0.0)], 1)
         return max(0.0, size)
 
@@ -207,7 +185,7 @@ class _RequestFields(NamedTuple):
         return closure_of(self.text, self.name)
 
     def read_numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return a list of so many numbers."""
+        """Return a list of ``count`` numbers."""
         return _read_numbers(key, self.content.get(key), count)
 
 
@@ -231,7 +209,7 @@ def _answer_open(fields: _RequestFields) -> dict[str, Any]:
     name, names = fields.content.get('name'), linkage_names()
     if not isinstance(name, str) or name not in names:
         remedy = did_you_mean(str(name), names, f'name one of {list_names(names)}')
-        raise LinkageError('name', f'{quote(name)} is no shipped linkage', remedy)
+        raise LinkageError('name', f'{quote(name)} is not a shipped linkage', remedy)
     return build_model(shipped_path(f'linkages/{name}.yaml').read_text('utf-8'), name, whole=True)
 
 
@@ -295,20 +273,12 @@ _HANDLERS: dict[str, Callable[[_RequestFields], dict[str, Any]]] = {
 
 @lru_cache(maxsize=4)
 def closure_of(text: str, name: str) -> Closure:
-    """Return the closure of a linkage file's text; errors are those of `linkage_ros.load`."""
+    """Return the closure of a linkage file's text; errors are as in `linkage_ros.load`."""
     return read_closure(parse_yaml(encode_text(text, name), name), name)
 
 
 def encode_text(text: str, name: str) -> bytes:
-    """
-    Return the bytes of a file's text.
-
-    Raises
-    ------
-    FileError
-        It holds half of a surrogate pair, which UTF-8 has not.
-
-    """
+    """Return the bytes of a file's text; a FileError is raised for half a surrogate pair."""
     try:
         return text.encode()
     except UnicodeEncodeError as error:
@@ -328,15 +298,8 @@ def failure_answer(
     """
     Return the answer to a request that failed, as JSON.
 
-    Parameters
-    ----------
-    number
-        The number of the request; None if it has none.
-    error
-        Why it failed.
-    content
-        The request; the answer then has the pin or the link that the error concerns.
-
+    ``number`` is the number of the request; None if it has none. With the request as ``content``
+    the answer has the pin or the link that the error concerns.
     """
     where = error.key if isinstance(error, FileError) else error.where
     pin = None if content is None else _find_pin(error, content)

@@ -70,22 +70,12 @@ class Sensors:
 
     def read(self, t: float, inputs: Sequence[float], rates: Sequence[float]) -> dict[str, Any]:
         """
-        Return what the sensors read.
+        Return what the sensors read at a time of the page, in [s]; a step back restarts the run.
 
-        Parameters
-        ----------
-        t
-            Time of the page, in [s]; a step back begins the run again.
-        inputs, rates
-            The crank at that time, in [rad] and [rad/s], or [m] and [m/s].
-
-        Returns
-        -------
-        found : dict
-            ``read``: the value of each published joint, in [rad] or [m]; empty where nothing is
-            published. ``frames``: x, y and angle of each link where these values put it, as
-            the program of a model gives them; empty where they put it nowhere.
-
+        Inputs and rates are in [rad] and [rad/s], or [m] and [m/s]. The result has ``read``: the
+        value of each published joint, in [rad] or [m], empty where nothing is published; and
+        ``frames``: x, y and angle of each link where these values put it, as the program of a
+        model gives them, empty where they put it nowhere.
         """
         since, before = self._last
         line = self._linkage

@@ -82,15 +82,9 @@ class Server:
     """
     The server of a page.
 
-    Parameters
-    ----------
-    page
-        Returns the page; called in a thread, whenever a browser asks for it.
-    routes
-        What is served beside it.
-    report
-        Called with one line where something is refused for the first time, and with each defect.
-
+    ``page`` returns the page; it is called in a thread whenever a browser asks. ``routes`` are
+    served beside it. ``report`` is called with one line for the first refusal of a kind, and for
+    each defect.
     """
 
     def __init__(
@@ -184,7 +178,7 @@ class Server:
         finally:
             self._sockets.pop(socket, None)
             if socket.exception() is not None:
-                self.count_refusal('what is no WebSocket message')
+                self.count_refusal('what is not a WebSocket message')
 
     async def _has_place(self, path: str) -> bool:
         """Return whether one more page may be open, if need be after one that is being closed."""
@@ -198,7 +192,7 @@ class Server:
     async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
         """Answer only what comes from the page itself."""
         own = [[f'http://{host}'] for host in self._hosts]
-        # Browsers name the origin of every WebSocket, but not that of every page.
+        # Browsers name the origin of every WebSocket, but not of every page.
         unnamed: list[list[str]] = [] if 'Upgrade' in request.headers else [[]]
         if request.headers.getall('Host', []) not in [[host] for host in self._hosts]:
             return self._refuse(403, 'a request that names another host')
@@ -208,7 +202,7 @@ class Server:
         if not compare_digest(token.encode('utf-8', 'replace'), self._token.encode()):
             return self._refuse(404, 'a request without the token')
         if request.method not in ('GET', 'HEAD'):
-            return self._refuse(405, 'a request that is no GET')
+            return self._refuse(405, 'a request that is not a GET')
         try:
             response: web.StreamResponse = await handler(request)
         except web.HTTPException:

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     for package in ('plotly', *(() if arguments.output else ('aiohttp', 'ruamel'))):
         check_installed(package, "pip install 'linkage_ros[view]'")
     if not 0 <= arguments.port < 2**16:
-        raise LinkageError(f'--port {arguments.port}', 'is no port', 'name one below 65536')
+        raise LinkageError(f'--port {arguments.port}', 'is not a port', 'name one below 65536')
     if arguments.node is not None:
         return _show_node(arguments, stop)
     if arguments.file is None:

@@ -99,18 +99,10 @@ _Step = float | np.ufunc | None
 @dataclass(frozen=True, slots=True)
 class Expression:
     """
-    A formula of x.
+    A formula of x, such as ``log10(x)``.
 
-    Parameters
-    ----------
-    text
-        The formula, such as ``log10(x)``.
-
-    Raises
-    ------
-    SynthesisError
-        If it is not a formula: with the wrong part and its place, counted from 1.
-
+    A SynthesisError names the wrong part of a text that is not a formula, and its place, counted
+    from 1.
     """
 
     text: str
@@ -127,15 +119,7 @@ class Expression:
     def __call__(self, x: Array) -> Array: ...
 
     def __call__(self, x: float | Array) -> float | Array:
-        """
-        Return the values; inf or NaN where the formula has none.
-
-        Parameters
-        ----------
-        x
-            A number, or an array of any shape.
-
-        """
+        """Return the values for an x of any shape; inf or NaN where the formula has none."""
         values = np.asarray(x, np.float64)
         stack: list[Array | float] = []
         with np.errstate(all='ignore'):

@@ -49,28 +49,15 @@ def nearest_four_bar(
     crank: Sequence[float], rocker: Sequence[float], ground: float, *, free_zeros: bool = False
 ) -> Design:
     """
-    Return the four-bar nearest to more than three pairs.
+    Return the four-bar nearest to more than three pairs, in [rad]; the ground is in [m].
 
     There are many minima. The result is the best of those reached from the four-bar of
     Freudenstein's equation, and from some that meet three of the pairs exactly; one that closes at
-    all pairs is preferred to any that does not.
+    all pairs is preferred to any that does not. With ``free_zeros`` the zero angles of crank and
+    rocker are free too, and five pairs are needed.
 
-    Parameters
-    ----------
-    crank, rocker
-        More than three angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-    free_zeros
-        Whether the zero angles of crank and rocker are free too; this needs five pairs.
-
-    Raises
-    ------
-    SynthesisError
-        If the pairs determine no four-bar.
-    LinkageError
-        If scipy is not installed.
-
+    A SynthesisError is raised if the pairs determine no four-bar, a LinkageError if scipy is
+    missing.
     """
     starts = [fit_equation(crank, rocker, ground), *_through_triples(crank, rocker, ground)]
     starts.sort(key=root_mean_square)
@@ -105,22 +92,11 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
 
     It minimises `root_mean_square` of the errors, on one assembly for all positions: both are
     tried and the better is returned, never one that is worse than the start on its own assembly.
-    The minimum is the one reached from the start, and the same each time.
+    The minimum is the one reached from the start, and the same each time. With ``free_zeros`` the
+    zero angles of crank and rocker are free too.
 
-    Parameters
-    ----------
-    design
-        The start. All its wanted positions have a rocker angle.
-    free_zeros
-        Whether the zero angles of crank and rocker are free too.
-
-    Raises
-    ------
-    SynthesisError
-        If a position has no wanted rocker angle, or there are fewer positions than unknowns.
-    LinkageError
-        If scipy is not installed.
-
+    A SynthesisError is raised if a position has no wanted rocker angle, or there are fewer
+    positions than unknowns; a LinkageError if scipy is not installed.
     """
     count = 5 if free_zeros else 3
     if len(design.wanted) < count:

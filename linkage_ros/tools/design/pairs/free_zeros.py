@@ -69,7 +69,7 @@ Moved = Literal['rocker', 'crank', 'both']
 Lost = Literal['imaginary', 'infinite', 'vague']
 
 NOISE = 8.0
-"""Multiple of the effect of rounding the angles: smaller values cannot be told from zero."""
+"""Multiple of the effect of rounding the angles: smaller values may be zero."""
 
 _UNKNOWNS: dict[Moved, list[int]] = {'crank': [0, 1, 2], 'rocker': [0, 1, 3], 'both': [0, 1, 2, 3]}
 """Indices of the unknowns among k1, k2, α, β."""
@@ -79,6 +79,9 @@ _STEPS = 8
 
 _VAGUE = 0.1
 """Largest relative uncertainty of a link."""
+
+_NEARLY_REAL = 1e-3
+"""Largest imaginary part of a root that is still polished; rounding splits a double root so."""
 
 
 class DividedDifferences(NamedTuple):
@@ -285,10 +288,6 @@ def _pin_places(solution: Solution) -> tuple[NDArray[np.complex128], Array]:
     return lengths * np.exp(1j * solution.zeros), sensitivity
 
 
-_NEARLY_REAL = 1e-3
-"""Largest imaginary part of a root that is still polished; rounding splits a double root so."""
-
-
 class Count(NamedTuple):
     """The number of solutions of the equations; a double one counts once."""
 
@@ -301,7 +300,7 @@ class Count(NamedTuple):
     def __str__(self) -> str:
         """Return the text for a user, such as '3 solutions, 2 imaginary'."""
         parts = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
-        kinds = ('imaginary', 'with infinite links', 'whose links cannot be told')
+        kinds = ('imaginary', 'with infinite links', 'with uncertain links')
         parts += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
         return ', '.join(parts)
 
@@ -353,7 +352,7 @@ def four_pairs(
     check_pairs(crank, rocker, ground)
     rows = equation_differences(crank, rocker)
     sizes = np.linalg.svd(_real_rows(rows), compute_uv=False)
-    # Rounding error of a determinant: that of one row times the largest area of the others.
+    # Rounding error of a determinant: the error of one row times the largest area of the others.
     noise = NOISE * np.sum(rows.noise) * sizes[0] * sizes[1]
     directions: list[tuple[Moved, float, float]] = []
     imaginary = vague = 0
@@ -390,7 +389,7 @@ def five_pairs(
     """
     Return all four-bars for five pairs with the zeros of crank and rocker free.
 
-    The best conditioned comes first. Units and errors are those of `four_pairs`.
+    The best conditioned comes first. Units and errors are as in `four_pairs`.
     """
     check_pairs(crank, rocker, ground)
     rows = equation_differences(crank, rocker)
@@ -501,6 +500,6 @@ def _undetermined_error(count: int) -> SynthesisError:
     return SynthesisError(
         'pairs',
         f'the {count} equations depend on each other, so that any number of four-bars fits or '
-        'none, or the pairs are too near each other to tell',
+        'none, or the pairs are too close to decide',
         'move one of the angles, or leave the zeros as they are',
     )

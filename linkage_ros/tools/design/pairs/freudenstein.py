@@ -28,7 +28,7 @@ The differences are products,
 of angles that are sums of two or four doubles, and are computed so. Determinants, lengths and the
 coupler are computed in sums of two doubles too, so that they lose no more than rounding the angles
 loses: at a change point, in a parallelogram or with a short coupler, terms cancel whatever the
-angles are. So the error of the lengths is that of the angles: each length is within 4·2⁻⁵³ of its
+angles are. So only the error of the angles remains: each length is within 4·2⁻⁵³ of its
 sensitivity κ, the sum of its relative changes with each angle (`length_gradient`); if κ is too
 large for any digit, no digit is trusted. More pairs are met by least squares. The coupler is real
 whenever the angles are: b² is the mean, over the pairs, of the squared distance of crank pin and
@@ -60,6 +60,29 @@ from linkage_ros.tools.design.proof import assemble
 import numpy as np
 from numpy.typing import ArrayLike
 
+MOVE = 'move one of the angles'
+
+_SAME = 1e-12
+"""Angles nearer than this count as equal, in [rad]."""
+
+_FARTHEST = 1e9
+"""Larger angles, in [rad], have lost the digits of their direction."""
+
+_CONSISTENT = 1e-9
+"""Equations with a smaller relative residual do not contradict each other."""
+
+TRUSTED = 4.0
+"""Bound of the error of a length, in units of roundoff times sensitivity; measured."""
+
+LONGEST = 1e9
+"""In grounds: the length of a longer link is indistinguishable from infinite."""
+
+_NOISE = TRUSTED * UNIT_ROUNDOFF
+_SHAKEN = 0.1
+
+_BLOCK = 2048
+"""Triples of pairs that are computed at once: they stay in the cache."""
+
 
 class System(NamedTuple):
     """Freudenstein's equation for three pairs, and its solution for a ground of length 1."""
@@ -67,12 +90,12 @@ class System(NamedTuple):
     # Angles of crank and rocker, in [rad]; (3, n).
     theta: Array
     phi: Array
-    # cos φ, cos θ and cos(θ − φ) of the second and third pair minus those of the first, divided by
+    # cos φ, cos θ and cos(θ − φ) of the second and third pair minus the first, divided by
     # −2; (2, n).
     P: Array
     Q: Array
     R: Array
-    last: Array  # P and Q of the third pair minus those of the second; (2, n)
+    last: Array  # P and Q of the third pair minus the second; (2, n)
     determinant: Array  # P0·Q1 − P1·Q0; (n,)
     k: Array  # k1, k2 and k3; (3, n)
     lengths: Array  # Lengths of crank, coupler and rocker, the first and the last signed; (3, n)
@@ -80,15 +103,7 @@ class System(NamedTuple):
 
 
 def solve_pairs(theta: Array, phi: Array) -> System:
-    """
-    Solve three pairs; infinite or NaN if there is no solution.
-
-    Parameters
-    ----------
-    theta, phi
-        Angles of crank and rocker, in [rad]; (3, n).
-
-    """
+    """Solve three pairs, in [rad], (3, n); infinite or NaN without a solution."""
     with np.errstate(all='ignore'):
         P, Q, R = equation_differences(theta, phi)
         determinant, of_k1, of_k2 = _determinant(P, Q), _determinant(R, Q), _determinant(P, R)
@@ -117,18 +132,9 @@ def solve_pairs(theta: Array, phi: Array) -> System:
 
 def equation_differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
     """
-    Return all equations but the first minus the first, divided by −2.
+    Return all equations but the first minus the first, divided by −2, for angles (m, n) in [rad].
 
-    Parameters
-    ----------
-    theta, phi
-        Angles of crank and rocker, in [rad]; (m, n).
-
-    Returns
-    -------
-    tuple
-        Of cos φ, of cos θ and of cos(θ − φ); (m − 1, n) each.
-
+    The results are the differences of cos φ, cos θ and cos(θ − φ); (m − 1, n) each.
     """
     theta_by, phi_by = two_sum(theta[1:], -theta[:1]), two_sum(phi[1:], -phi[:1])
     theta_sum, phi_sum = two_sum(theta[1:], theta[:1]), two_sum(phi[1:], phi[:1])
@@ -151,16 +157,12 @@ def length_gradient(system: System) -> Array:
     """
     Differentiate the lengths, and the direction of the coupler in the first pair, by the angles.
 
-    The residual of equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ), changes by
-    sin(θ − φ) − k2·sin θ with θᵢ and by −sin(θ − φ) − k1·sin φ with φᵢ; k changes by that times
-    minus column i of the inverse. The coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
+    The residual of equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ), changes by sin(θ − φ) −
+    k2·sin θ with θᵢ and by −sin(θ − φ) − k1·sin φ with φᵢ; k changes by that times minus column i
+    of the inverse. The coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
 
-    Returns
-    -------
-    Array
-        Of crank, coupler, rocker and direction by the three crank angles, then by the three rocker
-        angles, per [rad]; (4, 6, n).
-
+    The result, (4, 6, n) per [rad], has crank, coupler, rocker and direction by the three crank
+    angles, then by the three rocker angles.
     """
     theta, phi = system.theta, system.phi
     k1, k2, _ = system.k
@@ -235,18 +237,6 @@ def _matrix_norm(x: Array, y: Array, z: Array) -> Array:
     return np.asarray(np.sqrt(mean + 2.0 * width * np.cos(turned)))
 
 
-MOVE = 'move one of the angles'
-
-_SAME = 1e-12
-"""Angles nearer than this count as equal, in [rad]."""
-
-_FARTHEST = 1e9
-"""Larger angles, in [rad], have lost the digits of their direction."""
-
-_CONSISTENT = 1e-9
-"""Equations with a smaller relative residual do not contradict each other."""
-
-
 def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[DesignRequest, ...]:
     """Return pairs as wanted positions."""
     return tuple(DesignRequest(t, p) for t, p in zip(crank, rocker, strict=True))
@@ -256,21 +246,17 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
     """
     Refuse pairs that no four-bar can have, or that repeat each other.
 
-    Raises
-    ------
-    SynthesisError
-        With the numbers of the pairs, counted from 1.
-
+    The SynthesisError has the numbers of the pairs, counted from 1.
     """
     if not SHORTEST <= ground <= FARTHEST:
         remedy = f'give it one from {SHORTEST:g} to {FARTHEST:g}'
-        raise SynthesisError('ground', f'{ground!r} m is no length', remedy)
+        raise SynthesisError('ground', f'{ground!r} m is not a length', remedy)
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     for number, pair in pairs:
         if not all(abs(angle) <= _FARTHEST for angle in pair):
             raise SynthesisError(
                 f'pair {number}',
-                f'{_pair_text(pair)} is no pair of angles',
+                f'{_pair_text(pair)} is not a pair of angles',
                 f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
             )
     for (i, one), (j, other) in combinations(pairs, 2):
@@ -317,14 +303,14 @@ def dependence_error(crank: Sequence[float], rocker: Sequence[float]) -> Synthes
                 f'{_pair_text(one)} and {_pair_text(other)} are mirror images in the ground '
                 'line: a '
                 'four-bar that has one has the other',
-                'give another pair in place of one of them',
+                'replace one of the pairs',
             )
     P, Q, R = centre_cosines(crank, rocker)
     matrix = np.stack((P, Q), 1)
     rest = R - matrix @ np.linalg.lstsq(matrix, R, _CONSISTENT)[0]
     if np.linalg.norm(rest) < _CONSISTENT * np.linalg.norm(R):
         return SynthesisError(
-            'the pairs', 'say so little that any number of four-bars has them all', MOVE
+            'the pairs', 'do not determine a four-bar: any number of four-bars has them all', MOVE
         )
     return SynthesisError(
         'the pairs',
@@ -339,19 +325,6 @@ def _pair_text(pair: tuple[float, float]) -> str:
 
 def _degrees_text(angle: float) -> str:
     return f'{degrees(angle):.10g}°'
-
-
-TRUSTED = 4.0
-"""Bound of the error of a length, in units of roundoff times sensitivity; measured."""
-
-LONGEST = 1e9
-"""In grounds: the length of a longer link is indistinguishable from infinite."""
-
-_NOISE = TRUSTED * UNIT_ROUNDOFF
-_SHAKEN = 0.1
-
-_BLOCK = 2048
-"""Triples of pairs that are computed at once: they stay in the cache."""
 
 
 class FreudensteinLinks(NamedTuple):
@@ -483,7 +456,7 @@ def exact_four_bar(
     if not solution.reliable_digits.all():
         raise SynthesisError(
             'the pairs',
-            f'do not tell how long the links are: rounding their angles changes one by '
+            f'do not determine the lengths of the links: rounding their angles changes one by '
             f'{parts.max():.0%}',
             'move the pairs apart',
         )

@@ -80,16 +80,10 @@ class ZeroProblem:
 
     def courses(self, candidates: Array) -> tuple[Array, Traversal, Flags]:
         """
-        Return the four-bars of zeros, and their courses through the pairs.
+        Return the four-bars of zeros, their traversals of the pairs, and which exist, (count,).
 
-        Returns
-        -------
-        lengths : (count, 4)
-            Lengths of crank, coupler, rocker and ground; all 1 if there is no four-bar.
-        found : Course
-        exists : (count,)
-            Whether there is one.
-
+        The lengths, (count, 4), are crank, coupler, rocker and ground; all 1 where no four-bar
+        exists.
         """
         theta, phi = self.crank + candidates[:, :1], self.rocker + candidates[:, 1:]
         signed = solve_links(theta, phi).lengths
@@ -124,28 +118,12 @@ def search_zeros(
     """
     Return the best four-bars for three pairs whose zeros are free, the best first.
 
-    Designs that meet the needs come first, by their transmission angle; then the nearest. None
-    has a defect.
+    Designs that meet the needs come first, by their transmission angle; then the nearest. None has
+    a defect. The angles are in [rad], the ground is in [m]; ``keep`` is the maximum number of
+    designs, and the other arguments are as in `study.search`.
 
-    Parameters
-    ----------
-    crank, rocker
-        Three angles each, in [rad].
-    ground
-        Length of the ground, in [m].
-    needs
-        The requirements on the design.
-    seed, count, progress, address
-        As in `study.search`.
-    keep
-        Most designs to return.
-
-    Raises
-    ------
-    SynthesisError
-        If two pairs are equal, or none of the zeros that were tried gives a four-bar without
-        defects.
-
+    A SynthesisError is raised if two pairs are equal, or none of the zeros tried gives a four-bar
+    without defects.
     """
     check_pairs(crank, rocker, ground)
     needs.check()
@@ -159,7 +137,7 @@ def search_zeros(
         raise SynthesisError(
             f'pairs {pairs}',
             f'none of {count} zeros of crank and rocker gives a four-bar without a defect',
-            'try more of them, or move an angle',
+            'try more zeros, or move an angle',
         )
     spacing = pi / count**0.5
     best = [_polish(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]

@@ -21,7 +21,7 @@ pivot, x = (b² + |D|² − c²)/2b and y = √(|D|² − x²) along and across 
     e^{iβ} = D·(x ± i·y)/|D|²,   + where the rocker's pin is on the left of D.
 
 Its derivatives follow from |a·e^{iθ} + b·e^{iβ} − d| = c.
-Lengths along a curve are those of its chords.
+Lengths along a curve are sums of chords.
 """
 
 from __future__ import annotations
@@ -36,6 +36,16 @@ from linkage_ros.kinematics import Array, Complex, Mask
 from linkage_ros.tools.design.design import FARTHEST, SHORTEST
 import numpy as np
 from numpy.typing import NDArray
+
+COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')
+"""The dimensions in a row."""
+
+LENGTHS = slice(3, 7)
+POINT = slice(7, 9)
+"""The slices of a row with the logarithms of the lengths, and with the traced point."""
+
+_SPARE = 1e-9
+"""Least distance of a loop from folding, relative to its longest diagonal, for its derivative."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +63,8 @@ class PathTask:
         Crank angles at the points, in [rad], all increasing or all decreasing, within a turn; None
         if they are free.
     zero_free
-        Whether only the differences of these angles count. Otherwise they are those of the crank's
-        pin itself, from the x axis.
+        Whether only the differences of these angles count. Otherwise they are angles of the
+        crank's pin itself, from the x axis.
     full_turn
         Whether the crank shall turn fully even if the path is open.
     links
@@ -82,7 +92,7 @@ class PathTask:
         shortest, longest = self.links
         if not 0.0 < shortest < longest < inf:
             raise SynthesisError(
-                'links', f'from {shortest:g} to {longest:g} of the path', 'say e.g. 0.2 to 4'
+                'links', f'from {shortest:g} to {longest:g} of the path', 'write e.g. 0.2 to 4'
             )
 
     @property
@@ -97,7 +107,7 @@ def _check_points(points: tuple[complex, ...], closed: bool) -> None:
     for number, point in enumerate(points, 1):
         if not (isfinite(point.real) and isfinite(point.imag)):
             raise SynthesisError(
-                f'point {number}', f'({point.real:g}, {point.imag:g}) is no place', 'correct it'
+                f'point {number}', f'({point.real:g}, {point.imag:g}) is not a place', 'correct it'
             )
     for number, (point, after) in enumerate(pairwise(points), 1):
         if point == after:
@@ -126,11 +136,11 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
     if not (all(step > 0.0 for step in steps) or all(step < 0.0 for step in steps)):
         raise SynthesisError(
             'timing',
-            'the crank angles go neither up nor down all the way',
+            'the crank angles neither increase nor decrease throughout',
             'write on beyond 360° or below 0° where they wrap',
         )
     travel = abs(timing[-1] - timing[0])
-    # A few rounding errors of degrees are no more than a turn.
+    # A few rounding errors of degrees do not exceed a turn.
     if not travel < tau * (1.0 + 1e-12) or (closed and travel > tau * (1.0 - 1e-12)):
         raise SynthesisError(
             'timing',
@@ -171,17 +181,6 @@ class Aim:
     longest: float
 
 
-COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')
-"""The dimensions in a row."""
-
-LENGTHS = slice(3, 7)
-POINT = slice(7, 9)
-"""The slices of a row with the logarithms of the lengths, and with the traced point."""
-
-_SPARE = 1e-9
-"""Least distance of a loop from folding, relative to its longest diagonal, for its derivative."""
-
-
 class Slopes(NamedTuple):
     """
     Places of the traced point, (n, N), and their derivatives.
@@ -200,15 +199,8 @@ def coupler_directions(
     """
     Return e^{iβ}, and y², which is below 0 if the loop is open.
 
-    Parameters
-    ----------
-    crank
-        The crank vector a·e^{iθ}, (n, N).
-    b, c, d
-        Lengths, (n, 1).
-    side
-        1 for left and −1 for right, (n, 1).
-
+    ``crank`` is the vector a·e^{iθ}, (n, N); the lengths are (n, 1), and ``side`` is 1 for left
+    and −1 for right, (n, 1).
     """
     diagonal = d - crank
     square = diagonal.real**2 + diagonal.imag**2
@@ -257,21 +249,11 @@ def transmission_cotangents(rows: Array, angles: Array) -> tuple[Array, Array, A
     """
     Return the cotangent of the transmission angle, and its derivatives.
 
-    It is 0 if coupler and rocker are square, and unbounded if they are in line. With
-    cos μ = (b² + c² − |D|²)/2bc, d(cot μ) = d(cos μ)/sin³ μ.
+    It is 0 if coupler and rocker are square, and unbounded if they are in line. With cos μ = (b² +
+    c² − |D|²)/2bc, d(cot μ) = d(cos μ)/sin³ μ.
 
-    Parameters
-    ----------
-    rows
-        Dimensions, (n, 9).
-    angles
-        Crank angles, (n, N).
-
-    Returns
-    -------
-    tuple
-        Cotangents (n, N), by dimension (n, N, 9), by crank angle (n, N).
-
+    For dimensions (n, 9) and crank angles (n, N) the results are the cotangents, (n, N), their
+    derivatives by dimension, (n, N, 9), and by crank angle, (n, N).
     """
     a, b, c, d = np.exp(rows[:, LENGTHS]).T[:, :, None]
     cosine, swing = np.cos(angles), 2.0 * a * d * np.sin(angles)

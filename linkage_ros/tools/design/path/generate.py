@@ -72,6 +72,34 @@ _AHEAD = 0.1
 _TINY = 1e-30
 """Prevents a division by zero if a crank angle moves nothing."""
 
+_DAMPING = 1e-2
+_LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
+_HELPED, _FAILED = 0.2, 5.0
+"""Factors of the damping after a step that improved the distances, and after one that did not."""
+
+_SETTLED = 1e-15
+"""A step with a smaller relative gain of the squares is the last."""
+
+_NOTHING = 1e-30
+"""Squares below this are rounding, for a path of size 1."""
+
+COUNT = 200_000
+"""Default number of four-bars that are drawn."""
+
+_STARTS = 512
+_STAGES = ((30, 3e-3, 128), (50, 3e-4, 64), (150, 3e-5, 32))
+"""Steps, guard, and the number of distinct four-bars that continue."""
+
+_LAST_STEPS = 300
+_THINNED = 32
+"""Points used by the search; the last steps use all of them."""
+
+_SAME = 0.05
+"""Linkages that differ by less than this, relative to the longest length, count as one."""
+
+_EXACT = 1e-9
+"""Errors below this, relative to the size of the path, count as none."""
+
 
 def damped_step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
     """
@@ -208,33 +236,12 @@ def _row_bounds(aim: Aim) -> tuple[Array, Array]:
     return low, high
 
 
-_DAMPING = 1e-2
-_LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
-_HELPED, _FAILED = 0.2, 5.0
-"""Factors of the damping after a step that improved the distances, and after one that did not."""
-
-_SETTLED = 1e-15
-"""A step with a smaller relative gain of the squares is the last."""
-
-_NOTHING = 1e-30
-"""Squares below this are rounding, for a path of size 1."""
-
-
 def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fitted, Array]:
     """
-    Return the four-bars after some steps, and their sums of squared distances, (n,).
+    Return the four-bars after at most ``steps``, and their sums of squared distances, (n,).
 
-    Invalid four-bars (open, or with points out of order) have inf, and are not changed.
-
-    Parameters
-    ----------
-    start, aim
-        The start, and the points.
-    steps
-        Most steps.
-    guard
-        Weight of a transmission angle of 45° as a distance. Not part of the sums.
-
+    Invalid four-bars (open, or with points out of order) have inf, and are not changed. ``guard``
+    is the weight of a transmission angle of 45° as a distance; it is not part of the sums.
     """
     now = Fitted(*(np.array(part) for part in start))
     seen = point_slopes(*now)
@@ -300,24 +307,6 @@ def _squared_distances(seen: Slopes, aim: Aim) -> Array:
     return total
 
 
-COUNT = 200_000
-"""Default number of four-bars that are drawn."""
-
-_STARTS = 512
-_STAGES = ((30, 3e-3, 128), (50, 3e-4, 64), (150, 3e-5, 32))
-"""Steps, guard, and the number of distinct four-bars that continue."""
-
-_LAST_STEPS = 300
-_THINNED = 32
-"""Points used by the search; the last steps use all of them."""
-
-_SAME = 0.05
-"""Linkages that differ by less than this, relative to the longest length, count as one."""
-
-_EXACT = 1e-9
-"""Errors below this, relative to the size of the path, count as none."""
-
-
 class PathResult(NamedTuple):
     """A linkage that passes near the points."""
 
@@ -330,20 +319,10 @@ class PathResult(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """
-    The result of a path generation, sorted by error.
+    """The result of a path generation, sorted by error."""
 
-    Attributes
-    ----------
-    found
-        The best accepted linkages.
-    refused
-        The best refused linkages.
-
-    """
-
-    found: tuple[PathResult, ...]
-    refused: tuple[PathResult, ...]
+    found: tuple[PathResult, ...]  # The best accepted linkages
+    refused: tuple[PathResult, ...]  # The best refused linkages
 
 
 def generate_path(

@@ -27,6 +27,29 @@ from typing import Any
 from linkage_ros.errors import escape_unprintable, LinkageError
 from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Status
 
+_UNKNOWN = {
+    'Float64': nan,
+    'Int32': 0,
+    'Int64': 0,
+    'UInt64': c_uint64(0),
+    'Boolean': False,
+    'String': '',
+}
+"""Kinds of values that the wrapper reads and sets, and what an unknown reference reads as."""
+
+_REFUSED: dict[str, tuple[str, Any]] = {
+    '_get_fmu_state': ('fmi3GetFMUState', {}),
+    '_set_fmu_state': ('fmi3SetFMUState', None),
+    'set_time': ('fmi3SetTime', None),
+    'update_discrete_states': ('fmi3UpdateDiscreteStates', None),
+    'get_continuous_states': ('fmi3GetContinuousStates', []),
+    'set_continuous_states': ('fmi3SetContinuousStates', None),
+    'get_continuous_state_derivatives': ('fmi3GetContinuousStateDerivatives', []),
+    'get_nominals_of_continuous_states': ('fmi3GetNominalsOfContinuousStates', []),
+    'get_event_indicators': ('fmi3GetEventIndicators', []),
+}
+"""Methods that the wrapper calls for what this FMU cannot do, and what it is given."""
+
 
 class SlaveState(Enum):
     """A state of an instance, in which FMI 3 allows some of the calls."""
@@ -47,15 +70,8 @@ def guard_call(
     """
     Make a method of `GuardedSlave` that PythonFMU3 calls, and which never raises.
 
-    Parameters
-    ----------
-    call
-        Name of the function of FMI.
-    states
-        States that allow it.
-    otherwise
-        Returns what PythonFMU3 is given after a failure, from the arguments of the call.
-
+    ``call`` is the name of the function of FMI, ``states`` are the states that allow it. After a
+    failure PythonFMU3 gets the result of ``otherwise`` for the arguments of the call.
     """
 
     def decorate(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -109,7 +125,7 @@ class GuardedSlave(Fmi3Slave):
             raise LinkageError(
                 call,
                 f'there is no value reference {reference}',
-                f'use those of the model description, 0 to {len(self.vars) - 1}',
+                f'use 0 to {len(self.vars) - 1}, as in the model description',
             )
         return variable
 
@@ -161,29 +177,6 @@ def _make_refusal(call: str, result: Any) -> Callable[..., Any]:
 
     return refuse_call
 
-
-_UNKNOWN = {
-    'Float64': nan,
-    'Int32': 0,
-    'Int64': 0,
-    'UInt64': c_uint64(0),
-    'Boolean': False,
-    'String': '',
-}
-"""Kinds of values that the wrapper reads and sets, and what an unknown reference reads as."""
-
-_REFUSED: dict[str, tuple[str, Any]] = {
-    '_get_fmu_state': ('fmi3GetFMUState', {}),
-    '_set_fmu_state': ('fmi3SetFMUState', None),
-    'set_time': ('fmi3SetTime', None),
-    'update_discrete_states': ('fmi3UpdateDiscreteStates', None),
-    'get_continuous_states': ('fmi3GetContinuousStates', []),
-    'set_continuous_states': ('fmi3SetContinuousStates', None),
-    'get_continuous_state_derivatives': ('fmi3GetContinuousStateDerivatives', []),
-    'get_nominals_of_continuous_states': ('fmi3GetNominalsOfContinuousStates', []),
-    'get_event_indicators': ('fmi3GetEventIndicators', []),
-}
-"""Methods that the wrapper calls for what this FMU cannot do, and what it is given."""
 
 for _kind, _value in _UNKNOWN.items():
     setattr(GuardedSlave, f'get_{_kind.lower()}', _make_reader(_kind, _value))

@@ -71,6 +71,9 @@ _STATUS_TEXTS = {
     'indeterminate': 'two pins coincide: the position is undefined',
 }
 
+_loaded: set[str] = set()
+"""Folders of FMUs that could be instantiated."""
+
 
 class Content(NamedTuple):
     """
@@ -94,19 +97,12 @@ class _Enumeration(Enumeration):
     dimensions = ()
 
 
-_loaded: set[str] = set()
-"""Folders of FMUs that could be instantiated."""
-
-
 class SceneSlave(GuardedSlave):
     """
     An instance of the FMU.
 
-    Raises
-    ------
-    LinkageError
-        Another version of linkage_ros made the FMU, or its files are damaged.
-
+    A LinkageError is raised if another version of linkage_ros made the FMU, or its files are
+    damaged.
     """
 
     def __init__(self, **given: Any) -> None:
@@ -240,7 +236,7 @@ class SceneSlave(GuardedSlave):
             self.register_units([Unit(unit, **_EXPONENTS[unit])])
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
-        """Return the model description; PythonFMU3 has no words for the rest of it."""
+        """Return the model description; PythonFMU3 cannot write all parts."""
         root: Element = super().to_xml(model_options or {})
         # A joint is named as in ROS, which structured names would forbid.
         root.set('variableNamingConvention', 'flat')
@@ -272,7 +268,7 @@ class SceneSlave(GuardedSlave):
         'fmi3DoStep', (SlaveState.INITIALIZED,), lambda *_: Fmi3StepResult(Fmi3Status.error)
     )
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
-        """Do the ticks of a step; discard a step that is no whole number of them."""
+        """Do the ticks of a step; discard a step that is not a whole number of ticks."""
         # PythonFMU3 keeps the start time to itself: the first step begins there.
         begin = current_time if self._begin is None else self._begin
         try:

@@ -7,9 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-A scene that another program steps: inputs in, so many ticks, outputs.
+A scene that another program steps: inputs, ticks, outputs.
 
-The clock is that of the other program, counted in ticks: tick n is at n/rate seconds after the
+The other program keeps the clock, counted in ticks: tick n is at n/rate seconds after the
 first. No other clock is read.
 """
 
@@ -40,7 +40,7 @@ FIRST_TICK = NANOSECONDS
 """Time of the first tick, in [ns]; not 0, since a sample stamped 0 is rejected as unstamped."""
 
 NO_CRANK = 0
-"""Status where no state of the crank is known; those of `Status` count from 1, in their order."""
+"""Status without a known state of the crank; the members of `Status` count from 1, in order."""
 
 STATUS_NUMBERS: Mapping[Status, int] = {status: n for n, status in enumerate(Status, 1)}
 
@@ -66,6 +66,14 @@ _MOST_TICKS = 10_000_000
 _OF_A_TICK = 1e-3
 """How far a step may be from whole ticks, in ticks: what rounding of sums of steps takes."""
 
+_READ_AS = {
+    'position': 'joints',
+    'velocity': 'rates',
+    'acceleration': 'accelerations',
+    'effort': 'efforts',
+}
+"""Name of each field in a `SensorReading`."""
+
 
 class Variable(NamedTuple):
     """A number that goes in or comes out, named as ``joint_states.rocker_joint.position``."""
@@ -76,15 +84,7 @@ class Variable(NamedTuple):
 
 
 class _Sender:
-    """
-    Sends the input values of a linkage as the message that its drive reads.
-
-    Parameters
-    ----------
-    line
-        The pipeline of the linkage, whose drive listens to a topic.
-
-    """
+    """Sends the input values of a linkage as the message that its drive reads from a topic."""
 
     def __init__(self, line: LinkagePipeline) -> None:
         scene_linkage = line.scene_linkage
@@ -165,15 +165,6 @@ class LinkageOutputs:
                 values[:] = newest
 
 
-_READ_AS = {
-    'position': 'joints',
-    'velocity': 'rates',
-    'acceleration': 'accelerations',
-    'effort': 'efforts',
-}
-"""Name of each field in a `SensorReading`."""
-
-
 def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
     named = {also for effect in scene_linkage.effects for also in PUBLISHED_WITH.get(effect, ())}
@@ -182,17 +173,7 @@ def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
 
 
 class MotorOutputs:
-    """
-    What the encoder of a motor reads: the newest message on ``~/motor``.
-
-    Parameters
-    ----------
-    line
-        The pipeline of its linkage.
-    writer
-        Number of its topic among the auxiliary topics.
-
-    """
+    """Readings of a motor's encoder: the newest ``~/motor`` message, by its auxiliary writer."""
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
         scene_linkage = line.scene_linkage
@@ -224,17 +205,8 @@ class SteppedScene:
     """
     A scene that is stepped from outside. To reset it, build it again.
 
-    Parameters
-    ----------
-    scene
-        The scene.
-
-    Raises
-    ------
-    FileError
-        The scene cannot be stepped: it has no tick rate, needs further files or modules, or sets
-        its own clock.
-
+    A FileError is raised if the scene cannot be stepped: it has no tick rate, needs further files
+    or modules, or sets its own clock.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -279,20 +251,10 @@ class SteppedScene:
 
     def whole_ticks(self, begin: float, seconds: float) -> int:
         """
-        Return how many ticks a step takes.
+        Return how many ticks a step takes; its begin is in [s] since the first tick.
 
-        Parameters
-        ----------
-        begin
-            Begin of the step, in [s] since the first tick.
-        seconds
-            Its length, in [s].
-
-        Raises
-        ------
-        LinkageError
-            The step does not begin where the last one ended, or is no whole number of ticks.
-
+        A LinkageError is raised if the step does not begin where the last one ended, or is not a
+        whole number of ticks.
         """
         rate = self._scene.rate
         # Written so that NaN is refused too.
@@ -313,7 +275,7 @@ class SteppedScene:
 
     def step(self, ticks: int, inputs: Sequence[float]) -> None:
         """
-        Take the values of the inputs at the end of the last step, then do so many ticks.
+        Take the values of the inputs at the end of the last step, then do these ticks.
 
         A drive takes them once, as one message.
         """
@@ -357,7 +319,7 @@ def _refuse_scene(scene: Scene) -> None:
     for name, fault in scene.faults.items():
         if fault.kind == 'time_jump':
             raise content.error(
-                f'faults.{name}', 'sets the clock, which is that of the importer', 'leave it out'
+                f'faults.{name}', 'sets the clock, which the importer keeps', 'leave it out'
             )
     for scene_linkage in scene.linkages:
         drive, _ = scene_linkage.drive

@@ -26,9 +26,9 @@ from linkage_ros.tools.models.source_code.source import (
 _NOTES = (
     '',
     'Values are written where the status has values; else the arrays stay as they were. Nothing',
-    'is allocated, and nothing is remembered: calls from several threads are safe. The digits are',
-    'those of linkage_ros where the compiler keeps to IEEE 754: -ffp-contract=off, and never',
-    '-ffast-math, which takes the checks out. It needs doubles of 64 bits and libm (-lm).',
+    'is allocated, and no state is kept: calls from several threads are safe. The digits are as',
+    'in linkage_ros if the compiler keeps to IEEE 754: -ffp-contract=off, and never',
+    '-ffast-math, which removes the checks. It needs doubles of 64 bits and libm (-lm).',
 )
 
 _CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53',

@@ -44,11 +44,7 @@ class JavaScript(Language):
     """
     JavaScript as an ECMAScript 2015 module.
 
-    Parameters
-    ----------
-    for_page
-        Whether a page of this package runs it: it exports nothing, and returns frames too.
-
+    For a page of this package (``for_page``) it exports nothing, and returns frames too.
     """
 
     def __init__(self, *, for_page: bool = False) -> None:

@@ -62,15 +62,15 @@ UNDECIDED = 'UNDECIDED'
 
 STATUSES: dict[str, str] = {
     Status.CLOSED.name: 'Every loop closes; the values are valid.',
-    Status.CHANGE_POINT.name: 'All links of a loop lie in one line; the values are valid: those '
-    'of the motion that passes through.',
+    Status.CHANGE_POINT.name: 'All links of a loop lie in one line; the values are valid, and '
+    'belong to the motion that passes through.',
     Status.LIMITED.name: 'A joint is beyond its limits; the values are valid.',
-    Status.TOGGLE.name: 'Two links are stretched or folded, and have no rates. No values. Whether '
-    'loops behind them are open is not told.',
+    Status.TOGGLE.name: 'Two links are stretched or folded, and have no rates. No values. '
+    'Loops behind them may be open.',
     Status.OPEN.name: 'Links do not reach each other. No values.',
-    Status.INDETERMINATE.name: 'A number that was given is not finite, or two pins coincide, so '
-    'that no direction can be told. No values.',
-    UNDECIDED: 'This code cannot tell, only linkage_ros itself can. No values.',
+    Status.INDETERMINATE.name: 'An argument is not finite, or two pins coincide, so that a '
+    'direction is undefined. No values.',
+    UNDECIDED: 'This code cannot decide; linkage_ros itself can. No values.',
 }
 """The statuses of a source, in the order of their numbers, with their meanings."""
 
@@ -163,7 +163,7 @@ class Language(ABC):
         )  # fmt: skip
 
     def function_name(self, derivatives: int) -> str:
-        """Return the name of the function with so many derivatives."""
+        """Return the name of the function with this number of derivatives."""
         return FUNCTIONS[derivatives]
 
     @abstractmethod
@@ -443,7 +443,7 @@ def _head_lines(subject: Subject, function: str) -> Iterator[str]:
             break_on_hyphens=False,
         )  # fmt: skip
     yield f'Lengths in the code are in units of {closure.scale:.9g} m. The constants k0, k1 and so'
-    yield 'on are what the solution makes of them.'
+    yield 'on are computed from them.'
 
 
 def _derived_names(subject: Subject, names: Sequence[str]) -> Iterator[str]:

@@ -33,6 +33,9 @@ _HERE = 'linkage_ros.tools.view.pages'
 Parts = Sequence[tuple[str, str]]
 """Files of one page: each with its package and its name."""
 
+_LONG = 28
+"""Length from which the text of a cell may be broken into lines."""
+
 
 def html_document(
     title: str,
@@ -45,28 +48,11 @@ def html_document(
     has_plots: bool = True,
 ) -> str:
     """
-    Return a page.
+    Return a page with a title, lines of HTML, and data for its script as JSON without NaN.
 
-    Parameters
-    ----------
-    title
-        Title of the window.
-    body
-        Lines of HTML.
-    data
-        Data of the script, as JSON holds them; numbers are finite.
-    styles, scripts
-        Files of this page beside those of all pages, in their order.
-    policy
-        Content policy; a page with a server must be allowed to ask it.
-    has_plots
-        Whether its scripts draw with Plotly, which is then part of the page.
-
-    Raises
-    ------
-    LinkageError
-        If plotly is needed and not installed.
-
+    ``styles`` and ``scripts`` are its files beside the ones that all pages share, in their order.
+    The content policy of a page with a server must allow requests to it. With ``has_plots`` Plotly
+    is part of the page; a LinkageError is raised if it is not installed.
     """
     plotting = [f'<script>{_within_script(plotting_library())}</script>'] if has_plots else []
     return '\n'.join(
@@ -110,7 +96,7 @@ def plotting_library() -> str:
 
 
 def _join_files(name: str, parts: Parts) -> str:
-    """Return the file that all pages share, followed by those of this page."""
+    """Return the file that all pages share, followed by this page's."""
     texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
     return '\n'.join(file.read_text('utf-8') for file in texts)
 
@@ -139,10 +125,6 @@ def _escape_letters(letters: set[str], text: str, before: str = '') -> str:
 
 def _within_script(text: str) -> str:
     return text.replace('</script', r'<\/script')
-
-
-_LONG = 28
-"""Length from which the text of a cell may be broken into lines."""
 
 
 def table_html(

@@ -17,15 +17,9 @@ def table_lines(
     heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool] = ()
 ) -> list[str]:
     """
-    Return the lines of a table.
+    Return the lines of a table of Markdown cells.
 
-    Parameters
-    ----------
-    heads, rows
-        Its cells, which are Markdown.
-    numbers
-        Which columns hold numbers and are aligned to the right; none if not given.
-
+    ``numbers`` marks the columns that hold numbers and are aligned to the right; by default none.
     """
     rule = ['---:' if number else '---' for number in numbers or (False,) * len(heads)]
     return [f'| {" | ".join(line)} |' for line in (heads, rule, *rows)]

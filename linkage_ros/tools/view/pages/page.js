@@ -4,7 +4,7 @@
 
 const Page = (() => {
   const NARROW = 640;
-  // Where a letter is typed, it is no command.
+  // Where a letter is typed, it is not a command.
   const TYPED = 'select, textarea, input:not([type=checkbox], [type=range])';
   const dark = matchMedia('(prefers-color-scheme: dark)');
   const paper = matchMedia('print');

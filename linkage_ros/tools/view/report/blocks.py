@@ -11,7 +11,7 @@ The messages of a bag in blocks of some thousands, with the run time of each.
 
 Run time begins at 0 and never goes back. When the recorder's clock jumps back, run time stands
 still and then goes on from there. In a bag of another program, messages on several topics may be
-slightly out of order; that is no jump.
+slightly out of order; that is not a jump.
 """
 
 from __future__ import annotations
@@ -27,6 +27,18 @@ import numpy as np
 _LATEST = 2**62
 """Latest plausible log time, in [ns]; a later one is damage."""
 
+_MOST_MESSAGES = 8192
+_MOST_BYTES = 32 * 2**20
+_FARTHEST = 4
+"""Factor by which a block may grow to keep messages of one log time together."""
+
+Entry = tuple[int, int, int, bytes]
+"""Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
+
+KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'forces', 'health')
+_OTHER_RECORDER = 'health'
+"""Topics recorded by another thread; run time does not follow them."""
+
 
 def times_of(logged: Sequence[int]) -> Times:
     """Return log times as an array; they may be any 64-bit numbers."""
@@ -37,11 +49,7 @@ class RunClock:
     """
     Converts log times to run time.
 
-    Parameters
-    ----------
-    disorder
-        By how much a message may come too late without a jump of the clock, in [ns].
-
+    A message may come too late by ``disorder``, in [ns], without a jump of the clock.
     """
 
     def __init__(self, disorder: int = 0) -> None:
@@ -82,13 +90,8 @@ class RunClock:
         """
         Return the run times of messages that another thread has recorded, in [ns].
 
-        Parameters
-        ----------
-        logged
-            Their log times, in [ns]; they may deviate a little from those of the first thread.
-        behind
-            How many messages of the last call of `run_times` precede each.
-
+        Their log times, in [ns], may deviate a little from the first thread's. ``behind`` is how
+        many messages of the last call of `run_times` precede each.
         """
         since = np.maximum(logged - self._logged[behind], 0)
         next_ones = np.append(self._times[1:], _LATEST)
@@ -100,15 +103,6 @@ class RunClock:
         """Yield time and size of the clock's jumps since the last call, in [ns]."""
         found, self._jumps = self._jumps, []
         yield from found
-
-
-_MOST_MESSAGES = 8192
-_MOST_BYTES = 32 * 2**20
-_FARTHEST = 4
-"""Factor by which a block may grow to keep messages of one log time together."""
-
-Entry = tuple[int, int, int, bytes]
-"""Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
 
 
 class Progress(NamedTuple):
@@ -123,17 +117,9 @@ class Blocks:
     Reads a bag block by block, and counts.
 
     A block ends between two ticks: messages of one log time stay in one block, unless there are
-    more than any tick has.
-
-    Parameters
-    ----------
-    bag
-        The bag. If it is damaged, the part before the damage is read.
-    wanted
-        Topics whose messages are needed; messages of others are only counted.
-    progress
-        Receives the progress, and says whether to stop.
-
+    more than any tick has. Of a damaged bag the part before the damage is read. Messages of topics
+    that are not ``wanted`` are only counted. ``progress`` receives the progress, and says whether
+    to stop.
     """
 
     def __init__(self, bag: Bag, wanted: Collection[str], progress: Progress) -> None:
@@ -198,11 +184,6 @@ class Blocks:
         self._read += sum(sizes) + RECORD_SIZE * len(entries)
 
 
-KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'forces', 'health')
-_OTHER_RECORDER = 'health'
-"""Topics recorded by another thread; run time does not follow them."""
-
-
 class MessageRows(NamedTuple):
     """Messages of one kind in a block, by their numbers; all times are in [ns]."""
 
@@ -222,17 +203,8 @@ def rows_of(
     """
     Return the messages of a block by kind.
 
-    Parameters
-    ----------
-    block
-        The messages of each topic.
-    topics
-        Kind of each topic, one of `KINDS` or a kind of its own; topics without one are left out.
-    own
-        Distinguishes the run's joint states from the samples if they share a topic.
-    clock
-        The clock of the run.
-
+    ``topics`` has the kind of each topic, one of `KINDS` or its own kind; other topics are left
+    out. ``own`` distinguishes the run's joint states from the samples if they share a topic.
     """
     kinds: dict[str, list[Entry]] = {kind: [] for kind in (*topics.values(), *KINDS)}
     kinds[_OTHER_RECORDER] = kinds.pop(_OTHER_RECORDER)  # the last

@@ -62,6 +62,16 @@ _FEWEST, _MOST_TICKS = 32, 4096
 _NONE = 2**62
 """In [ns]: stands for the minimum of no values."""
 
+MOST_LINKAGES = 16
+"""Number of linkages of a run that move in the animation."""
+
+UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
+"""Unit of each quantity, for a revolute and for a prismatic joint."""
+
+NO_ROOM = 'curves for which there is no room'
+
+LATENESS, AGE = CurveColumn('tick', 'lateness', 'ms'), CurveColumn('input', 'age', 'ms')
+
 
 class Lateness:
     """Computes the lateness of ticks as they come, at a rate in [Hz], more than 0."""
@@ -124,7 +134,7 @@ class Lateness:
 
 
 def _least_around(values: Times, window: int) -> tuple[Times, Times]:
-    """Return the minimum of each value and so many before it, and of it and so many after it."""
+    """Return each value's minimum with ``window`` values before it, and after it."""
     size = window + 1
     n = len(values)
     padded = np.full(-(-n // size) * size + size, _NONE)
@@ -137,17 +147,6 @@ def _least_around(values: Times, window: int) -> tuple[Times, Times]:
     before = onward[:n].copy()
     before[window:] = np.minimum(before[window:], back[: max(0, n - window)])
     return before, after
-
-
-MOST_LINKAGES = 16
-"""Kinds of bodies that move in the animation."""
-
-UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
-"""Unit of each quantity, for a revolute and for a prismatic joint."""
-
-NO_ROOM = 'curves for which there is no room'
-
-LATENESS, AGE = CurveColumn('tick', 'lateness', 'ms'), CurveColumn('input', 'age', 'ms')
 
 
 class BoundedCurves:
@@ -236,7 +235,7 @@ class SceneCurves:
         for names, angles in inputs:
             if names[0] in self._places:
                 values[:, [self._places[name] for name in names]] = angles
-        # Published values have priority over those of samples.
+        # Published values have priority over samples.
         positions = numbers[:, 0, : len(self._joints)]
         there = ~np.isnan(positions)
         under = values[:, self._joints]
@@ -341,7 +340,7 @@ class PinForces:
         self.left_out: Counter[str] = Counter()
 
     def add(self, times: Times, messages: Sequence[bytes]) -> None:
-        """Add messages at run times in [ns]; those of one time, of several linkages, are a row."""
+        """Add messages at run times in [ns]; several linkages at one time are a row."""
         good: list[tuple[int, MessageContent]] = []
         for time, message in zip(times.tolist(), messages, strict=True):
             values = self._reader.read(message)

@@ -67,11 +67,18 @@ _FARTHEST = 1e30
 Places = Any
 """Array of complex numbers: positions in [m], or directions."""
 
+_Found = dict[str, tuple[Places, Places]]
+"""For each link the position of its frame, and its direction."""
+
+Plot = dict[str, Any]
+
+_NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
+
 
 class Poses(NamedTuple):
     """Poses of the links."""
 
-    links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are no links
+    links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are not links
     # Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape (instants, links,
     # 3); NaN where it is unknown.
     frames: Numbers
@@ -80,28 +87,14 @@ class Poses(NamedTuple):
     reason: str  # Why the loops were closed instead; '' if recorded joints determine every link
 
 
-_Found = dict[str, tuple[Places, Places]]
-"""For each link the position of its frame, and its direction."""
-
-
 def link_poses(
     closure: Closure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
 ) -> Poses:
     """
     Return the poses of the links.
 
-    Parameters
-    ----------
-    closure
-        The linkage.
-    prefix
-        Prefix of its joints' names in messages.
-    values
-        Joint values by name in messages, in [rad] or [m]; NaN where unknown. All have one length;
-        the inputs are among them.
-    inputs
-        Names of the driven joints in messages.
-
+    ``values`` are joint values, in [rad] or [m], by names in messages, which begin with the
+    prefix; NaN where unknown. All have one length; the inputs are among them.
     """
     known = {
         name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()
@@ -201,9 +194,6 @@ def _loop_gaps(closure: Closure, found: _Found, count: int) -> Numbers:
     return worst
 
 
-Plot = dict[str, Any]
-
-
 def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
     """Return the data of a page, as JSON holds them; wrapped angles jump from π to −π."""
     since = max(0, run.window.since)
@@ -236,7 +226,7 @@ def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
     shown = dict(run.event_tracks)
     silent = [each.silent for each in run.linkages]
     if silent:
-        # Each linkage has its own silences; one lane shows those of all.
+        # Each linkage has its own silences; one lane shows all.
         merged = EventTrack(APART)
         spans = [
             (s.begin, s.end, each.name, s.count)
@@ -248,9 +238,6 @@ def event_tracks(run: ReportedRun) -> dict[str, EventTrack]:
         merged.count = sum(lane.count for lane in silent)
         shown['silent'] = merged
     return {key: shown[key] for key in EVENT_TRACKS if key in shown and shown[key].count}
-
-
-_NOT_PLOTTED_IF_ZERO = ('rate', 'effort', 'force')
 
 
 def time_plots(run: ReportedRun) -> list[Plot]:

@@ -54,6 +54,13 @@ TABLE_BYTES = 600_000
 _FEWEST_INTERVALS = 256
 """Minimum number of intervals of a useful curve."""
 
+_PER_DECADE = 10
+_FIRST, _LAST = 2, 12
+"""Powers of ten, in [ns], of the first and last bin edge."""
+
+EDGES = [10 ** (_FIRST + i / _PER_DECADE) for i in range(_PER_DECADE * (_LAST - _FIRST) + 1)]
+"""Edges of the bins, in [ns]; one more bin lies below the first and one above the last."""
+
 
 class Intervals(NamedTuple):
     """Curves as intervals."""
@@ -74,7 +81,7 @@ def most_columns(space: int) -> int:
 
 
 def interval_capacity(columns: int, space: int) -> int:
-    """Return the number of intervals of so many curves for a size limit, in [bytes]."""
+    """Return the number of intervals of each curve for a size limit, in [bytes]."""
     # Per interval two times, and per curve two values, of 8 bytes each.
     most = space // (16 * columns + 16)
     return 1 << (most.bit_length() - 1)
@@ -230,14 +237,6 @@ class Decimation:
         self._values[:half] = self._values[0:n:2]
         self._count = half
         self.step *= 2
-
-
-_PER_DECADE = 10
-_FIRST, _LAST = 2, 12
-"""Powers of ten, in [ns], of the first and last bin edge."""
-
-EDGES = [10 ** (_FIRST + i / _PER_DECADE) for i in range(_PER_DECADE * (_LAST - _FIRST) + 1)]
-"""Edges of the bins, in [ns]; one more bin lies below the first and one above the last."""
 
 
 class Histogram:

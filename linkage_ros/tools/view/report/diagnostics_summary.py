@@ -33,6 +33,23 @@ DIAGNOSTIC_ARRAY = parse_declaration(
 _MOST_ITEMS = 10_000
 """Maximum number of statuses of a message, and of values of a status; more means damage."""
 
+_LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}
+_TASKS = ('tick', 'crank', 'loop closure', 'recording', 'faults')
+
+_COUNTED = {
+    'Lost ticks': ('lost', ''),
+    'Ticks open': ('told_open', 'open'),
+    'Ticks indeterminate': ('told_open', 'indeterminate'),
+    'Ticks at a toggle': ('told_toggle', ''),
+    'Ticks beyond limits': ('told_limited', ''),
+}
+"""Counters that only grow, with the lane and the text of their events."""
+
+_DROPPED = 'Dropped: '
+
+MOST_VALUES = 500
+"""Maximum number of values kept; our node reports some sixty."""
+
 
 class DiagnosticStatus(NamedTuple):
     """The status of one task, with texts by key; level 0 is OK, 1 WARN, 2 ERROR, 3 STALE."""
@@ -67,36 +84,12 @@ def _decode_text(text: bytes) -> str:
     return text.decode('utf-8', 'backslashreplace')
 
 
-_LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}
-_TASKS = ('tick', 'crank', 'loop closure', 'recording', 'faults')
-
-_COUNTED = {
-    'Lost ticks': ('lost', ''),
-    'Ticks open': ('told_open', 'open'),
-    'Ticks indeterminate': ('told_open', 'indeterminate'),
-    'Ticks at a toggle': ('told_toggle', ''),
-    'Ticks beyond limits': ('told_limited', ''),
-}
-"""Counters that only grow, with the lane and the text of their events."""
-
-_DROPPED = 'Dropped: '
-
-MOST_VALUES = 500
-"""Maximum number of values kept; our node reports some sixty."""
-
-
 class RecordedDiagnostics:
     """
-    Collects the diagnostics.
+    Collects the diagnostics, and the tracks of their events by kind.
 
-    Parameters
-    ----------
-    event_tracks
-        Lanes of the events, by kind: lost, told_open, told_toggle, told_limited, dropped and
-        health.
-    from_beginning
-        Whether the bag holds the beginning of the run; if not, counters do not start at 0.
-
+    The kinds are lost, told_open, told_toggle, told_limited, dropped and health. Counters start at
+    0 if the bag holds the beginning of the run.
     """
 
     def __init__(

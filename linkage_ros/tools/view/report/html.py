@@ -48,6 +48,28 @@ _LONGEST = 200
 _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 """Upper bound of the HTML around each cell, in [bytes]."""
 
+_HERE = 'linkage_ros.tools.view.report'
+_STYLES = [(_HERE, 'report.css')]
+_SCRIPTS = [
+    *(
+        ('linkage_ros.tools.view.pages', f'{name}.js')
+        for name in ('angles', 'curves', 'looks', 'picture')
+    ),
+    *((_HERE, f'{name}.js') for name in ('over_time', 'over_others', 'plots', 'report')),
+]
+
+_LONGEST_FACT = 400
+"""Maximum number of characters of a fact or a warning."""
+
+_SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
+
+_ANGLE_CONTROLS = (
+    '<div class="controls"><label>angles in <select id="unit"><option value="rad">radians</option>'
+    '<option value="degrees">degrees</option></select></label> <label>that are <select id="range">'
+    '<option value="continuous">continuous</option>'
+    '<option value="wrapped">within ± half a turn</option></select></label></div>'
+)
+
 
 class TableOf(NamedTuple):
     """A table, which may be collapsed at first; a leading ``>`` marks a column of numbers."""
@@ -141,22 +163,6 @@ def _curve_ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
         least = np.nanmin(np.fmin(found.first[:, index], found.second[:, index]))
         greatest = np.nanmax(np.fmax(found.first[:, index], found.second[:, index]))
         yield name, quantity, f'{least:.9g}', f'{greatest:.9g}', unit, curves.title
-
-
-_HERE = 'linkage_ros.tools.view.report'
-_STYLES = [(_HERE, 'report.css')]
-_SCRIPTS = [
-    *(
-        ('linkage_ros.tools.view.pages', f'{name}.js')
-        for name in ('angles', 'curves', 'looks', 'picture')
-    ),
-    *((_HERE, f'{name}.js') for name in ('over_time', 'over_others', 'plots', 'report')),
-]
-
-_LONGEST_FACT = 400
-"""Maximum number of characters of a fact or a warning."""
-
-_SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
 
 class ReportHeader(NamedTuple):
@@ -263,14 +269,6 @@ def _events_html(run: ReportedRun) -> Iterator[str]:
     if missing:
         yield f'<p class="note">None of these: {escape("; ".join(missing))}.</p>'
     yield '</section>'
-
-
-_ANGLE_CONTROLS = (
-    '<div class="controls"><label>angles in <select id="unit"><option value="rad">radians</option>'
-    '<option value="degrees">degrees</option></select></label> <label>that are <select id="range">'
-    '<option value="continuous">continuous</option>'
-    '<option value="wrapped">within ± half a turn</option></select></label></div>'
-)
 
 
 def _plots_html(run: ReportedRun) -> Iterator[str]:

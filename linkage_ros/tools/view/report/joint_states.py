@@ -31,7 +31,7 @@ _MOST_LAYOUTS = 64
 """Maximum number of layouts per message length in a block; a publisher has a handful."""
 
 MOST_JOINTS = 64
-"""Maximum number of joints of a topic; more is no machine that a page could show."""
+"""Maximum number of joints of a topic; a page could not show more."""
 
 NOTHING = 'no joints or no numbers'
 TWICE = 'a joint named twice'
@@ -53,13 +53,8 @@ class JointStates:
     """
     Decodes the messages of a topic.
 
-    Parameters
-    ----------
-    joints
-        Joints that come first; others follow in the order of their appearance.
-    others
-        Whether other joints may follow; if not, they are ignored.
-
+    The given joints come first. With ``others``, other joints follow in the order of their
+    appearance; else they are ignored.
     """
 
     def __init__(self, joints: Sequence[str] = (), *, others: bool = True) -> None:

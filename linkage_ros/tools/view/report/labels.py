@@ -31,7 +31,7 @@ EVENT_TRACKS = {
     'dropped': ('messages dropped', 'by the recorder, as the diagnostics count, once a period'),
     'reset': ('reset', 'all was forgotten before the tick that follows'),
     'jump': ('clock jumped back', 'the time of this page goes on from there'),
-    'health': ('warnings, errors', 'of the diagnostics, by the period that they tell of'),
+    'health': ('warnings, errors', 'of the diagnostics, by the period that they cover'),
 }
 """Title and description of each lane, in the order of the page."""
 
@@ -67,13 +67,13 @@ POSE_NOTE = (
     'share. Where no joint state was recorded there is no pose.'
 )
 CLOSED_NOTE = (
-    'The published joints do not tell where every link stands ({why}); the loops are closed at '
-    'the recorded inputs.'
+    'The published joints do not determine where every link stands ({why}); the loops are closed '
+    'at the recorded inputs.'
 )
 
 
 def shorten_text(text: str, most: int = LONGEST_NAME) -> str:
-    """Return a text of at most so many characters."""
+    """Return a text of at most ``most`` characters."""
     return text if len(text) <= most else f'{text[: most - 1]}…'
 
 

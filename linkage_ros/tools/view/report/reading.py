@@ -72,6 +72,15 @@ _DISORDER = 1_000_000_000
 _MORE_TOPICS = f'topics of joint states beyond the first {_MOST_TOPICS}'
 _LATER_JOINTS = 'messages with joints that turn up later'
 
+_TOGETHER = 20_000_000
+"""Events of a kind that are closer than this form one span, in [ns]."""
+
+_ALIKE = ('open', 'toggle')
+_MOST_SILENCES = 400
+_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
+
+_NEVER = 2**62
+
 
 class ForeignRun:
     """Reads the window of a bag without a scene, block by block."""
@@ -164,28 +173,12 @@ def read_run(
     scene_of: Callable[[Bag], Scene] = recorded_scene,
 ) -> tuple[ReportedRun, Scene | None, str]:
     """
-    Read a bag for its page.
+    Return the contents of a bag for its page, its scene, and why the scene is missing.
 
-    Parameters
-    ----------
-    bag
-        The bag. If it is damaged, the part before the damage is shown.
-    window
-        The part of the run to show.
-    progress
-        Called with the progress; returns whether to stop.
-    scene_of
-        Returns the scene that a bag carries.
-
-    Returns
-    -------
-    run
-        Its contents.
-    scene
-        Its scene, if it carries one.
-    missing
-        Why the scene is missing, or cannot be built here; '' if it is complete.
-
+    Of a damaged bag the part before the damage is shown. ``progress`` is called with the progress
+    and returns whether to stop; ``scene_of`` returns the scene that a bag carries. The scene is
+    None if the bag carries none; the reason is '' if the scene is complete, else it may also be
+    that the scene cannot be built here.
     """
     scene, missing = None, ''
     reader: SceneRun | ForeignRun
@@ -217,14 +210,6 @@ def _find_open_loop_spans(
             position = linkage.closure.position(*given)
             text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
         track.add(time, time, f'{linkage.name} {text}'.strip())
-
-
-_TOGETHER = 20_000_000
-"""Events of a kind that are closer than this form one span, in [ns]."""
-
-_ALIKE = ('open', 'toggle')
-_MOST_SILENCES = 400
-_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
 
 
 class SceneRun:
@@ -316,7 +301,7 @@ class SceneRun:
         self._examine_states(states, read)
         self._forces.add(rows['forces'].passed, rows['forces'].data)
         for topic, kind in self._loaded.items():
-            if kind in rows:  # unless its name is that of another topic of the run
+            if kind in rows:  # unless another topic of the run has its name
                 self._loads.add(topic, rows[kind].passed, rows[kind].data)
         self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
         for time, message in zip(health.passed.tolist(), health.data, strict=True):
@@ -428,6 +413,3 @@ class SceneRun:
         """Return which joint states contain a linkage."""
         present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
         return present
-
-
-_NEVER = 2**62

@@ -87,7 +87,7 @@ const Report = (() => {
   }
 
   function run(now) {
-    // A picture has the time at which it was begun, which may be before that of the click.
+    // A picture has the time at which it was begun, which may be before the time of the click.
     const passed = Math.max(0, now - last) / 1000;
     state.time = Math.min(state.time + passed * state.speed, whole[1]);
     last = Math.max(now, last);

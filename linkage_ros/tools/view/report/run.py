@@ -37,6 +37,14 @@ APART = -1
 _LONGEST_TEXT = 120
 _MORE = ', and others'
 
+_SILENCE_FACTOR = 5
+"""A gap of this many usual periods is a silence."""
+
+_SHORTEST_SILENCE = 2_000_000
+"""Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
+
+_MESSAGES_FOR_A_USUAL = 8
+
 
 @dataclass(slots=True)
 class EventSpan:
@@ -50,21 +58,11 @@ class EventSpan:
 
 class EventTrack:
     """
-    Events of one kind.
+    Events of one kind, within a window, in [ns]; events outside are ignored.
 
-    Parameters
-    ----------
-    near
-        Events closer than this form one span, in [ns].
-    alike
-        Whether events with different texts join, too; the first text is kept.
-    longest
-        Whether the longest spans are kept if there are too many; if not, spans are merged.
-    most
-        Maximum number of spans.
-    window
-        Begin and end, in [ns]; events outside are ignored.
-
+    Events closer than ``near``, in [ns], form one span. With ``alike``, events with different
+    texts join, too; the first text is kept. Of more than ``most`` spans the ``longest`` are kept,
+    or spans are merged.
     """
 
     def __init__(
@@ -135,28 +133,12 @@ def _extend_span(last: EventSpan, end: int, count: int) -> None:
     last.count += count
 
 
-_SILENCE_FACTOR = 5
-"""A gap of so many usual periods is a silence."""
-
-_SHORTEST_SILENCE = 2_000_000
-"""Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
-
-_MESSAGES_FOR_A_USUAL = 8
-
-
 class Silences:
     """
-    Finds silences, block by block.
+    Finds silences, block by block, and adds them to a track.
 
-    Parameters
-    ----------
-    track
-        The lane that receives them.
-    period
-        Period of the messages, in [ns]; 0 if unknown.
-    limit
-        Shortest silence, in [ns]; 0 for a multiple of the usual period.
-
+    ``period`` is the period of the messages, in [ns], or 0 if unknown; ``limit`` is the shortest
+    silence, in [ns], or 0 for a multiple of the usual period.
     """
 
     def __init__(self, track: EventTrack, period: int, limit: int = 0) -> None:
@@ -240,7 +222,7 @@ class LinkageRun(NamedTuple):
 class Frames(NamedTuple):
     """Instants of a run at which all joints are known, for the animation."""
 
-    step: int  # One joint state of so many is kept
+    step: int  # One in this many joint states is kept
     times: Times  # Run times, in [ns]
     # Joint values by name in messages, in [rad] or [m]; NaN if missing.
     values: Mapping[str, Numbers]

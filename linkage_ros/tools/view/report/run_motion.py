@@ -26,20 +26,9 @@ def find_run_motion(run: ReportedRun, name: str, seconds: float | None) -> Anima
     """
     Return the motion of the first linkage of a run.
 
-    Parameters
-    ----------
-    run
-        The run, and the part of it to show.
-    name
-        Its name.
-    seconds
-        How long the picture is to last; without it as long as the part, at most 10 s.
-
-    Raises
-    ------
-    LinkageError
-        If the run has no joint states to show, or the time is too short or too long.
-
+    ``seconds`` is the duration of the picture; None for the duration of the part, at most 10 s. A
+    LinkageError is raised if the run has no joint states to show, or the time is too short or too
+    long.
     """
     if not run.linkages or run.frames is None:
         raise LinkageError(name, 'has no scene to animate', 'name a bag of a linkage_node')

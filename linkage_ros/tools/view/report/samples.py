@@ -10,7 +10,7 @@
 Crank samples of a run: the accepted ones, the rejected ones with reasons, and the crank angle.
 
 Each sample is offered to the scene's own pipeline, as in the run, so that it is rejected for the
-same reason. The crank angle is that of the last accepted sample, extrapolated by its rate.
+same reason. The crank angle is the last accepted sample's, extrapolated by its rate.
 """
 
 from __future__ import annotations
@@ -36,13 +36,8 @@ class CrankHistory:
     """
     Driven joints of a linkage, by the last accepted sample.
 
-    Parameters
-    ----------
-    linkage
-        The pipeline of the linkage, driven from a topic.
-    columns
-        Columns of the joints that its samples name, among those of all samples.
-
+    A topic drives the linkage; ``columns`` are the columns of the joints that its samples name,
+    among the columns of all samples.
     """
 
     def __init__(self, linkage: LinkagePipeline, columns: Sequence[int]) -> None:
