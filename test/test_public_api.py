@@ -154,13 +154,13 @@ def test_what_has_no_pose_has_no_picture():
 # What is no input and no rate: test/kinematics/test_wrong_inputs.py.
 ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: lr.laod, AttributeError, "module 'linkage_ros' has no attribute 'laod'"),
-    (lambda: lr.load('jansen'), lr.FileError, 'jansen: is neither a file nor a name'),
+    (lambda: lr.load('jansen'), lr.FileError, 'jansen: is neither a file nor the name'),
     (lambda: lr.load('jansen'), lr.FileError, "did you mean 'jansen_leg'?"),
     (lambda: lr.load('demo'), lr.FileError, 'demo: is a shipped scene, not a linkage; name a'),
     (lambda: lr.load('x'), lr.FileError, 'or one of andrews_squeezer, class_3, '),
     (lambda: lr.load('hoeken.yaml'), lr.FileError, "is not a file; did you mean 'hoeken'?"),
     (lambda: lr.load('none.yaml'), lr.FileError, 'none.yaml: cannot be read'),
-    (lambda: lr.load(''), lr.FileError, "'': is neither a file nor a name"),
+    (lambda: lr.load(''), lr.FileError, "'': is neither a file nor the name"),
     (lambda: lr.load(3), TypeError, '3 is neither a path nor a name; name a file, or one of a'),
     (lambda: lr.load(SCENE), lr.FileError, 'demo.yaml: is a scene; name its linkage, '),
     (lambda: lr.Pipeline('demo'), TypeError, "scene: 'demo' is not a Scene; load_scene() reads"),

@@ -249,7 +249,7 @@ def test_the_suffix_says_the_format(tmp_path: Path, name: str, begin: str) -> No
 def test_a_format_beside_a_file_is_refused(tmp_path: Path) -> None:
     answer = linkage(tmp_path, 'solve', 'four_bar', '--format', 'json', '-o', 'x.csv')
     assert answer.returncode == 2
-    assert '--format json: is for what is printed' in answer.stderr
+    assert '--format json: is for a printed result' in answer.stderr
 
 
 # Keys that are set.

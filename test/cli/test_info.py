@@ -281,7 +281,7 @@ def test_of_a_foreign_bag_the_rest_is_told(
     assert account['scene'] is None
     assert 'carries no run.json, scene.yaml' in account['scene_missing']
     assert answer(info, foreign) == 0
-    assert 'carries no run.json, scene.yaml; so neither residual' in capsys.readouterr().out
+    assert 'carries no run.json, scene.yaml; residual and nearness' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

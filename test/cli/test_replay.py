@@ -399,7 +399,7 @@ def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
     assert 1000 < account['topics'][0]['same'] < 12_000
     assert err == (
         f'linkage replay: {part}: unfinished: its recording was killed, or still runs, or goes on '
-        'in another file; what it holds was replayed\n'
+        'in another file; its content was replayed\n'
     )
 
 

@@ -142,7 +142,7 @@ BAD_SAID = [
     ":11: faults.f: the key 'seconds' is missing; add seconds",
     ":11: faults.f.at[2]: 'x' is not a number; write a number, at least 0",
     ':13: loads.gravity: [0] is too short; write 2 of them (gravity: [x, y] [m/s²])',
-    ":14: record.name: 'a/b' does not fit; write a text on one line (name of the bag's folder;",
+    ":14: record.name: 'a/b' does not fit; write a string on one line (name of the bag's folder;",
 ]
 
 
@@ -191,7 +191,7 @@ WRONG = [
         'linkage: l.yaml\nfaults: {a-b: {freeze: {}, silence: {}}}\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
         [
-            "s.yaml:2: faults: 'a-b' does not fit; write a text on one line (a name: letters",
+            "s.yaml:2: faults: 'a-b' does not fit; write a string on one line (a name: letters",
             's.yaml:2: faults.a-b: names 2 kinds of fault; leave all but one of',
         ],
     ),

@@ -138,7 +138,7 @@ def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
 
 WRITTEN_WRONGLY = {
     'links:\n\tground: {O: [0, 0]}\n': (2, 'has a tab; write spaces instead of tabs'),
-    'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is indented otherwise'),
+    'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is not indented like'),
     'links: {ground: {O: [0, 0]\njoints: {}\n': (2, ''),
     'links:\n  ground: {O: [0, 0}\n': (2, 'has a [ that does not end'),
     'links\n  ground: {}\n': (2, 'has a misplaced colon'),

@@ -155,7 +155,7 @@ def test_every_command_is_in_its_reference(pages):
     [
         ('reference/commands.html', '--min-transmission ANGLE'),
         ('reference/commands.html', '--set KEY=VALUE'),
-        ('reference/commands.html', 'one line names it, the place and the remedy'),
+        ('reference/commands.html', 'one line names place, reason and remedy'),
         ('reference/commands.html', 'linkage gallery worn_press -o my_press.yaml'),
         ('reference/commands.html', '--schema scene|linkage'),
         ('reference/commands.html', 'at this rate [Hz]; without a number 40'),

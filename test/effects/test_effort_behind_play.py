@@ -240,7 +240,7 @@ def test_torque_with_backlash_is_refused_in_one_line():
         with pytest.raises(FileError) as refused:
             scene_of(f'drive: {{torque: {{}}}}\neffects: {effects}', PENDULUM)
         assert str(refused.value) == (
-            'here: scene.yaml:3: effects.backlash: is a play without masses, and torque moves '
+            'here: scene.yaml:3: effects.backlash: is play without masses, and torque moves '
             'masses; write drive.torque.play: {width: …, inertia: …} instead'
         )
 
@@ -259,5 +259,5 @@ def test_of_several_linkages_that_with_torque_may_have_none():
 
     turning = 'drive: {constant_rate: {rate: 1}}'
     assert len(scene(turning, 'drive: {torque: {}}, effects: {}').linkages) == 2
-    with pytest.raises(FileError, match=r'effects\.backlash: is a play without'):
+    with pytest.raises(FileError, match=r'effects\.backlash: is play without'):
         scene(turning, 'drive: {torque: {}}')

@@ -399,7 +399,7 @@ def test_a_run_that_ends_waits_for_its_snapshot_and_answers(tmp_path, write_scen
     assert ask().startswith('nothing is in memory yet')
     loop.recorder.offer(0, 1, 1, b'\0\1\0\0')
     assert ask() == ''
-    assert ask().startswith('a snapshot is being written; ask again')
+    assert ask().startswith('a snapshot is being written; call again')
     recording.collect_snapshot()
     assert answers == []
     Timer(0.2, slow_disk.set).start()

@@ -662,7 +662,7 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
     ('arguments', 'line'),
     [
         (['none.yaml'], 'none.yaml: cannot be read (No such file or directory); '),
-        (['jansen_legs'], 'jansen_legs: is neither a file nor a name of what comes with '),
+        (['jansen_legs'], 'jansen_legs: is neither a file nor the name of a shipped '),
         (['bad.yaml'], 'bad.yaml:1: links: 1 is not a mapping; '),
         ([], 'FILE: is missing; name a linkage, a scene or a bag, or --node'),
         (['four_bar', '--port', '70000'], '--port 70000: is not a port; name one below 65536'),
