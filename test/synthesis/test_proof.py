@@ -276,7 +276,7 @@ def test_a_word_stands_for_kinds_of_four_bars(word, name):
         assert unmet_needs(found, needs) == ()
         assert needs_penalty(found, needs) == 0.0
     else:
-        assert unmet_needs(found, needs) == (f'a {found.kind.name}, no {word}',)
+        assert unmet_needs(found, needs) == (f'a {found.kind.name}, not {word}',)
         assert needs_penalty(found, needs) == 1.0
 
 
@@ -337,7 +337,7 @@ def test_a_defect_is_farther_than_any_number():
 def test_links_that_never_close_are_of_no_kind():
     found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (DesignRequest(1.0, 2.0),)))
     for word in WORDS:
-        assert unmet_needs(found, Needs(word)) == (f'a {found.kind.name}, no {word}',)
+        assert unmet_needs(found, Needs(word)) == (f'a {found.kind.name}, not {word}',)
 
 
 def test_many_at_once_are_as_far_as_each_alone():

@@ -335,8 +335,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     except LinkageError as error:
         if arguments.angles.in_degrees:
             raise
-        parts = map(arguments.angles.convert_text, (error.where, error.reason, error.remedy))
-        raise LinkageError(*parts) from None
+        told = arguments.angles.convert_text
+        raise LinkageError(told(error.where), told(error.reason), told(error.remedy)) from None
 
 
 def _run_design(arguments: argparse.Namespace) -> int:
@@ -410,8 +410,8 @@ def _write_solution(arguments: argparse.Namespace, shown: Sequence[DesignAnswer]
     first = answer.design.wanted[0].crank
     command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
     defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
-    convert = arguments.angles.convert_text
-    lines = [convert(f'Designed: {answer.title}'), command, *map(convert, defects)]
+    told = arguments.angles.convert_text
+    lines = [told(f'Designed: {answer.title}'), command, *map(told, defects)]
     write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
     names = ' and '.join(one.name for one in answer.assessment.defects)
     print(f'{arguments.output}  ({names} defect: see above)' if names else arguments.output)
