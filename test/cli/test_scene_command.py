@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import fields
-from importlib import import_module
 from importlib.util import find_spec
 import json
 from math import inf
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli import REGISTRIES, scene as command, table_of, table_text
+from linkage_ros.cli import parameters_of, REGISTRIES, scene as command, table_of, table_text
 from linkage_ros.description import as_text
 from linkage_ros.errors import FileError, LinkageError
 from linkage_ros.messages import JOINT_STATE_TYPE
@@ -291,8 +290,7 @@ def test_every_parameter_has_a_unit_or_values_and_a_meaning():
         for name in registry:
             table = table_of(what, name)
             assert table_text(table).startswith(f'{what} {name}: ')
-            module = import_module(registry[name])
-            declared = [field.name for field in fields(module.PARAMETERS)]
+            declared = [field.name for field in fields(parameters_of(what, name))]
             rows = table.rows if declared else []
             # A parameter of parameters, as `motor`, has its own rows after it, with a dot.
             assert [row[0] for row in rows if '.' not in row[0]] == declared

@@ -61,7 +61,7 @@ def told(counts):
 
 def test_one_slow_tick_is_named_and_the_rate_holds_otherwise(run):
     counts = run([0] * 50 + [54] + [0] * 50)
-    assert counts.stall == Stall(52 * MS, in_tick=True)
+    assert counts.last_stall == Stall(52 * MS, in_tick=True)
     assert told(counts) == [
         '26 ticks lost at once: a tick took 0.052 s; the rate is kept otherwise'
     ]
@@ -69,7 +69,7 @@ def test_one_slow_tick_is_named_and_the_rate_holds_otherwise(run):
 
 def test_one_late_wake_up_is_that_of_the_operating_system(run):
     counts = run([0] * 100, oversleep=[0] * 50 + [40])
-    assert counts.stall == Stall(40 * MS, in_tick=False)
+    assert counts.last_stall == Stall(40 * MS, in_tick=False)
     assert told(counts) == [
         (
             '20 ticks lost at once: the operating system woke the node 0.040 s late; '
