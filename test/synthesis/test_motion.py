@@ -125,7 +125,7 @@ def test_pivots_are_right_to_what_rounding_the_poses_makes_of_them(find, fixed, 
         error = float(abs(mpc(complex(found.pivots[index])) - wanted))
         assert error <= UNIT_ROUNDOFF * found.sensitivity[index]
         length = float(abs(wanted - places_of(*there, fixed=fixed)[0]))
-        assert error <= 1.01 * 10.0 ** -found.digits[index] * length
+        assert error <= 1.01 * 10.0 ** -found.reliable_digits[index] * length
         assert found.lengths[index] == pytest.approx(length, rel=1e-9 + error / length)
 
 
