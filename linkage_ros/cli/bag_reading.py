@@ -100,7 +100,7 @@ def scene_of(bag: Bag, *, trust_effects: bool, settings: Sequence[str] = ()) -> 
 
     for name in scene.not_imported:
         where = found_in(name)
-        line = f'linkage: {bag.path} is trusted: imports {name} from {where}'
+        line = f'linkage: {bag.path} is trusted: imports {name}, and the name leads to {where}'
         print(escape_unprintable(line), file=sys.stderr, flush=True)
     return recorded_scene(bag, trust_effects=True, settings=settings)
 

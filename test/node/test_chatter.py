@@ -34,14 +34,14 @@ def loop_of(scene=SCENE):
 
 def run(loop, begin, end):
     """Tick a loop from one [ms] to another under 5 N·m."""
-    (line,) = loop.pipeline.lines
+    (linkage,) = loop.pipeline.linkages
     for time_ms in range(begin, end, 10):
-        assert line.drive.offer(EffortCommand(0, 5.0), BEGIN + time_ms * 1_000_000) is None
+        assert linkage.drive.offer(EffortCommand(0, 5.0), BEGIN + time_ms * 1_000_000) is None
         loop.tick_at(BEGIN + time_ms * 1_000_000)
 
 
 def summary(loop, before):
-    now = CountsSnapshot.take(loop.counts, BEGIN + NS, chatter_count(loop.pipeline.lines))
+    now = CountsSnapshot.take(loop.counts, BEGIN + NS, chatter_count(loop.pipeline.linkages))
     return now, DiagnosticsSummary(
         'node', 's', 0.0, BEGIN, '', (), loop, before, now, '',
         {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
