@@ -7,15 +7,14 @@
 # language governing permissions and limitations under the License.
 
 """
-Generate the usual tick of a linkage as one straight function of Python text.
+Generate the usual tick of a linkage as the text of one Python function.
 
 In the usual tick there is a crank state, every loop closes, the linkage and its forces follow the
-compiled path, and no published angle wraps. Every other tick, the first among them, is left to the
-plain tick. Both give the same bits.
+compiled path, and no published angle wraps. Every other tick, the first among them, is interpreted
+step by step. Both give the same bits.
 
 A tick comes once a millisecond, to a processor whose caches hold other data. Its cost is then the
-memory that it touches: frames, objects, functions. A straight function of local variables touches
-least.
+memory that it touches: frames, objects, functions. One function of local variables touches least.
 """
 
 from __future__ import annotations

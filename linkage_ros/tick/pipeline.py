@@ -108,8 +108,8 @@ class Tick(NamedTuple):
     def full_states(self) -> tuple[LinkageState, ...]:
         """State of each linkage in full; computes here what the message did not need."""
         return tuple(
-            linkage.complete_state(seen)
-            for linkage, seen in zip(self.linkages, self.states, strict=True)
+            linkage.complete_state(state)
+            for linkage, state in zip(self.linkages, self.states, strict=True)
         )
 
 
@@ -409,11 +409,11 @@ class LinkagePipeline:
                 reading = sensor.gap(now)
         return reading
 
-    def complete_state(self, seen: LinkageState | CompiledState | StateTuple) -> LinkageState:
+    def complete_state(self, state: LinkageState | CompiledState | StateTuple) -> LinkageState:
         """Return the full state of a linkage; the generated tick leaves a part out."""
-        if isinstance(seen, LinkageState):
-            return seen
-        crank_numbers, numbers, _ = seen
+        if isinstance(state, LinkageState):
+            return state
+        crank_numbers, numbers, _ = state
         crank = _crank_state(crank_numbers)
         position = self._solve_loops(*crank.angles)
         reading = None if numbers is None else SensorReading(*numbers)
@@ -424,16 +424,18 @@ class LinkagePipeline:
         return [self._write_extra(extra, now, state) for extra in self.extras]
 
     def _write_extra(
-        self, extra: AuxiliaryOutput, now: int, seen: LinkageState | CompiledState
+        self, extra: AuxiliaryOutput, now: int, state: LinkageState | CompiledState
     ) -> bytes:
         writer = extra.writer
         if writer.due is not None and not writer.due(now):
             return b''
-        reading = seen.reading
-        forces = seen if extra.effect in _FORCES_ONLY and isinstance(seen, CompiledState) else None
+        reading = state.reading
+        forces = (
+            state if extra.effect in _FORCES_ONLY and isinstance(state, CompiledState) else None
+        )
         if writer.of_reading or forces is not None:
             return b'' if reading is None else writer.write(now, forces, reading)
-        _, position, motion, _ = self.complete_state(seen)
+        _, position, motion, _ = self.complete_state(state)
         if motion is not None:
             return b'' if reading is None else writer.write(now, motion, reading)
         if position is None or writer.no_pose is None:
@@ -619,10 +621,10 @@ class Pipeline:
         self._offer_count += 1
         rejections = []
         self.addressed_linkages = self._router.find_receivers(message)
-        for line in self.addressed_linkages:
-            rejections.append(line.offer(message, now))
+        for linkage in self.addressed_linkages:
+            rejections.append(linkage.offer(message, now))
             if rejections[-1] is None:
-                self._newest_offers[line] = self._offer_count
+                self._newest_offers[linkage] = self._offer_count
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
     def count_fresh_and_stale(self, now: int) -> tuple[int, int]:
@@ -633,37 +635,40 @@ class Pipeline:
         """
         if len(self.linkages) == 1:
             return (0, 1) if self.linkages[0].is_stale(now) else (1, 0)
-        fresh = {number for line, number in self._newest_offers.items() if not line.is_stale(now)}
+        newest = self._newest_offers.items()
+        fresh = {offer for linkage, offer in newest if not linkage.is_stale(now)}
         stale = {*self._newest_offers.values()} - fresh
         self._newest_offers.clear()
         return len(fresh), len(stale)
 
-    def _make_tick(self, now: int, seen: Sequence[LinkageState | CompiledState]) -> Tick:
+    def _make_tick(self, now: int, states: Sequence[LinkageState | CompiledState]) -> Tick:
         """Return the result of a tick; joints without a reading are left out."""
         extras: tuple[bytes, ...] = ()
         if self.extras:
-            pairs = zip(self.linkages, seen, strict=True)
-            extras = tuple([extra for line, one in pairs for extra in line.write_extras(now, one)])
-        readings = [one.reading for one in seen if one.reading is not None]
+            pairs = zip(self.linkages, states, strict=True)
+            extras = tuple(
+                [extra for linkage, state in pairs for extra in linkage.write_extras(now, state)]
+            )
+        readings = [state.reading for state in states if state.reading is not None]
         if not readings:
-            return Tick(b'', extras if any(extras) else (), seen, self.linkages)
-        present = tuple([one.reading is not None for one in seen])
+            return Tick(b'', extras if any(extras) else (), states, self.linkages)
+        present = tuple([state.reading is not None for state in states])
         writer = self._writers.get(present) or self._make_writer(present)
         stamp = max([reading.stamp for reading in readings])
-        return Tick(writer.write(stamp, *_join_readings(readings)), extras, seen, self.linkages)
+        return Tick(writer.write(stamp, *_join_readings(readings)), extras, states, self.linkages)
 
     def _build_tick(self) -> Callable[[int], Tick]:
         """Return the tick as a function of the time, in [ns]; generated text if possible."""
-        wholes = [whole for linkage in self.linkages if (whole := linkage.whole_tick) is not None]
+        compiled = [tick for linkage in self.linkages if (tick := linkage.whole_tick) is not None]
         several = len(self.linkages) > 1
-        if len(wholes) < len(self.linkages) or (several and self.extras):
-            see = [linkage.compute_state for linkage in self.linkages]
-            return lambda now: self._make_tick(now, [look(now) for look in see])
+        if len(compiled) < len(self.linkages) or (several and self.extras):
+            computes = [linkage.compute_state for linkage in self.linkages]
+            return lambda now: self._make_tick(now, [compute(now) for compute in computes])
         if several:
-            return self._combine_ticks(wholes)
-        (linkage,), (whole,) = self.linkages, wholes
+            return self._combine_ticks(compiled)
+        (linkage,), (compiled_tick,) = self.linkages, compiled
         return compile_scene_tick(
-            whole,
+            compiled_tick,
             self._make_writer((True,)),
             [extra.writer for extra in self.extras],
             Tick,
@@ -673,35 +678,35 @@ class Pipeline:
 
     def _combine_ticks(self, compiled_ticks: Sequence[CompiledTick]) -> Callable[[int], Tick]:
         """Return the tick of several linkages that all have generated ticks."""
-        lines = self.linkages
-        shares = [
-            compile_contribution(one, line.interpret_from_crank)
-            for one, line in zip(compiled_ticks, lines, strict=True)
+        linkages = self.linkages
+        contributions = [
+            compile_contribution(compiled, linkage.interpret_from_crank)
+            for compiled, linkage in zip(compiled_ticks, linkages, strict=True)
         ]
-        write = self._make_writer((True,) * len(lines)).write
-        count = sum(len(whole.joints) for whole in compiled_ticks)
+        write = self._make_writer((True,) * len(linkages)).write
+        count = sum(len(compiled.joints) for compiled in compiled_ticks)
 
         def tick(now: int) -> Tick:
             positions: list[float] = []
             rates: list[float] = []
             efforts: list[float] = []
-            seen = [share(now, positions, rates, efforts) for share in shares]
+            states = [add(now, positions, rates, efforts) for add in contributions]
             if len(positions) < count:
-                return self._make_tick(now, [_name_fields(one) for one in seen])
+                return self._make_tick(now, [_name_fields(state) for state in states])
             message = write(
                 now, positions, _if_complete(rates, count), _if_complete(efforts, count)
             )
-            return Tick(message, (), seen, lines)
+            return Tick(message, (), states, linkages)
 
         return tick
 
     def changes_state(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes the state of the pipeline."""
         return any(
-            not isinstance(seen, LinkageState)
+            not isinstance(state, LinkageState)
             or linkage.gap_begins
-            or (seen.position is not None and (bool(seen.position.joints) or self._has_state))
-            for linkage, seen in zip(self.linkages, tick.states, strict=True)
+            or (state.position is not None and (bool(state.position.joints) or self._has_state))
+            for linkage, state in zip(self.linkages, tick.states, strict=True)
         )
 
     def _make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
@@ -763,11 +768,11 @@ def _if_complete(values: list[float], count: int) -> list[float]:
     return values if len(values) == count else []
 
 
-def _name_fields(seen: LinkageState | StateTuple) -> LinkageState | CompiledState:
+def _name_fields(state: LinkageState | StateTuple) -> LinkageState | CompiledState:
     """Return the state of a linkage as a named tuple."""
-    if isinstance(seen, LinkageState):
-        return seen
-    crank, reading, reactions = seen
+    if isinstance(state, LinkageState):
+        return state
+    crank, reading, reactions = state
     return CompiledState(_crank_state(crank), SensorReading(*reading), reactions)
 
 
