@@ -132,7 +132,7 @@ def test_of_two_linkages_each_uses_its_newest():
 
 
 def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
-    rig = Rig(TWO, own=own_joint_states(parse_scene('t', 't', TWO_FILES)))
+    rig = Rig(TWO, is_own=own_joint_states(parse_scene('t', 't', TWO_FILES)))
     rig.send(names=('left_crank_joint',))
     rig.tick(BEGIN)
     rig.send(BEGIN + MS, names=('right_crank_joint',))
@@ -296,7 +296,7 @@ def test_two_publishers_of_one_crank_are_told_by_the_numbers_of_their_messages(k
 
 @pytest.mark.parametrize(('numbers', 'expected'), [([1, 2, 3], 0), ([9, 1, 10, 2, 11], 2)])
 def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, expected):
-    rig = Rig(own=lambda message: b'rocker' in message)
+    rig = Rig(is_own=lambda message: b'rocker' in message)
     for number in numbers:
         rig.send(names=('coupler_joint', 'rocker_joint'), number=number)
         rig.send()
