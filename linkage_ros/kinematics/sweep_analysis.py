@@ -590,7 +590,7 @@ def check_limits(closure: LoopClosure) -> None:
         if bound is not None:
             raise DefinitionError(
                 'pose.inputs',
-                f'bring {quote(bound.name)} to {bound.turned(joints[bound.number]):.6g} '
+                f'bring {quote(bound.name)} to {bound.turn_to_middle(joints[bound.number]):.6g} '
                 f'{_joint_unit(linkage, bound)}, '
                 f'beyond its limits {_limits_text(closure, bound)}',
                 'start within the limits, or widen them',

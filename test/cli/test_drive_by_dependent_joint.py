@@ -116,7 +116,7 @@ def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
         ('{joint: rocker_joint}', 'drive.topic.joint: rocker_joint: several cranks reach a value'),
         (
             '{joint: rocker_joint, branch: 4}',
-            'drive.topic.branch: branch 4: rocker_joint has none',
+            'drive.topic.branch: branch 4: rocker_joint has no branch of this number',
         ),
         ('{branch: 1}', 'drive.topic.branch: has no joint; name it: joint: NAME'),
         ('{joint: rocker_joint, branch: -1}', 'drive.topic.branch'),

@@ -266,7 +266,9 @@ def test_a_bag_that_was_cut_is_told_as_far_as_it_goes(longer: Path) -> None:
     assert answer(command, longer) == 0
     page = longer.parent / 'bag.html'
     (warning,) = warnings_of(page)
-    assert warning.startswith('Unfinished: its recording was killed, or still runs; what it holds')
+    assert warning.startswith(
+        'Unfinished: its recording was killed, or still runs; the page shows'
+    )
     assert 0 < data_of(page)['curves'][0]['of'] < 3000
 
 

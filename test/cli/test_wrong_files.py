@@ -133,7 +133,7 @@ def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
 ) -> None:
     monkeypatch.chdir(folder)
     line = answer(command, f'{name}.yaml', *OF_BAGS.get(command, '').split())
-    assert f'is a {noun} file, and no ' in line
+    assert f'is a {noun} file, not a' in line
 
 
 WRITTEN_WRONGLY = {

@@ -111,7 +111,7 @@ def test_results_are_copied_with_their_closure(way):
 
 def test_positions_of_another_linkage_are_refused_by_a_copy():
     other = lr.load('jansen_leg').position(1.0)
-    with pytest.raises(TypeError, match='is not of'):
+    with pytest.raises(TypeError, match='is not from'):
         copy.deepcopy(lr.load('four_bar')).velocity(other, 1.0)
 
 

@@ -394,7 +394,7 @@ class AllKinds:
     joints: tuple[str, ...] = part_names('which', 'joint')
     gains: Mapping[str, float] = each_part('of each', 'joint', Number('gain', '', least=0.0))
     shifts: Mapping[str, Any] = each_part('of each', 'link', Point('[x, y]', 'N', 1.0))
-    within: Within = parameter_section('further', Within)  # noqa: RUF009 (a field, as the others are)
+    within: Within = parameter_section('further', Within)  # noqa: RUF009 (a field)
 
 
 PARTS = dict.fromkeys(KINDS, ('rocker', 'crank'))
