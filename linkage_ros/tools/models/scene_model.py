@@ -22,7 +22,7 @@ Write = Callable[[str, Sequence[ModelPart]], bytes]
 
 
 def scene_urdf(scene: Scene, closures: Sequence[Closure]) -> bytes:
-    """Return the URDF of a scene; see `scene_model`."""
+    """Return the URDF of a scene; see `make_scene_model`."""
     return make_scene_model(scene, closures, urdf_model)
 
 
