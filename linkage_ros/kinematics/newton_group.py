@@ -24,28 +24,37 @@ the pose is followed again for each state, with the same proof that no other ass
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from math import hypot, inf, isnan, nan
+from itertools import islice
+from math import hypot, inf, isnan, nan, prod
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.arithmetic import call, has_result, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import (
+    call,
+    has_result,
+    make_vector,
+    SMALLEST,
+    UndecidedError,
+    UNIT_ROUNDOFF,
+)
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
-from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling import compile_function
+from linkage_ros.kinematics.built_once import BUILD_LOCK, keep_results
+from linkage_ros.kinematics.compiling import compile_function, compile_line
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
     Constraints,
-    differentiate_constraints,
     evaluate_constraints,
     line_motion,
     OnLine,
     point_in_line_frame,
 )
+from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.start_table import make_start_table, StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
 import numpy as np
@@ -65,6 +74,13 @@ _AROUND = 64.0
 _MOVED = 1e-6
 """In lengths: a smaller closure error is not reported."""
 
+_LAST_STEP = 2.0**-28
+"""
+Sum of the last changes by Newton's method, in [rad] and lengths: the next is below the rounding.
+
+Near a toggle the method converges more slowly by the same factor by which the rounding is greater.
+"""
+
 _EARLY_STEPS = 8
 _EARLY_SINGULAR = 1e-6
 """Steps that end at a tolerance, and the conditioning below which full accuracy is needed."""
@@ -77,7 +93,6 @@ class IteratedPose(NamedTuple):
     status: Status
     gap: float
     unknowns: list[float]  # For each body its angle and the place of its point
-    jacobian: Array  # Derivatives of the constraints by the unknowns
 
 
 class Iteration:
@@ -87,12 +102,13 @@ class Iteration:
     There are as many constraints as unknowns. The values of ``slides`` are appended to the
     coordinates. ``inputs`` are the inputs of the pose, as coordinates, and ``sliding`` says for
     each whether it is a slide. ``start`` has the approximate angle and place of each body at the
-    pose, one after the other. ``before`` are the steps before this one. No slide needs to be
-    longer than ``far`` to stretch a link.
+    pose, one after the other. ``before`` are the steps before this one, and ``known`` is their
+    state at the pose. No slide needs to be longer than ``far`` to stretch a link.
     """
 
-    __slots__ = ('_before', '_constraints', '_far', '_slides', '_sliding', '_start', '_straight',
-                 'branch', 'inputs', 'solution', 'tolerance')  # fmt: skip
+    __slots__ = ('_accelerations_line', '_before', '_constraints', '_equations', '_far',
+                 '_known_sizes', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
+                 '_straight', '_table', 'branch', 'inputs', 'solution', 'tolerance')  # fmt: skip
 
     def __init__(
         self,
@@ -103,6 +119,7 @@ class Iteration:
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
         far: float,
+        known: LinkState,
     ) -> None:
         self._constraints = constraints
         self._slides = slides
@@ -111,7 +128,13 @@ class Iteration:
         self._sliding = sliding
         self._far = far
         self._start = np.array(start)
+        self._equations = GroupEquations(constraints, len(start) // 3)
         self._straight: _CompiledSystem | None = None
+        self._known_sizes = len(known.coordinates), len(known.pins)
+        self._solution_line = _StraightLine(self._straight_solution, known)
+        self._rates_line = _StraightLine(self._straight_rates)
+        self._accelerations_line = _StraightLine(self._straight_accelerations)
+        self._table = keep_results(self._make_table)
         # Returns the branch of a single input; None if the pose leads to no solution.
         self.branch = keep_results(self._follow_branch)
         # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
@@ -131,42 +154,125 @@ class Iteration:
         stopped.tolerance = tolerance
         return stopped
 
-    def close(self, solved_state: LinkState) -> IteratedPose:
+    def close(self, solved: LinkState) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        early = self._closed_early(solved_state) if self.tolerance else None
+        early = self._closed_early(solved) if self.tolerance else None
         if early is not None:
             return early
-        solved = call(
-            self._closed_at,
-            len(solved_state.coordinates),
-            *solved_state.coordinates,
-            *solved_state.pins,
-        )
-        if not has_result(solved):
-            return self._not_closed(solved_state)
-        n, bodies = self.equation_count, self.equation_count // 3
-        unknowns = [solved[i] for i in range(n)]
-        self._append_solution(solved_state, unknowns, [solved[n + i] for i in range(bodies)])
-        return IteratedPose(Status.CLOSED, 0.0, unknowns, solved[n + bodies])
+        if _has_symbols(solved):
+            pose, values = self._close_straight(solved)
+        else:
+            found = self._solution_line(solved)
+            if found is None:
+                return self._close_slowly(solved)
+            pose, values = IteratedPose(Status.CLOSED, 0.0, found[: self.equation_count]), found
+        self._append_solution(solved, values)
+        return pose
 
-    def _closed_at(self, count: int, *numbers: Any) -> tuple[Any, ...] | None:
+    def _close_straight(self, solved: LinkState) -> tuple[IteratedPose, list[Any]]:
         """
-        Return a closed solution: unknowns, angles with their turns, and the Jacobian.
+        Return the pose, and its unknowns, angles with their turns and slides, as straight lines.
 
-        The numbers are ``count`` known coordinates, then the known pins.
+        All decisions are by symbols. Where they leave it open how the links lie,
+        `UndecidedError` is raised.
         """
-        solved = LinkState(list(numbers[:count]), list(numbers[count:]))
+        equations, turns = self._equations, None
+        inputs = self._inputs_of(solved)
+        if len(inputs) > 1:
+            found = call(self._start_on_a_line, *inputs)
+            if not has_result(found):
+                raise UndecidedError
+            count = len(equations.free)
+            values, farthest = [found[k] for k in range(count)], found[count]
+        else:
+            branch, table = self.branch(), self._table()
+            if branch is None or table is None:
+                raise UndecidedError
+            turns, x = branch.unwrap(inputs[0])
+            status = branch.status_at(x)
+            if status is not Status.CLOSED:
+                return IteratedPose(status, 0.0, []), []
+            values, farthest = table.find_start(x)
+        for last in (False, True):
+            unknowns = equations.place_bodies(values, solved)
+            step, divisors = equations.correct(unknowns, solved)
+            length = sum(map(abs, step[1:]), abs(step[0]))
+            regular = abs(prod(divisors[1:], start=divisors[0])) if divisors else 1.0
+            if not regular > SMALLEST or not length <= (_LAST_STEP if last else farthest):
+                raise UndecidedError
+            values = [value - change for value, change in zip(values, step, strict=True)]
+        unknowns = equations.place_bodies(values, solved)
+        angles = unknowns[0::3]
+        if turns is not None:
+            gained = branch.gained_angles
+            angles = [
+                a + turns * more if more else a for a, more in zip(angles, gained, strict=True)
+            ]
+        slides = [point_in_line_frame(slide, solved, unknowns).real for slide in self._slides]
+        return IteratedPose(Status.CLOSED, 0.0, unknowns), [*unknowns, *angles, *slides]
+
+    def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
+        """Return where Newton's method starts with several inputs, and how far it may lead."""
+        start, known = self._along_a_line(inputs), self._known_at(inputs)
+        if start is None or known is None:
+            return None
+        jacobian = self._evaluate_system(known, start.unknowns)[1]
+        if _reciprocal_condition(jacobian) <= _SINGULAR:
+            return None
+        values = start.unknowns.tolist()
+        return (*(values[k] for k in self._equations.free), start.farthest)
+
+    def _make_table(self) -> StartTable | None:
+        """Return the table of starts of a single input; None if there is no branch."""
+        branch = self.branch()
+        if branch is None:
+            return None
+        free = list(self._equations.free)
+
+        def solution_at(x: float) -> Array | None:
+            start = branch.find_start(x)
+            found = start.unknowns if start is not None and start.is_end else self.solution_at(x)
+            return None if found is None else found[free]
+
+        def converges(x: float, values: Array) -> bool:
+            known = self._known_at((x,))
+            if known is None:
+                return False
+            unknowns = np.array(self._equations.place_bodies(values.tolist(), known))
+            length = inf
+            for _ in range(2):
+                errors, jacobian = self._evaluate_system(known, unknowns)
+                try:
+                    step = np.linalg.solve(jacobian, errors)
+                except np.linalg.LinAlgError:
+                    return False
+                unknowns, length = unknowns - step, float(np.abs(step[free]).sum())
+            return length <= _LAST_STEP / 16.0
+
+        return make_start_table(branch.pieces(), solution_at, converges)
+
+    def _close_slowly(self, solved: LinkState) -> IteratedPose:
+        """Close the links where straight lines do not, as near a toggle."""
         inputs = self._inputs_of(solved)
         start = self._start_at(inputs)
         if start is None or start.is_end:
-            return None
+            return self._not_closed(solved)
         corrected = self._solve_newton(solved, start.unknowns, start.farthest)
         if corrected is None:
-            return None
+            return self._not_closed(solved)
         unknowns, jacobian = corrected
         if len(inputs) > 1 and _reciprocal_condition(jacobian) <= _SINGULAR:
-            return None
-        return (*unknowns.tolist(), *(unknowns + start.turned_angles)[0::3].tolist(), jacobian)
+            return self._not_closed(solved)
+        return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
+
+    def _pose_at(
+        self, status: Status, solved: LinkState, unknowns: Array, turned: Array
+    ) -> IteratedPose:
+        """Append a solution, and return its pose."""
+        values = unknowns.tolist()
+        slides = [point_in_line_frame(slide, solved, values).real for slide in self._slides]
+        self._append_solution(solved, [*values, *(unknowns + turned)[0::3].tolist(), *slides])
+        return IteratedPose(status, 0.0, values)
 
     def _closed_early(self, solved: LinkState) -> IteratedPose | None:
         """Append a solution within the tolerance; None if the first steps do not contract."""
@@ -188,11 +294,7 @@ class Iteration:
             if length <= self.tolerance:
                 if _reciprocal_condition(jacobian) <= _EARLY_SINGULAR:
                     return None
-                values = unknowns.tolist()
-                self._append_solution(
-                    solved, values, (unknowns + start.turned_angles)[0::3].tolist()
-                )
-                return IteratedPose(Status.CLOSED, 0.0, values, jacobian)
+                return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
         return None
 
     def _not_closed(self, solved: LinkState) -> IteratedPose:
@@ -203,15 +305,13 @@ class Iteration:
             return self._nearest_open_pose(solved, inputs)
         if start.is_end:
             # The Jacobian is singular here, so Newton's method would come no nearer.
-            unknowns, jacobian = start.unknowns, self._evaluate_system(solved, start.unknowns)[1]
+            unknowns = start.unknowns
         else:
             corrected = self._solve_newton(solved, start.unknowns, start.farthest)
             if corrected is None:
                 return self._nearest_open_pose(solved, inputs)
-            unknowns, jacobian = corrected
-        values = unknowns.tolist()
-        self._append_solution(solved, values, (unknowns + start.turned_angles)[0::3].tolist())
-        return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
+            unknowns = corrected[0]
+        return self._pose_at(Status.TOGGLE, solved, unknowns, start.turned_angles)
 
     def _inputs_of(self, solved: LinkState) -> list[float]:
         end = 1 + len(self.inputs)
@@ -240,41 +340,72 @@ class Iteration:
 
     def rates(self, pose: IteratedPose, solved: LinkState, velocities: LinkState) -> list[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
-        still = [0.0] * len(pose.unknowns)
-        drift = differentiate_constraints(
-            self._constraints, pose.unknowns, solved, velocities, still, None, still
+        states = LinkState(pose.unknowns, []), solved, velocities
+        if _has_symbols(*states):
+            found = self._straight_rates(*states)
+        else:
+            found = self._rates_line(states[0], *map(self._known_part, states[1:])) or []
+        self._append_rates(velocities, found)
+        return found[: self.equation_count]
+
+    def _straight_rates(
+        self, pose: LinkState, solved: LinkState, velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns and of the slides."""
+        unknowns = pose.coordinates
+        rates = self._equations.rates(unknowns, solved, velocities)
+        still = [0.0] * len(rates)
+        motions = (
+            line_motion(slide, unknowns, solved, velocities, rates, None, still)
+            for slide in self._slides
         )
-        rates = _cancel_drift(pose, drift)
-        self._append_rates(velocities, rates)
-        for slide in self._slides:
-            _, rate, _ = line_motion(slide, pose.unknowns, solved, velocities, rates, None, still)
-            velocities.coordinates.append(rate.real)
-        return rates
+        return [*rates, *(rate.real for _, rate, _ in motions)]
 
     def accelerations(
         self,
         pose: IteratedPose,
         rates: list[float],
-        solved_state: LinkState,
+        solved: LinkState,
         velocities: LinkState,
         accelerations: LinkState,
     ) -> None:
         """Append the accelerations of the coordinates and pins that `close` appended."""
-        still = [0.0] * len(rates)
-        drift = differentiate_constraints(
-            self._constraints, pose.unknowns, solved_state, velocities, rates, accelerations, still
-        )
-        solved = _cancel_drift(pose, drift)
-        self._append_rates(accelerations, solved)
-        for slide in self._slides:
-            _, _, change = line_motion(
-                slide, pose.unknowns, solved_state, velocities, rates, accelerations, solved
-            )
-            accelerations.coordinates.append(change.real)
+        states = (
+            LinkState(pose.unknowns, []), LinkState(rates, []), solved, velocities, accelerations
+        )  # fmt: skip
+        if _has_symbols(*states):
+            found = self._straight_accelerations(*states)
+        else:
+            found = self._accelerations_line(*states[:2], *map(self._known_part, states[2:])) or []
+        self._append_rates(accelerations, found)
 
-    def conditioning(self, pose: IteratedPose) -> float:
+    def _straight_accelerations(
+        self,
+        pose: LinkState,
+        pose_rates: LinkState,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns and of the slides."""
+        unknowns, rates = pose.coordinates, pose_rates.coordinates
+        found = self._equations.accelerations(unknowns, solved, velocities, rates, accelerations)
+        motions = (
+            line_motion(slide, unknowns, solved, velocities, rates, accelerations, found)
+            for slide in self._slides
+        )
+        return [*found, *(change.real for _, _, change in motions)]
+
+    def _straight_solution(self, solved: LinkState) -> list[Any]:
+        """Return the unknowns, the angles with their turns, and the slides."""
+        pose, values = self._close_straight(solved)
+        if pose.status is not Status.CLOSED:
+            raise UndecidedError
+        return values
+
+    def conditioning(self, pose: IteratedPose, solved: LinkState) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _reciprocal_condition(pose.jacobian)
+        return _reciprocal_condition(self._evaluate_lists(solved, pose.unknowns)[1])
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -301,18 +432,18 @@ class Iteration:
         corrected = self._solve_newton(known, start.unknowns, start.farthest)
         return None if corrected is None else corrected[0]
 
-    def _append_solution(
-        self, solved: LinkState, unknowns: list[float], angles: list[float]
-    ) -> None:
-        """Append a solution; its angles include the turns made before."""
-        solved.coordinates.extend(angles)
-        solved.pins.extend(_body_places(unknowns))
-        for slide in self._slides:
-            solved.coordinates.append(point_in_line_frame(slide, solved, unknowns).real)
+    def _append_solution(self, solved: LinkState, values: Sequence[float]) -> None:
+        """Append a solution: unknowns, angles with the turns made before, and slides."""
+        n = self.equation_count
+        solved.coordinates.extend(values[n:])
+        solved.pins.extend(_body_places(values[:n]))
 
-    def _append_rates(self, state: LinkState, values: list[float]) -> None:
-        state.coordinates.extend(values[0::3])
-        state.pins.extend(_body_places(values))
+    def _append_rates(self, state: LinkState, values: Sequence[float]) -> None:
+        """Append the rates of the unknowns and of the slides, or their accelerations."""
+        n = self.equation_count
+        state.coordinates.extend(values[0:n:3])
+        state.coordinates.extend(values[n:])
+        state.pins.extend(_body_places(values[:n]))
 
     def _evaluate_system(self, solved: LinkState, unknowns: Array) -> tuple[Array, Array]:
         """Return the residuals, and their derivatives by the unknowns."""
@@ -322,12 +453,18 @@ class Iteration:
     def _evaluate_lists(
         self, solved: LinkState, unknowns: Sequence[float]
     ) -> tuple[tuple[float, ...], Array]:
-        numbers = [*solved.coordinates, *solved.pins, *unknowns]
+        known = self._known_part(solved)
+        numbers = [*known.coordinates, *known.pins, *unknowns]
         if self._straight is None:
             self._straight = _CompiledSystem(
-                self._constraints, numbers, len(solved.coordinates), len(unknowns)
+                self._constraints, numbers, len(known.coordinates), len(unknowns)
             )
         return self._straight.residuals_at(numbers)
+
+    def _known_part(self, state: LinkState) -> LinkState:
+        """Return what a state has of the links before this step."""
+        coordinates, pins = self._known_sizes
+        return LinkState(state.coordinates[:coordinates], state.pins[:pins])
 
     def _known_at(self, inputs: Sequence[float]) -> LinkState | None:
         """Return the state of the links solved before this step, or None."""
@@ -431,9 +568,51 @@ class Iteration:
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
         gap = float(np.abs(errors).max())
-        return IteratedPose(
-            Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), jacobian
-        )
+        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist())
+
+
+class _StraightLine:
+    """
+    A function of states as straight-line code for numbers, with the bits of a tape.
+
+    It is compiled at ``example``, or else at the first states. It returns None where the function
+    would decide otherwise.
+    """
+
+    __slots__ = ('_example', '_function', '_line')
+
+    def __init__(self, function: Callable[..., Sequence[Any]], *example: LinkState) -> None:
+        self._function = function
+        self._example = example
+        self._line: Callable[..., Any] | None = None
+
+    def __call__(self, *states: LinkState) -> list[float] | None:
+        """Return the numbers of the function."""
+        if self._line is None:
+            with BUILD_LOCK:
+                self._line = self._compile(self._example or states)
+        found = self._line(*_list_numbers(states))
+        return found and list(found[0])
+
+    def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:
+        def compute(*numbers: Any) -> Sequence[Any]:
+            left = iter(numbers)
+            return self._function(
+                *(LinkState(*(list(islice(left, len(part))) for part in each)) for each in states)
+            )
+
+        try:
+            return compile_line(compute, _list_numbers(states))
+        except UndecidedError:
+            return lambda *_: None
+
+
+def _list_numbers(states: Sequence[LinkState]) -> list[Any]:
+    return [number for state in states for part in state for number in part]
+
+
+def _has_symbols(*states: LinkState) -> bool:
+    return any(hasattr(number, 'apply') for number in _list_numbers(states))
 
 
 class _CompiledSystem:
@@ -478,23 +657,12 @@ def _greatest_magnitude(values: Sequence[float]) -> float:
 
 
 def _body_places(values: Sequence[float]) -> list[complex]:
-    return [x + 1j * y for x, y in zip(values[1::3], values[2::3], strict=True)]
+    return list(map(make_vector, values[1::3], values[2::3]))
 
 
 def _reciprocal_condition(jacobian: Array) -> float:
     values = np.linalg.svd(jacobian, compute_uv=False)
     return float(values[-1] / values[0])
-
-
-def _cancel_drift(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
-    """Return the rates of the unknowns that cancel the drift of the constraints."""
-    rates = call(_solve_linear, pose.jacobian, *drift)
-    return [rates[i] for i in range(len(drift))]
-
-
-def _solve_linear(jacobian: Array, *drift: float) -> list[float]:
-    rates: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
-    return rates
 
 
 def make_iteration(
@@ -541,7 +709,9 @@ def make_iteration(
         for points in planner.points.values()
     )
     slides = tuple(constraints.slides.values())
-    return Iteration(tuple(constraints.constraints), slides, inputs, start, before, sliding, far)
+    return Iteration(
+        tuple(constraints.constraints), slides, inputs, start, before, sliding, far, solved
+    )
 
 
 def _initial_guess(

@@ -16,6 +16,7 @@ from linkage_ros.kinematics.compiling.numpy_blocks import (
 )
 from linkage_ros.kinematics.compiling.python import (
     compile_function as compile_function,
+    compile_line as compile_line,
     python_source as python_source,
 )
 from linkage_ros.kinematics.compiling.real_program import (

@@ -159,14 +159,12 @@ def compile_function(
     The function takes numbers and returns numbers, and its decisions do not depend on them.
     ``values`` are arguments for which it works, each real or complex as in all later calls.
     """
-    tape = Tape()
-    given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
-    results = [number_of(number) for number in function(*given)]
-    if tape.decisions:
+    path = _trace_function(function, values)
+    if path.decisions:
         raise ValueError('the function decides by its arguments, and cannot be compiled')
+    (results,) = path.outputs
     places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
-    inputs = tuple(one.operation for one in given)
-    line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))
+    line = python_function(path._replace(outputs=(tuple(results[i] for i in places),)))
 
     def varying_results(*arguments: Any) -> tuple[float, ...]:
         (group,) = line(*arguments) or ((),)
@@ -174,3 +172,21 @@ def compile_function(
 
     constants = tuple(0.0 if isinstance(number, Operation) else number for number in results)
     return CompiledFunction(varying_results, places, constants)
+
+
+def compile_line(
+    function: Callable[..., Sequence[float]], values: Sequence[complex]
+) -> Callable[..., Values | None]:
+    """
+    Return a function as straight-line code; None where it decides otherwise than at ``values``.
+
+    The function takes numbers and returns numbers, which are the only group of the code.
+    """
+    return python_function(_trace_function(function, values))
+
+
+def _trace_function(function: Callable[..., Sequence[float]], values: Sequence[complex]) -> Path:
+    tape = Tape()
+    given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
+    results = tuple(number_of(number) for number in function(*given))
+    return Path(tuple(one.operation for one in given), tuple(tape.decisions), (results,), tape)
