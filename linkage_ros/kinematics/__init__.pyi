@@ -155,6 +155,7 @@ from linkage_ros.kinematics.sides import (
 )
 from linkage_ros.kinematics.singularity_margin import signed_distance as signed_distance
 from linkage_ros.kinematics.solved_links import Angle as Angle, SolvedLinks as SolvedLinks
+from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
     FixedPoint as FixedPoint,

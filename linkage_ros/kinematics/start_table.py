@@ -23,11 +23,12 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from math import frexp, ldexp
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import call, sqrt as root_of, where
-from linkage_ros.kinematics.equations import Array
-import numpy as np
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.equations import Array
 
 _DIGITS = 24
 """Binary digits of the numbers of a row, relative to the largest change in it."""
@@ -112,6 +113,8 @@ def _fit_rows(
     depth: int,
 ) -> Iterator[tuple[float, tuple[float, ...]]]:
     """Yield the end and the numbers of each row of a piece."""
+    import numpy as np  # local import: sources of linkages need only the table
+
     low, high, folds = piece
     begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
 

@@ -24,7 +24,11 @@ from linkage_ros.kinematics.compiling.real_program import (
     Program as Program,
 )
 from linkage_ros.kinematics.compiling.solve import BLOCK as BLOCK, SolverOutline as SolverOutline
-from linkage_ros.kinematics.compiling.tape import Operation as Operation, Tape as Tape
+from linkage_ros.kinematics.compiling.tape import (
+    Kind as Kind,
+    Operation as Operation,
+    Tape as Tape,
+)
 from linkage_ros.kinematics.compiling.trace import (
     DecisionBranch as DecisionBranch,
     motion_at as motion_at,
