@@ -499,7 +499,7 @@ class Branch:
                         break
         if side.sign * x > self._reach_of(side):
             return None
-        gained = (turned or 0) * self._gained
+        gained = turned * self._gained
         inputs = side.inputs
         number = bisect_left(inputs, side.sign * x)
         if number == len(inputs):
@@ -517,10 +517,10 @@ class Branch:
         gained: list[float] = self._gained[0::3].tolist()
         return gained
 
-    def unwrap(self, x: float) -> tuple[int | None, float]:
+    def unwrap(self, x: float) -> tuple[int, float]:
         """Return how often the branch has started again, and the input without these turns."""
         if not (self._turning and self.interval.period_turns):
-            return None, x
+            return 0, x
         period = tau * self.interval.period_turns
         turned = round((x - 0.5 * (self.interval.low + self.interval.high)) / period)
         return turned, x - turned * period

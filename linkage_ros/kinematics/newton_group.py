@@ -42,7 +42,7 @@ from linkage_ros.kinematics.arithmetic import (
 )
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import BUILD_LOCK, keep_results
-from linkage_ros.kinematics.compiling import compile_function, compile_line
+from linkage_ros.kinematics.compiling import compile_function, compile_line, Tape
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
@@ -131,9 +131,19 @@ class Iteration:
         self._equations = GroupEquations(constraints, len(start) // 3)
         self._straight: _CompiledSystem | None = None
         self._known_sizes = len(known.coordinates), len(known.pins)
-        self._solution_line = _StraightLine(self._straight_solution, known)
-        self._rates_line = _StraightLine(self._straight_rates)
-        self._accelerations_line = _StraightLine(self._straight_accelerations)
+        examples = keep_results(self._trace_examples)
+
+        def examples_of(*names: str) -> Callable[[], Sequence[LinkState] | None]:
+            return lambda: [found[name] for name in names] if (found := examples()) else None
+
+        self._solution_line = _StraightLine(self._straight_solution, examples_of('known'))
+        self._rates_line = _StraightLine(
+            self._straight_rates, examples_of('pose', 'known', 'velocities')
+        )
+        self._accelerations_line = _StraightLine(
+            self._straight_accelerations,
+            examples_of('pose', 'rates', 'known', 'velocities', 'accelerations'),
+        )
         self._table = keep_results(self._make_table)
         # Returns the branch of a single input; None if the pose leads to no solution.
         self.branch = keep_results(self._follow_branch)
@@ -176,8 +186,8 @@ class Iteration:
         All decisions are by symbols. Where they leave it open how the links lie,
         `UndecidedError` is raised.
         """
-        equations, turns = self._equations, None
-        inputs = self._inputs_of(solved)
+        equations, inputs = self._equations, self._inputs_of(solved)
+        turns, gained = 0, [0.0] * (self.equation_count // 3)
         if len(inputs) > 1:
             found = call(self._start_on_a_line, *inputs)
             if not has_result(found):
@@ -189,6 +199,7 @@ class Iteration:
             if branch is None or table is None:
                 raise UndecidedError
             turns, x = branch.unwrap(inputs[0])
+            gained = branch.gained_angles
             status = branch.status_at(x)
             if status is not Status.CLOSED:
                 return IteratedPose(status, 0.0, []), []
@@ -202,12 +213,10 @@ class Iteration:
                 raise UndecidedError
             values = [value - change for value, change in zip(values, step, strict=True)]
         unknowns = equations.place_bodies(values, solved)
-        angles = unknowns[0::3]
-        if turns is not None:
-            gained = branch.gained_angles
-            angles = [
-                a + turns * more if more else a for a, more in zip(angles, gained, strict=True)
-            ]
+        angles = [
+            angle + turns * more if more else angle
+            for angle, more in zip(unknowns[0::3], gained, strict=True)
+        ]
         slides = [point_in_line_frame(slide, solved, unknowns).real for slide in self._slides]
         return IteratedPose(Status.CLOSED, 0.0, unknowns), [*unknowns, *angles, *slides]
 
@@ -221,6 +230,34 @@ class Iteration:
             return None
         values = start.unknowns.tolist()
         return (*(values[k] for k in self._equations.free), start.farthest)
+
+    def _trace_examples(self) -> dict[str, LinkState]:
+        """Return the states at the pose as symbols; nothing if it is at a toggle."""
+        tape, n = Tape(), self.equation_count
+        known, velocities, accelerations = (
+            LinkState(
+                [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs))], []
+            )
+            for name in 'qwa'
+        )  # type: ignore[misc]
+        try:
+            for step in self._before:
+                closed = step.close(known)
+                if not closed.status.has_rates:
+                    return {}
+                found = step.rates(closed, known, velocities)
+                step.accelerations(closed, found, known, velocities, accelerations)
+            pose = LinkState(self._straight_solution(known)[:n], [])
+            rates = LinkState(self._straight_rates(pose, known, velocities)[:n], [])
+        except UndecidedError:
+            return {}
+        return {
+            'known': known,
+            'velocities': velocities,
+            'accelerations': accelerations,
+            'pose': pose,
+            'rates': rates,
+        }
 
     def _make_table(self) -> StartTable | None:
         """Return the table of starts of a single input; None if there is no branch."""
@@ -575,34 +612,46 @@ class _StraightLine:
     """
     A function of states as straight-line code for numbers, with the bits of a tape.
 
-    It is compiled at ``example``, or else at the first states. It returns None where the function
+    ``examples`` returns states as symbols; what is a number there is the same at all states.
+    Without them the code is compiled at the first states. It returns None where the function
     would decide otherwise.
     """
 
-    __slots__ = ('_example', '_function', '_line')
+    __slots__ = ('_examples', '_function', '_line')
 
-    def __init__(self, function: Callable[..., Sequence[Any]], *example: LinkState) -> None:
+    def __init__(
+        self,
+        function: Callable[..., Sequence[Any]],
+        examples: Callable[[], Sequence[LinkState] | None],
+    ) -> None:
         self._function = function
-        self._example = example
+        self._examples = examples
         self._line: Callable[..., Any] | None = None
 
     def __call__(self, *states: LinkState) -> list[float] | None:
         """Return the numbers of the function."""
         if self._line is None:
             with BUILD_LOCK:
-                self._line = self._compile(self._example or states)
+                self._line = self._compile(self._examples() or states)
         found = self._line(*_list_numbers(states))
         return found and list(found[0])
 
     def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:
+        examples = _list_numbers(states)
+        varying = list(map(_is_symbol, examples))
+        values = [one.operation.value if _is_symbol(one) else one for one in examples]
+        if not any(varying):
+            varying = [True] * len(varying)
+
         def compute(*numbers: Any) -> Sequence[Any]:
-            left = iter(numbers)
+            given = zip(numbers, values, varying, strict=True)
+            left = iter([number if varies else value for number, value, varies in given])
             return self._function(
                 *(LinkState(*(list(islice(left, len(part))) for part in each)) for each in states)
             )
 
         try:
-            return compile_line(compute, _list_numbers(states))
+            return compile_line(compute, values)
         except UndecidedError:
             return lambda *_: None
 
@@ -611,8 +660,12 @@ def _list_numbers(states: Sequence[LinkState]) -> list[Any]:
     return [number for state in states for part in state for number in part]
 
 
+def _is_symbol(number: Any) -> bool:
+    return hasattr(number, 'apply')
+
+
 def _has_symbols(*states: LinkState) -> bool:
-    return any(hasattr(number, 'apply') for number in _list_numbers(states))
+    return any(map(_is_symbol, _list_numbers(states)))
 
 
 class _CompiledSystem:

@@ -130,10 +130,13 @@ class Lowering:
         name = operation.name
         if operation.is_input:
             return self.tape.add_input(name, operation.value)
-        given = [self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
-                 for a in operation.arguments]  # fmt: skip
+        given: list[Any] = [
+            self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
+            for a in operation.arguments
+        ]
         if name == 'call':
-            return self.tape.call(*given)
+            function, *numbers = given
+            return self.tape.call(function, *numbers)
         if name == 'item':
             # As text: the number could get the name of an equal length.
             return self.tape.write(name, given[0], str(given[1]))
