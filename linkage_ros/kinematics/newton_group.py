@@ -233,13 +233,12 @@ class Iteration:
 
     def _trace_examples(self) -> dict[str, LinkState]:
         """Return the states at the pose as symbols; nothing if it is at a toggle."""
-        tape, n = Tape(), self.equation_count
-        known, velocities, accelerations = (
-            LinkState(
-                [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs))], []
-            )
+        tape, n, inputs = Tape(), self.equation_count, self.inputs
+        states: list[Any] = [
+            [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(inputs))]
             for name in 'qwa'
-        )  # type: ignore[misc]
+        ]
+        known, velocities, accelerations = (LinkState(state, []) for state in states)
         try:
             for step in self._before:
                 closed = step.close(known)
