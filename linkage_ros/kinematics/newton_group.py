@@ -17,16 +17,16 @@ solve the same matrix for the derivatives of the constraints.
 The assembly is the one that continuity from the given pose leads to. With a single input it is a
 `Branch`, which is followed once, so that a state depends only on its input and not on where the
 linkage was before: the method starts from the curve of the branch, and a solution farther from
-there than the curve allows is rejected. With several inputs, the straight line from the inputs of
+there than the curve allows is rejected. Two steps from a table of that curve end within the
+rounding; they are a straight line without a library, which a tape records. Only next to a toggle
+numpy iterates, until no step is shorter. With several inputs, the straight line from the inputs of
 the pose is followed again for each state, with the same proof that no other assembly is met.
 """
 
 from __future__ import annotations
 
-from cmath import phase, rect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
-from itertools import islice
 from math import hypot, inf, isnan, nan, prod
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -41,8 +41,8 @@ from linkage_ros.kinematics.arithmetic import (
     UNIT_ROUNDOFF,
 )
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
-from linkage_ros.kinematics.built_once import BUILD_LOCK, keep_results
-from linkage_ros.kinematics.compiling import compile_function, compile_line, Tape
+from linkage_ros.kinematics.built_once import keep_results
+from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
@@ -54,9 +54,11 @@ from linkage_ros.kinematics.equations import (
 )
 from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.rough_pose import guess_unknowns
 from linkage_ros.kinematics.start_table import make_start_table, StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
 import numpy as np
 
 if TYPE_CHECKING:
@@ -106,9 +108,11 @@ class Iteration:
     state at the pose. No slide needs to be longer than ``far`` to stretch a link.
     """
 
-    __slots__ = ('_accelerations_line', '_before', '_constraints', '_equations', '_far',
-                 '_known_sizes', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
-                 '_straight', '_table', 'branch', 'inputs', 'solution', 'tolerance')  # fmt: skip
+    __slots__ = (
+        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
+        '_rates_line', '_slides', '_sliding', '_solution_line', '_start', '_system_line', '_table',
+        'branch', 'inputs', 'solution', 'tolerance',
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -129,18 +133,18 @@ class Iteration:
         self._far = far
         self._start = np.array(start)
         self._equations = GroupEquations(constraints, len(start) // 3)
-        self._straight: _CompiledSystem | None = None
+        self._system_line = StraightLine(self._list_system, lambda: None)
         self._known_sizes = len(known.coordinates), len(known.pins)
         examples = keep_results(self._trace_examples)
 
         def examples_of(*names: str) -> Callable[[], Sequence[LinkState] | None]:
             return lambda: [found[name] for name in names] if (found := examples()) else None
 
-        self._solution_line = _StraightLine(self._straight_solution, examples_of('known'))
-        self._rates_line = _StraightLine(
+        self._solution_line = StraightLine(self._straight_solution, examples_of('known'))
+        self._rates_line = StraightLine(
             self._straight_rates, examples_of('pose', 'known', 'velocities')
         )
-        self._accelerations_line = _StraightLine(
+        self._accelerations_line = StraightLine(
             self._straight_accelerations,
             examples_of('pose', 'rates', 'known', 'velocities', 'accelerations'),
         )
@@ -169,7 +173,7 @@ class Iteration:
         early = self._closed_early(solved) if self.tolerance else None
         if early is not None:
             return early
-        if _has_symbols(solved):
+        if has_symbols(solved):
             pose, values = self._close_straight(solved)
         else:
             found = self._solution_line(solved)
@@ -377,7 +381,7 @@ class Iteration:
     def rates(self, pose: IteratedPose, solved: LinkState, velocities: LinkState) -> list[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
         states = LinkState(pose.unknowns, []), solved, velocities
-        if _has_symbols(*states):
+        if has_symbols(*states):
             found = self._straight_rates(*states)
         else:
             found = self._rates_line(states[0], *map(self._known_part, states[1:])) or []
@@ -409,7 +413,7 @@ class Iteration:
         states = (
             LinkState(pose.unknowns, []), LinkState(rates, []), solved, velocities, accelerations
         )  # fmt: skip
-        if _has_symbols(*states):
+        if has_symbols(*states):
             found = self._straight_accelerations(*states)
         else:
             found = self._accelerations_line(*states[:2], *map(self._known_part, states[2:])) or []
@@ -488,14 +492,14 @@ class Iteration:
 
     def _evaluate_lists(
         self, solved: LinkState, unknowns: Sequence[float]
-    ) -> tuple[tuple[float, ...], Array]:
-        known = self._known_part(solved)
-        numbers = [*known.coordinates, *known.pins, *unknowns]
-        if self._straight is None:
-            self._straight = _CompiledSystem(
-                self._constraints, numbers, len(known.coordinates), len(unknowns)
-            )
-        return self._straight.residuals_at(numbers)
+    ) -> tuple[list[float], Array]:
+        known, n = self._known_part(solved), len(unknowns)
+        numbers = self._system_line(known, LinkState([*unknowns], [])) or []
+        return numbers[:n], np.array(numbers[n:]).reshape(n, n)
+
+    def _list_system(self, solved: LinkState, pose: LinkState) -> list[float]:
+        errors, rows = evaluate_constraints(self._constraints, pose.coordinates, solved)
+        return [*errors, *(slope for row in rows for slope in row)]
 
     def _known_part(self, state: LinkState) -> LinkState:
         """Return what a state has of the links before this step."""
@@ -607,102 +611,6 @@ class Iteration:
         return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist())
 
 
-class _StraightLine:
-    """
-    A function of states as straight-line code for numbers, with the bits of a tape.
-
-    ``examples`` returns states as symbols; what is a number there is the same at all states.
-    Without them the code is compiled at the first states. It returns None where the function
-    would decide otherwise.
-    """
-
-    __slots__ = ('_examples', '_function', '_line')
-
-    def __init__(
-        self,
-        function: Callable[..., Sequence[Any]],
-        examples: Callable[[], Sequence[LinkState] | None],
-    ) -> None:
-        self._function = function
-        self._examples = examples
-        self._line: Callable[..., Any] | None = None
-
-    def __call__(self, *states: LinkState) -> list[float] | None:
-        """Return the numbers of the function."""
-        if self._line is None:
-            with BUILD_LOCK:
-                self._line = self._compile(self._examples() or states)
-        found = self._line(*_list_numbers(states))
-        return found and list(found[0])
-
-    def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:
-        examples = _list_numbers(states)
-        varying = list(map(_is_symbol, examples))
-        values = [one.operation.value if _is_symbol(one) else one for one in examples]
-        if not any(varying):
-            varying = [True] * len(varying)
-
-        def compute(*numbers: Any) -> Sequence[Any]:
-            given = zip(numbers, values, varying, strict=True)
-            left = iter([number if varies else value for number, value, varies in given])
-            return self._function(
-                *(LinkState(*(list(islice(left, len(part))) for part in each)) for each in states)
-            )
-
-        try:
-            return compile_line(compute, values)
-        except UndecidedError:
-            return lambda *_: None
-
-
-def _list_numbers(states: Sequence[LinkState]) -> list[Any]:
-    return [number for state in states for part in state for number in part]
-
-
-def _is_symbol(number: Any) -> bool:
-    return hasattr(number, 'apply')
-
-
-def _has_symbols(*states: LinkState) -> bool:
-    return any(map(_is_symbol, _list_numbers(states)))
-
-
-class _CompiledSystem:
-    """
-    The constraints and their derivatives as straight-line code.
-
-    Most derivatives are constants, such as 0 and 1; only the others are evaluated.
-
-    ``numbers`` are coordinates, pins and unknowns, in this order, at which the constraints can be
-    evaluated; ``coordinates`` and ``unknowns`` say how many there are.
-    """
-
-    def __init__(
-        self,
-        constraints: Sequence[Constraint],
-        numbers: Sequence[complex],
-        coordinates: int,
-        unknowns: int,
-    ) -> None:
-        def list_constants(*values: Any) -> list[float]:
-            state = LinkState(list(values[:coordinates]), list(values[coordinates:-unknowns]))
-            errors, rows = evaluate_constraints(constraints, values[-unknowns:], state)
-            return [*errors, *(slope for row in rows for slope in row)]
-
-        self._function = compile_function(list_constants, numbers)
-        self._count = unknowns
-        self._constants = np.array(self._function.results[unknowns:])
-        self._places = np.array([place - unknowns for place in self._function.places[unknowns:]])
-
-    def residuals_at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
-        """Return the residuals, all of which vary, and the Jacobian."""
-        n = self._count
-        varying = self._function.varying(*numbers)
-        jacobian = self._constants.copy()
-        jacobian[self._places] = varying[n:]
-        return varying[:n], jacobian.reshape(n, n)
-
-
 def _greatest_magnitude(values: Sequence[float]) -> float:
     """Return the greatest absolute value; NaN if any value is NaN."""
     return nan if isnan(sum(values)) else max(map(abs, values))
@@ -755,7 +663,7 @@ def make_iteration(
     places |= {name: pins[i] for name, i in constraints.known_pins.items()}
     angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
     angles |= {link: angle for link, angle in pose.angles.items() if link in links}
-    start = _initial_guess(linkage, links, planner, places, angles)
+    start = guess_unknowns(linkage, links, planner, places, angles)
     far = sum(
         max(abs(one - other) for one in points.values() for other in points.values())
         for points in planner.points.values()
@@ -764,62 +672,3 @@ def make_iteration(
     return Iteration(
         tuple(constraints.constraints), slides, inputs, start, before, sliding, far, solved
     )
-
-
-def _initial_guess(
-    linkage: Linkage,
-    links: Sequence[str],
-    planner: SolvedLinks,
-    given: Mapping[str, complex],
-    angles: dict[str, float],
-) -> list[float]:
-    """Return angle and place of each link, fitted to the given places of points."""
-    points = planner.points
-
-    def by_slider(link: str) -> float | None:
-        """Return the angle of a link from its slider: by the other link or by the direction."""
-        for name, slider in linkage.sliders.items():
-            block, rail = planner.blocks[name], slider.along
-            ends = slider.through, slider.point
-            if link not in (block, rail):
-                continue
-            turn = slider.angle if link == block else 0.0
-            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
-                along = given[ends[1]] - given[ends[0]]
-                return phase(along / complex(*slider.direction)) + turn
-            if link == block:
-                return angle_of(rail) + turn
-            if block in angles:
-                return angles[block] - slider.angle
-        return None
-
-    def angle_of(link: str) -> float:
-        if link not in angles:
-            known = [name for name in points[link] if name in given]
-            apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
-            if apart:
-                there = given[apart[0]] - given[known[0]]
-                angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
-            else:
-                angle = by_slider(link)
-                if angle is None:
-                    raise DefinitionError(
-                        'pose.points',
-                        f'does not say where {link!r} lies',
-                        f'give two of its points: {list_names(points[link])}',
-                    )
-                angles[link] = angle
-        return angles[link]
-
-    start: list[float] = []
-    for link in links:
-        angle = angle_of(link)
-        known = next((name for name in points[link] if name in given), None)
-        if known is None:
-            raise DefinitionError(
-                'pose.points', f'does not say where {link!r} lies', 'give one of its points'
-            )
-        first = next(iter(points[link].values()))
-        place = given[known] + rect(1.0, angle) * (first - points[link][known])
-        start += (angle, place.real, place.imag)
-    return start

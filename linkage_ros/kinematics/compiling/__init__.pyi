@@ -15,7 +15,6 @@ from linkage_ros.kinematics.compiling.numpy_blocks import (
     BlockFunction as BlockFunction,
 )
 from linkage_ros.kinematics.compiling.python import (
-    compile_function as compile_function,
     compile_line as compile_line,
     python_source as python_source,
 )
