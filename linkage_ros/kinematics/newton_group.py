@@ -95,6 +95,7 @@ class IteratedPose(NamedTuple):
     status: Status
     gap: float
     unknowns: list[float]  # For each body its angle and the place of its point
+    solved: LinkState  # The state that they were appended to
 
 
 class Iteration:
@@ -173,19 +174,19 @@ class Iteration:
         early = self._closed_early(solved) if self.tolerance else None
         if early is not None:
             return early
-        if has_symbols(solved):
-            pose, values = self._close_straight(solved)
-        else:
-            found = self._solution_line(solved)
-            if found is None:
-                return self._close_slowly(solved)
-            pose, values = IteratedPose(Status.CLOSED, 0.0, found[: self.equation_count]), found
+        status, values = (
+            self._close_straight(solved)
+            if has_symbols(solved)
+            else (Status.CLOSED, self._solution_line(solved))
+        )
+        if values is None:
+            return self._close_slowly(solved)
         self._append_solution(solved, values)
-        return pose
+        return IteratedPose(status, 0.0, values[: self.equation_count], solved)
 
-    def _close_straight(self, solved: LinkState) -> tuple[IteratedPose, list[Any]]:
+    def _close_straight(self, solved: LinkState) -> tuple[Status, list[Any]]:
         """
-        Return the pose, and its unknowns, angles with their turns and slides, as straight lines.
+        Return the status, and unknowns, angles with their turns and slides, as straight lines.
 
         All decisions are by symbols. Where they leave it open how the links lie,
         `UndecidedError` is raised.
@@ -206,7 +207,7 @@ class Iteration:
             gained = branch.gained_angles
             status = branch.status_at(x)
             if status is not Status.CLOSED:
-                return IteratedPose(status, 0.0, []), []
+                return status, []
             values, farthest = table.find_start(x)
         for last in (False, True):
             unknowns = equations.place_bodies(values, solved)
@@ -222,7 +223,7 @@ class Iteration:
             for angle, more in zip(unknowns[0::3], gained, strict=True)
         ]
         slides = [point_in_line_frame(slide, solved, unknowns).real for slide in self._slides]
-        return IteratedPose(Status.CLOSED, 0.0, unknowns), [*unknowns, *angles, *slides]
+        return Status.CLOSED, [*unknowns, *angles, *slides]
 
     def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
         """Return where Newton's method starts with several inputs, and how far it may lead."""
@@ -312,7 +313,7 @@ class Iteration:
         values = unknowns.tolist()
         slides = [point_in_line_frame(slide, solved, values).real for slide in self._slides]
         self._append_solution(solved, [*values, *(unknowns + turned)[0::3].tolist(), *slides])
-        return IteratedPose(status, 0.0, values)
+        return IteratedPose(status, 0.0, values, solved)
 
     def _closed_early(self, solved: LinkState) -> IteratedPose | None:
         """Append a solution within the tolerance; None if the first steps do not contract."""
@@ -438,14 +439,14 @@ class Iteration:
 
     def _straight_solution(self, solved: LinkState) -> list[Any]:
         """Return the unknowns, the angles with their turns, and the slides."""
-        pose, values = self._close_straight(solved)
-        if pose.status is not Status.CLOSED:
+        status, values = self._close_straight(solved)
+        if status is not Status.CLOSED:
             raise UndecidedError
         return values
 
-    def conditioning(self, pose: IteratedPose, solved: LinkState) -> float:
+    def conditioning(self, pose: IteratedPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _reciprocal_condition(self._evaluate_lists(solved, pose.unknowns)[1])
+        return _reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -608,7 +609,7 @@ class Iteration:
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
         gap = float(np.abs(errors).max())
-        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist())
+        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), solved)
 
 
 def _greatest_magnitude(values: Sequence[float]) -> float:

@@ -44,7 +44,7 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
             angle = min(angle, of_dyad := step.transmission_angle(pose))
             found = sqrt(2.0) * sin(0.5 * of_dyad)
         elif hasattr(step, 'conditioning'):
-            found = step.conditioning(pose, position.state)
+            found = step.conditioning(pose)
         else:
             continue
         if weakest < 0 or found < conditioning:
