@@ -63,6 +63,7 @@ from linkage_ros.kinematics.dyads.rrr import (
     RRRDyad as RRRDyad,
     RRRPose as RRRPose,
 )
+from linkage_ros.kinematics.elimination import Elimination as Elimination
 from linkage_ros.kinematics.equations import (
     BodyDirection as BodyDirection,
     CoincidentPoints as CoincidentPoints,

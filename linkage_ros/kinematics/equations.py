@@ -103,13 +103,13 @@ def evaluate_constraints(
             errors += [apart.real, apart.imag]
             across, along = [0.0] * n, [0.0] * n
             if constraint.one.body >= 0:
-                k = 3 * constraint.one.body
-                across[k : k + 3] = -turn.imag, 1.0, 0.0
-                along[k : k + 3] = turn.real, 0.0, 1.0
+                k, end = 3 * constraint.one.body, 3 * constraint.one.body + 3
+                across[k:end] = -turn.imag, 1.0, 0.0
+                along[k:end] = turn.real, 0.0, 1.0
             if constraint.other.body >= 0:
-                k = 3 * constraint.other.body
-                across[k : k + 3] = back.imag, -1.0, 0.0
-                along[k : k + 3] = -back.real, 0.0, -1.0
+                k, end = 3 * constraint.other.body, 3 * constraint.other.body + 3
+                across[k:end] = back.imag, -1.0, 0.0
+                along[k:end] = -back.real, 0.0, -1.0
             rows += [across, along]
         elif isinstance(constraint, Parallel):
             turned = x[constraint.turn] if constraint.turn else 0.0

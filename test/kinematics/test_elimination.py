@@ -11,9 +11,8 @@
 from collections.abc import Sequence
 import random
 
-from linkage_ros.kinematics import Closure, StartTable
+from linkage_ros.kinematics import Closure, Elimination, StartTable
 from linkage_ros.kinematics.compiling import compile_line, count_uses
-from linkage_ros.kinematics.elimination import Elimination
 from mpmath import lu_solve, matrix, mp, mpf, svd_r
 import pytest
 
@@ -80,8 +79,8 @@ def test_its_line_of_code_has_the_same_bits_for_all_numbers(size):
     rng = random.Random(size)
 
     def solve(*numbers: float) -> list[float]:
-        rows = [list(numbers[i * size :][:size]) for i in range(size)]
-        return Elimination(rows, []).solve(numbers[size * size :])
+        *rows, right = map(list, zip(*[iter(numbers)] * size, strict=True))
+        return Elimination(rows, []).solve(right)
 
     def draw() -> list[float]:
         return [rng.gauss(0.0, 1.0) for _ in range(size * size + size)]
