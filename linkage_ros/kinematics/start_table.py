@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 _DIGITS = 24
 """Binary digits of the numbers of a row, relative to the largest change in it."""
 
+_INPUT_DIGITS = 38
+"""The same for the inputs at the ends of rows, relative to the length of a row."""
+
 _DEEPEST = 12
 """How often a cell of the branch is halved at most."""
 
@@ -126,17 +129,31 @@ def _fit_rows(
     if len(known) == len(solutions) and length:
         values = np.array(known)
         size = float(np.abs(values - values[0]).max())
-        unit = ldexp(1.0, frexp(size or 1.0)[1] - _DIGITS)
-        cubics = np.round(np.linalg.solve(np.vander(_THIRDS, increasing=True), values) / unit)
-        cubics *= unit
+        cubics = np.linalg.solve(np.vander(_THIRDS, increasing=True), values)
+        cubics = _round_binary(cubics, size or 1.0, _DIGITS)
         if all(converges(input_at(part), np.power(part, range(4)) @ cubics) for part in _TRIED):
-            farthest = min(2.0**-10, 0.1 * size) if size else 2.0**-10
-            head = (begin, 1.0 / length, float(bool(folds)), farthest)
+            farthest = min(2.0**-10, ldexp(1.0, frexp(size or 1.0)[1] - 4))
+            start = _round_binary(begin, length, _INPUT_DIGITS) if folds else begin
+            head = (
+                start,
+                _round_binary(1.0 / length, 1.0 / length, _DIGITS),
+                float(bool(folds)),
+                farthest,
+            )
             yield high, (*head, *cubics.T.ravel().tolist())
             return
     if depth == _DEEPEST or not length:
         yield high, (begin, 0.0, 0.0, 0.0)
         return
-    middle = input_at(0.5)
+    middle = _round_binary(input_at(0.5), length, _INPUT_DIGITS)
     for part in (StartRow(low, middle, min(folds, 0.0)), StartRow(middle, high, max(folds, 0.0))):
         yield from _fit_rows(part, solution_at, converges, depth + 1)
+
+
+def _round_binary(values: Any, size: float, digits: int) -> Any:
+    """Return numbers with as many binary digits as one of a size has."""
+    import numpy as np  # local import: as above
+
+    unit = ldexp(1.0, frexp(size)[1] - digits)
+    rounded = np.round(values / unit) * unit
+    return rounded if rounded.ndim else float(rounded)
