@@ -17,6 +17,7 @@ import subprocess
 import pytest
 
 from .conftest import Run
+from ..support.scenes import iterated_with_two_inputs
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
@@ -78,18 +79,7 @@ def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: 
 def test_links_iterated_with_two_inputs_are_named_with_their_line(
     linkage: Run, tmp_path: Path
 ) -> None:
-    text = (LINKAGES / 'class_3.yaml').read_text('utf-8')
-    for old, new in {
-        'O2: [0.180, 0.020]': 'O4: [0.170, 0.020]',
-        '  crank_arm:': '  second: {O4: [0, 0], O2: [0.010, 0]}\n  crank_arm:',
-        'input: {joint: crank_joint, parent: ground, child: crank}': 'input:\n'
-        '  - {joint: crank_joint, parent: ground, child: crank}\n'
-        '  - {joint: second_joint, parent: ground, child: second}',
-        'inputs: [0.0]': 'inputs: [0.0, 0.0]',
-    }.items():  # fmt: skip
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / 'two.yaml').write_text(text, 'utf-8')
+    (tmp_path / 'two.yaml').write_text(iterated_with_two_inputs(), 'utf-8')
     said = refused(linkage, 'two.yaml', '-o', 'a.c')
     assert said.startswith('two.yaml:10: links: some are iterated with several inputs')
     assert not (tmp_path / 'a.c').exists()
