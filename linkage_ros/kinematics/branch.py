@@ -42,7 +42,6 @@ from linkage_ros.kinematics.equations import (
     Array,
     bound_jacobian_change,
     Constraint,
-    differentiate_constraints,
     evaluate_constraints,
     is_meshed,
 )
@@ -155,6 +154,8 @@ class Continuation:
     # Functions that give the state of the links solved before.
     known_at: KnownAt
     rates_at: RatesAt
+    # Returns the residuals, and their derivatives by the unknowns and the input.
+    evaluate: Callable[[list[float], LinkState, LinkState], tuple[Array, Array]]
 
     def first_node(self, unknowns: Array, x: float) -> BranchNode | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
@@ -367,13 +368,7 @@ class Continuation:
     def _evaluate_constraints(
         self, place: Array, solved: LinkState, velocities: LinkState
     ) -> tuple[Array, Array]:
-        unknowns = place[:-1].tolist()
-        errors, jacobian = evaluate_constraints(self.constraints, unknowns, solved)
-        still = [0.0] * len(unknowns)
-        drift = differentiate_constraints(
-            self.constraints, unknowns, solved, velocities, still, None, still
-        )
-        return np.array(errors), np.column_stack([jacobian, drift])
+        return self.evaluate(place[:-1].tolist(), solved, velocities)
 
 
 def _state_distances(one: LinkState, other: LinkState) -> tuple[list[float], list[float]]:

@@ -24,10 +24,12 @@ from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, sqrt
 
+_NUMBERS = (float, complex, int)
+
 
 def is_zero(number: Any) -> bool:
     """Return whether a number is the constant 0; a symbol is not."""
-    return isinstance(number, int | float | complex) and number == 0
+    return isinstance(number, _NUMBERS) and number == 0
 
 
 def multiply(one: Any, other: Any) -> Any:

@@ -47,6 +47,7 @@ from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
     Constraints,
+    differentiate_constraints,
     evaluate_constraints,
     line_motion,
     OnLine,
@@ -111,8 +112,8 @@ class Iteration:
 
     __slots__ = (
         '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
-        '_rates_line', '_slides', '_sliding', '_solution_line', '_start', '_system_line', '_table',
-        'branch', 'inputs', 'solution', 'tolerance',
+        '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
+        '_system_line', '_table', 'branch', 'inputs', 'solution', 'tolerance',
     )  # fmt: skip
 
     def __init__(
@@ -135,6 +136,7 @@ class Iteration:
         self._start = np.array(start)
         self._equations = GroupEquations(constraints, len(start) // 3)
         self._system_line = StraightLine(self._list_system, lambda: None)
+        self._moving_line = StraightLine(self._list_moving, lambda: None)
         self._known_sizes = len(known.coordinates), len(known.pins)
         examples = keep_results(self._trace_examples)
 
@@ -367,6 +369,7 @@ class Iteration:
                 self._constraints,
                 lambda x: self._known_at((x,)),
                 lambda x: self._moving_at((x,)),
+                self._evaluate_moving,
             ),
             solution,
             self.inputs[0],
@@ -502,6 +505,25 @@ class Iteration:
         errors, rows = evaluate_constraints(self._constraints, pose.coordinates, solved)
         return [*errors, *(slope for row in rows for slope in row)]
 
+    def _evaluate_moving(
+        self, unknowns: list[float], solved: LinkState, velocities: LinkState
+    ) -> tuple[Array, Array]:
+        """Return the residuals, and their derivatives by the unknowns and by time."""
+        numbers = self._moving_line(LinkState(unknowns, []), solved, velocities) or []
+        n = len(unknowns)
+        return np.array(numbers[:n]), np.array(numbers[n:]).reshape(n, n + 1)
+
+    def _list_moving(
+        self, pose: LinkState, solved: LinkState, velocities: LinkState
+    ) -> list[float]:
+        unknowns = pose.coordinates
+        errors, rows = evaluate_constraints(self._constraints, unknowns, solved)
+        still = [0.0] * len(unknowns)
+        drift = differentiate_constraints(
+            self._constraints, unknowns, solved, velocities, still, None, still
+        )
+        return [*errors, *(x for row, d in zip(rows, drift, strict=True) for x in (*row, d))]
+
     def _known_part(self, state: LinkState) -> LinkState:
         """Return what a state has of the links before this step."""
         coordinates, pins = self._known_sizes
@@ -553,6 +575,7 @@ class Iteration:
             self._constraints,
             lambda x: self._known_at(inputs_at(x)),
             lambda x: self._moving_at(inputs_at(x), rates),
+            self._evaluate_moving,
         )
         node = continuation.first_node(solution, 0.0)
         if node is None:
