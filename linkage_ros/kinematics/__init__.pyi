@@ -63,6 +63,7 @@ from linkage_ros.kinematics.dyads.rrr import (
     RRRDyad as RRRDyad,
     RRRPose as RRRPose,
 )
+from linkage_ros.kinematics.elimination import Elimination as Elimination
 from linkage_ros.kinematics.equations import (
     BodyDirection as BodyDirection,
     CoincidentPoints as CoincidentPoints,
@@ -155,6 +156,7 @@ from linkage_ros.kinematics.sides import (
 )
 from linkage_ros.kinematics.singularity_margin import signed_distance as signed_distance
 from linkage_ros.kinematics.solved_links import Angle as Angle, SolvedLinks as SolvedLinks
+from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
     FixedPoint as FixedPoint,

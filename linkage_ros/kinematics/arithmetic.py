@@ -33,6 +33,10 @@ ROUNDING = 16.0 * UNIT_ROUNDOFF
 """Bound of the error of a reach, relative to the size of its terms."""
 
 
+class UndecidedError(Exception):
+    """Symbols do not say how the links lie: only numbers do."""
+
+
 def sin(angle: float) -> float:
     """Return the sine of an angle, in [rad]."""
     try:

@@ -33,19 +33,20 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import floor, inf, nextafter, remainder, sqrt, tau
+from math import inf, nextafter, remainder, sqrt, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import UndecidedError, UNIT_ROUNDOFF
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.equations import (
     Array,
     bound_jacobian_change,
     Constraint,
-    differentiate_constraints,
     evaluate_constraints,
     is_meshed,
 )
+from linkage_ros.kinematics.start_table import StartRow
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 import numpy as np
 
@@ -153,6 +154,8 @@ class Continuation:
     # Functions that give the state of the links solved before.
     known_at: KnownAt
     rates_at: RatesAt
+    # Returns the residuals, and their derivatives by the unknowns and the input.
+    evaluate: Callable[[list[float], LinkState, LinkState], tuple[Array, Array]]
 
     def first_node(self, unknowns: Array, x: float) -> BranchNode | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
@@ -365,13 +368,7 @@ class Continuation:
     def _evaluate_constraints(
         self, place: Array, solved: LinkState, velocities: LinkState
     ) -> tuple[Array, Array]:
-        unknowns = place[:-1].tolist()
-        errors, jacobian = evaluate_constraints(self.constraints, unknowns, solved)
-        still = [0.0] * len(unknowns)
-        drift = differentiate_constraints(
-            self.constraints, unknowns, solved, velocities, still, None, still
-        )
-        return np.array(errors), np.column_stack([jacobian, drift])
+        return self.evaluate(place[:-1].tolist(), solved, velocities)
 
 
 def _state_distances(one: LinkState, other: LinkState) -> tuple[list[float], list[float]]:
@@ -427,6 +424,11 @@ class Start(NamedTuple):
     is_end: bool  # Whether this is the end of the branch, within the last few floats: a toggle
 
 
+def _last_floats(end: float) -> float:
+    """Return how far from the end of a branch its toggle reaches."""
+    return _LAST_FLOATS * max(1.0, abs(end))
+
+
 class _BranchSide:
     """
     Branch continuation in one direction from the pose, extended on demand.
@@ -478,16 +480,12 @@ class Branch:
 
     def find_start(self, x: float) -> Start | None:
         """Return the start of Newton's method at an input; None outside the branch."""
-        turned = 0.0
         low, high, _, turns = self.interval
         if not self._sides:
             return None
+        turned, x = self.unwrap(x)
         if turns:
-            period = turns * tau
-            turned = floor((x - low) / period)
-            x = min(max(x - turned * period, low), high)
-        elif self._turning and not low <= x <= high and self.interval.period_turns:
-            x -= tau * round((x - 0.5 * (low + high)) / tau)
+            x = min(max(x, low), high)
         side = self._sides[int(x >= self._x)]
         if side.sign * x > self._reach_of(side):
             with BUILD_LOCK:
@@ -503,10 +501,61 @@ class Branch:
             # Next to a toggle of the links before, the cells become too small to continue.
             return Start(side.node.place[:-1], _NEXT_TO_END, gained, False)
         cell = side.cells[number]
-        if cell.folds and abs(x - cell.end.place[-1]) <= _LAST_FLOATS * max(1.0, abs(x)):
+        if cell.folds and abs(x - cell.end.place[-1]) <= _last_floats(cell.end.place[-1]):
             return Start(cell.end.place[:-1], inf, gained, True)
         size = float(np.abs(cell.end.place - cell.begin.place).max())
         return Start(cell.point_at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
+
+    @property
+    def gained_angles(self) -> list[float]:
+        """Return the change of the unknowns' angles before the branch starts again, in [rad]."""
+        gained: list[float] = self._gained[0::3].tolist()
+        return gained
+
+    def unwrap(self, x: float) -> tuple[int, float]:
+        """Return how often the branch has started again, and the input without these turns."""
+        if not (self._turning and self.interval.period_turns):
+            return 0, x
+        period = tau * self.interval.period_turns
+        turned = round((x - 0.5 * (self.interval.low + self.interval.high)) / period)
+        return turned, x - turned * period
+
+    def status_at(self, x: float) -> Status:
+        """
+        Return how the links are at an unwrapped input: closed, open, or at a toggle.
+
+        UndecidedError is raised where the branch was not followed.
+        """
+        low, high, limited, turns = self.interval
+        if turns:
+            return Status.CLOSED
+        for side, end, is_limited in zip(self._sides, (low, high), limited, strict=True):
+            if x < low if side.sign < 0.0 else x > high:
+                if not is_limited:
+                    raise UndecidedError
+                return Status.OPEN
+            if side.cells and side.cells[-1].folds and abs(x - end) <= _last_floats(end):
+                return Status.TOGGLE
+        return Status.CLOSED
+
+    def pieces(self) -> list[StartRow]:
+        """Return the pieces of the branch between the nodes, in ascending order."""
+        if not self._sides:
+            return []
+        back, ahead = self._sides
+        inputs = [-x for x in reversed(back.inputs)] + [self._x] + ahead.inputs
+        # What is not an end of the branch may lie at a rounded input.
+        ends = [
+            round(x * 2.0**24) / 2.0**24
+            if 0 < k < len(inputs) - 1
+            and inputs[k + 1] - x > 2.0**-20
+            and x - inputs[k - 1] > 2.0**-20
+            else x
+            for k, x in enumerate(inputs)
+        ]
+        folds = [-float(cell.folds) for cell in reversed(back.cells)]
+        folds += [float(cell.folds) for cell in ahead.cells]
+        return list(map(StartRow, ends, ends[1:], folds))
 
     def nearest_end(self, x: float) -> Array | None:
         """Return the unknowns at the end of the branch that an input lies behind."""

@@ -22,6 +22,7 @@ from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import make_vector, remainder, unit_vector
+from linkage_ros.kinematics.elimination import add, multiply, subtract
 from linkage_ros.kinematics.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.step import LinkState
@@ -97,19 +98,18 @@ def evaluate_constraints(
     x = solved.coordinates
     for constraint in constraints:
         if isinstance(constraint, CoincidentPoints):
-            (one, turn), (other, back) = (_point_and_arm(e, unknowns, solved) for e in constraint)
-            errors += [one.real - other.real, one.imag - other.imag]
+            (one, turn), (other, back) = (point_and_arm(e, unknowns, solved) for e in constraint)
+            apart = one - other
+            errors += [apart.real, apart.imag]
             across, along = [0.0] * n, [0.0] * n
-            for end, arm, sign in (
-                (constraint.one, turn, 1.0),
-                (constraint.other, back, -1.0),
-            ):
-                if end.body >= 0:
-                    k = 3 * end.body
-                    across[k] -= sign * arm.imag
-                    across[k + 1] += sign
-                    along[k] += sign * arm.real
-                    along[k + 2] += sign
+            if constraint.one.body >= 0:
+                k, end = 3 * constraint.one.body, 3 * constraint.one.body + 3
+                across[k:end] = -turn.imag, 1.0, 0.0
+                along[k:end] = turn.real, 0.0, 1.0
+            if constraint.other.body >= 0:
+                k, end = 3 * constraint.other.body, 3 * constraint.other.body + 3
+                across[k:end] = back.imag, -1.0, 0.0
+                along[k:end] = -back.real, 0.0, -1.0
             rows += [across, along]
         elif isinstance(constraint, Parallel):
             turned = x[constraint.turn] if constraint.turn else 0.0
@@ -179,7 +179,7 @@ def bound_jacobian_change(
             for end in constraint:
                 if end.body >= 0:
                     k = 3 * end.body
-                    turn, arm = ways[k], _point_and_arm(end, values, solved)[1]
+                    turn, arm = ways[k], point_and_arm(end, values, solved)[1]
                     # |d(r·sin)| ≤ |r·cos|·|dφ| + |r|·dφ²/2, and likewise for the cosine.
                     curved = 0.5 * abs(end.arm) * turn * turn
                     across[k] += abs(arm.real) * turn + curved
@@ -252,7 +252,8 @@ def differentiate_constraints(
                 )[order]
                 for e in constraint
             )
-            derivatives += [one.real - other.real, one.imag - other.imag]
+            apart = subtract(one, other)
+            derivatives += [apart.real, apart.imag]
         elif isinstance(constraint, Parallel):
             state = solved_velocities if solved_accelerations is None else solved_accelerations
             values = rates if solved_accelerations is None else accelerations
@@ -303,20 +304,25 @@ def _direction_rate(of: BodyDirection, values: Sequence[float], state: LinkState
     return values[3 * of.body] if of.body >= 0 else state.coordinates[of.coordinate]
 
 
-def _point_and_arm(
+def end_arm(end: End, unknowns: Sequence[float]) -> complex:
+    """Return the arm of an end on a body, in the frame of the ground."""
+    return end.arm * unit_vector(unknowns[3 * end.body]) if end.arm else 0j
+
+
+def point_and_arm(
     end: End, unknowns: Sequence[float], solved: LinkState
 ) -> tuple[complex, complex]:
     """Return a point, and its arm in the frame of the ground."""
     if end.body < 0:
         return solved.pins[end.pin], 0j
     k = 3 * end.body
-    arm = end.arm * unit_vector(unknowns[k])
-    return make_vector(unknowns[k + 1], unknowns[k + 2]) + arm, arm
+    arm = end_arm(end, unknowns)
+    return add(make_vector(unknowns[k + 1], unknowns[k + 2]), arm), arm
 
 
 def point_in_line_frame(line: OnLine, solved: LinkState, unknowns: Any) -> complex:
     """Return a point in the frame of its line."""
-    point, through = (_point_and_arm(e, unknowns, solved)[0] for e in (line.point, line.through))
+    point, through = (point_and_arm(e, unknowns, solved)[0] for e in (line.point, line.through))
     return (point - through) * unit_vector(
         -_direction_angle(line.line, unknowns, solved.coordinates)
     )
@@ -332,7 +338,7 @@ def _line_slopes(
     for end, sign in ((line.point, 1.0), (line.through, -1.0)):
         if end.body >= 0:
             k = 3 * end.body
-            arm = _point_and_arm(end, unknowns, solved)[1]
+            arm = point_and_arm(end, unknowns, solved)[1]
             for column, slope in ((k, 1j * arm), (k + 1, 1.0 + 0j), (k + 2, 1j)):
                 columns[column] = columns.get(column, 0j) + sign * slope * back
     if line.line.body >= 0:
@@ -355,11 +361,16 @@ def _point_motion(
         pull = solved_accelerations.pins[end.pin] if solved_accelerations is not None else 0j
         return solved.pins[end.pin], solved_velocities.pins[end.pin], pull
     k = 3 * end.body
-    place, arm = _point_and_arm(end, unknowns, solved)
+    place, arm = point_and_arm(end, unknowns, solved)
     turn = rates[k]
-    velocity = make_vector(rates[k + 1], rates[k + 2]) + make_vector(0.0, turn) * arm
+    velocity = make_vector(rates[k + 1], rates[k + 2])
     pull = make_vector(accelerations[k + 1], accelerations[k + 2])
-    return place, velocity, pull + make_vector(-turn * turn, accelerations[k]) * arm
+    # Where the links stand still, or the point is that of the link, nothing is to be computed.
+    return (
+        place,
+        add(velocity, multiply(make_vector(0.0, turn), arm)),
+        add(pull, multiply(make_vector(-turn * turn, accelerations[k]), arm)),
+    )
 
 
 def line_motion(

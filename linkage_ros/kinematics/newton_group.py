@@ -17,24 +17,32 @@ solve the same matrix for the derivatives of the constraints.
 The assembly is the one that continuity from the given pose leads to. With a single input it is a
 `Branch`, which is followed once, so that a state depends only on its input and not on where the
 linkage was before: the method starts from the curve of the branch, and a solution farther from
-there than the curve allows is rejected. With several inputs, the straight line from the inputs of
+there than the curve allows is rejected. Two steps from a table of that curve end within the
+rounding; they are a straight line without a library, which a tape records. Only next to a toggle
+numpy iterates, until no step is shorter. With several inputs, the straight line from the inputs of
 the pose is followed again for each state, with the same proof that no other assembly is met.
 """
 
 from __future__ import annotations
 
-from cmath import phase, rect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
-from math import hypot, inf, isnan, nan
+from math import hypot, inf, isnan, nan, prod
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.arithmetic import call, has_result, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import (
+    call,
+    has_result,
+    make_vector,
+    SMALLEST,
+    UndecidedError,
+    UNIT_ROUNDOFF,
+)
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling import compile_function
+from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
@@ -45,9 +53,13 @@ from linkage_ros.kinematics.equations import (
     OnLine,
     point_in_line_frame,
 )
+from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.rough_pose import guess_unknowns
+from linkage_ros.kinematics.start_table import make_start_table, StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
 import numpy as np
 
 if TYPE_CHECKING:
@@ -65,6 +77,13 @@ _AROUND = 64.0
 _MOVED = 1e-6
 """In lengths: a smaller closure error is not reported."""
 
+_LAST_STEP = 2.0**-28
+"""
+Sum of the last changes by Newton's method, in [rad] and lengths: the next is below the rounding.
+
+Near a toggle the method converges more slowly by the same factor by which the rounding is greater.
+"""
+
 _EARLY_STEPS = 8
 _EARLY_SINGULAR = 1e-6
 """Steps that end at a tolerance, and the conditioning below which full accuracy is needed."""
@@ -77,7 +96,7 @@ class IteratedPose(NamedTuple):
     status: Status
     gap: float
     unknowns: list[float]  # For each body its angle and the place of its point
-    jacobian: Array  # Derivatives of the constraints by the unknowns
+    solved: LinkState  # The state that they were appended to
 
 
 class Iteration:
@@ -87,12 +106,15 @@ class Iteration:
     There are as many constraints as unknowns. The values of ``slides`` are appended to the
     coordinates. ``inputs`` are the inputs of the pose, as coordinates, and ``sliding`` says for
     each whether it is a slide. ``start`` has the approximate angle and place of each body at the
-    pose, one after the other. ``before`` are the steps before this one. No slide needs to be
-    longer than ``far`` to stretch a link.
+    pose, one after the other. ``before`` are the steps before this one, and ``known`` is their
+    state at the pose. No slide needs to be longer than ``far`` to stretch a link.
     """
 
-    __slots__ = ('_before', '_constraints', '_far', '_slides', '_sliding', '_start', '_straight',
-                 'branch', 'inputs', 'solution', 'tolerance')  # fmt: skip
+    __slots__ = (
+        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
+        '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
+        '_system_line', '_table', 'branch', 'inputs', 'solution', 'tolerance',
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -103,6 +125,7 @@ class Iteration:
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
         far: float,
+        known: LinkState,
     ) -> None:
         self._constraints = constraints
         self._slides = slides
@@ -111,7 +134,24 @@ class Iteration:
         self._sliding = sliding
         self._far = far
         self._start = np.array(start)
-        self._straight: _CompiledSystem | None = None
+        self._equations = GroupEquations(constraints, len(start) // 3)
+        self._system_line = StraightLine(self._list_system, lambda: None)
+        self._moving_line = StraightLine(self._list_moving, lambda: None)
+        self._known_sizes = len(known.coordinates), len(known.pins)
+        examples = keep_results(self._trace_examples)
+
+        def examples_of(*names: str) -> Callable[[], Sequence[LinkState] | None]:
+            return lambda: [found[name] for name in names] if (found := examples()) else None
+
+        self._solution_line = StraightLine(self._straight_solution, examples_of('known'))
+        self._rates_line = StraightLine(
+            self._straight_rates, examples_of('pose', 'known', 'velocities')
+        )
+        self._accelerations_line = StraightLine(
+            self._straight_accelerations,
+            examples_of('pose', 'rates', 'known', 'velocities', 'accelerations'),
+        )
+        self._table = keep_results(self._make_table)
         # Returns the branch of a single input; None if the pose leads to no solution.
         self.branch = keep_results(self._follow_branch)
         # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
@@ -131,42 +171,151 @@ class Iteration:
         stopped.tolerance = tolerance
         return stopped
 
-    def close(self, solved_state: LinkState) -> IteratedPose:
+    def close(self, solved: LinkState) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        early = self._closed_early(solved_state) if self.tolerance else None
+        early = self._closed_early(solved) if self.tolerance else None
         if early is not None:
             return early
-        solved = call(
-            self._closed_at,
-            len(solved_state.coordinates),
-            *solved_state.coordinates,
-            *solved_state.pins,
+        status, values = (
+            self._close_straight(solved)
+            if has_symbols(solved)
+            else (Status.CLOSED, self._solution_line(solved))
         )
-        if not has_result(solved):
-            return self._not_closed(solved_state)
-        n, bodies = self.equation_count, self.equation_count // 3
-        unknowns = [solved[i] for i in range(n)]
-        self._append_solution(solved_state, unknowns, [solved[n + i] for i in range(bodies)])
-        return IteratedPose(Status.CLOSED, 0.0, unknowns, solved[n + bodies])
+        if values is None:
+            return self._close_slowly(solved)
+        self._append_solution(solved, values)
+        return IteratedPose(status, 0.0, values[: self.equation_count], solved)
 
-    def _closed_at(self, count: int, *numbers: Any) -> tuple[Any, ...] | None:
+    def _close_straight(self, solved: LinkState) -> tuple[Status, list[Any]]:
         """
-        Return a closed solution: unknowns, angles with their turns, and the Jacobian.
+        Return the status, and unknowns, angles with their turns and slides, as straight lines.
 
-        The numbers are ``count`` known coordinates, then the known pins.
+        All decisions are by symbols. Where they leave it open how the links lie,
+        `UndecidedError` is raised.
         """
-        solved = LinkState(list(numbers[:count]), list(numbers[count:]))
+        equations, inputs = self._equations, self._inputs_of(solved)
+        turns, gained = 0, [0.0] * (self.equation_count // 3)
+        if len(inputs) > 1:
+            found = call(self._start_on_a_line, *inputs)
+            if not has_result(found):
+                raise UndecidedError
+            count = len(equations.free)
+            values, farthest = [found[k] for k in range(count)], found[count]
+        else:
+            branch, table = self.branch(), self._table()
+            if branch is None or table is None:
+                raise UndecidedError
+            turns, x = branch.unwrap(inputs[0])
+            gained = branch.gained_angles
+            status = branch.status_at(x)
+            if status is not Status.CLOSED:
+                return status, []
+            values, farthest = table.find_start(x)
+        for last in (False, True):
+            unknowns = equations.place_bodies(values, solved)
+            step, divisors = equations.correct(unknowns, solved)
+            length = sum(map(abs, step[1:]), abs(step[0]))
+            regular = abs(prod(divisors[1:], start=divisors[0])) if divisors else 1.0
+            if not regular > SMALLEST or not length <= (_LAST_STEP if last else farthest):
+                raise UndecidedError
+            values = [value - change for value, change in zip(values, step, strict=True)]
+        unknowns = equations.place_bodies(values, solved)
+        angles = [
+            angle + turns * more if more else angle
+            for angle, more in zip(unknowns[0::3], gained, strict=True)
+        ]
+        slides = [point_in_line_frame(slide, solved, unknowns).real for slide in self._slides]
+        return Status.CLOSED, [*unknowns, *angles, *slides]
+
+    def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
+        """Return where Newton's method starts with several inputs, and how far it may lead."""
+        start, known = self._along_a_line(inputs), self._known_at(inputs)
+        if start is None or known is None:
+            return None
+        jacobian = self._evaluate_system(known, start.unknowns)[1]
+        if _reciprocal_condition(jacobian) <= _SINGULAR:
+            return None
+        values = start.unknowns.tolist()
+        return (*(values[k] for k in self._equations.free), start.farthest)
+
+    def _trace_examples(self) -> dict[str, LinkState]:
+        """Return the states at the pose as symbols; nothing if it is at a toggle."""
+        tape, n, inputs = Tape(), self.equation_count, self.inputs
+        states: list[Any] = [
+            [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(inputs))]
+            for name in 'qwa'
+        ]
+        known, velocities, accelerations = (LinkState(state, []) for state in states)
+        try:
+            for step in self._before:
+                closed = step.close(known)
+                if not closed.status.has_rates:
+                    return {}
+                found = step.rates(closed, known, velocities)
+                step.accelerations(closed, found, known, velocities, accelerations)
+            pose = LinkState(self._straight_solution(known)[:n], [])
+            rates = LinkState(self._straight_rates(pose, known, velocities)[:n], [])
+        except UndecidedError:
+            return {}
+        return {
+            'known': known,
+            'velocities': velocities,
+            'accelerations': accelerations,
+            'pose': pose,
+            'rates': rates,
+        }
+
+    def _make_table(self) -> StartTable | None:
+        """Return the table of starts of a single input; None if there is no branch."""
+        branch = self.branch()
+        if branch is None:
+            return None
+        free = list(self._equations.free)
+
+        def solution_at(x: float) -> Array | None:
+            start = branch.find_start(x)
+            found = start.unknowns if start is not None and start.is_end else self.solution_at(x)
+            return None if found is None else found[free]
+
+        def converges(x: float, values: Array) -> bool:
+            known = self._known_at((x,))
+            if known is None:
+                return False
+            unknowns = np.array(self._equations.place_bodies(values.tolist(), known))
+            length = inf
+            for _ in range(2):
+                errors, jacobian = self._evaluate_system(known, unknowns)
+                try:
+                    step = np.linalg.solve(jacobian, errors)
+                except np.linalg.LinAlgError:
+                    return False
+                unknowns, length = unknowns - step, float(np.abs(step[free]).sum())
+            return length <= _LAST_STEP / 16.0
+
+        return make_start_table(branch.pieces(), solution_at, converges)
+
+    def _close_slowly(self, solved: LinkState) -> IteratedPose:
+        """Close the links where straight lines do not, as near a toggle."""
         inputs = self._inputs_of(solved)
         start = self._start_at(inputs)
         if start is None or start.is_end:
-            return None
+            return self._not_closed(solved)
         corrected = self._solve_newton(solved, start.unknowns, start.farthest)
         if corrected is None:
-            return None
+            return self._not_closed(solved)
         unknowns, jacobian = corrected
         if len(inputs) > 1 and _reciprocal_condition(jacobian) <= _SINGULAR:
-            return None
-        return (*unknowns.tolist(), *(unknowns + start.turned_angles)[0::3].tolist(), jacobian)
+            return self._not_closed(solved)
+        return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
+
+    def _pose_at(
+        self, status: Status, solved: LinkState, unknowns: Array, turned: Array
+    ) -> IteratedPose:
+        """Append a solution, and return its pose."""
+        values = unknowns.tolist()
+        slides = [point_in_line_frame(slide, solved, values).real for slide in self._slides]
+        self._append_solution(solved, [*values, *(unknowns + turned)[0::3].tolist(), *slides])
+        return IteratedPose(status, 0.0, values, solved)
 
     def _closed_early(self, solved: LinkState) -> IteratedPose | None:
         """Append a solution within the tolerance; None if the first steps do not contract."""
@@ -188,11 +337,7 @@ class Iteration:
             if length <= self.tolerance:
                 if _reciprocal_condition(jacobian) <= _EARLY_SINGULAR:
                     return None
-                values = unknowns.tolist()
-                self._append_solution(
-                    solved, values, (unknowns + start.turned_angles)[0::3].tolist()
-                )
-                return IteratedPose(Status.CLOSED, 0.0, values, jacobian)
+                return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
         return None
 
     def _not_closed(self, solved: LinkState) -> IteratedPose:
@@ -203,15 +348,13 @@ class Iteration:
             return self._nearest_open_pose(solved, inputs)
         if start.is_end:
             # The Jacobian is singular here, so Newton's method would come no nearer.
-            unknowns, jacobian = start.unknowns, self._evaluate_system(solved, start.unknowns)[1]
+            unknowns = start.unknowns
         else:
             corrected = self._solve_newton(solved, start.unknowns, start.farthest)
             if corrected is None:
                 return self._nearest_open_pose(solved, inputs)
-            unknowns, jacobian = corrected
-        values = unknowns.tolist()
-        self._append_solution(solved, values, (unknowns + start.turned_angles)[0::3].tolist())
-        return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
+            unknowns = corrected[0]
+        return self._pose_at(Status.TOGGLE, solved, unknowns, start.turned_angles)
 
     def _inputs_of(self, solved: LinkState) -> list[float]:
         end = 1 + len(self.inputs)
@@ -226,6 +369,7 @@ class Iteration:
                 self._constraints,
                 lambda x: self._known_at((x,)),
                 lambda x: self._moving_at((x,)),
+                self._evaluate_moving,
             ),
             solution,
             self.inputs[0],
@@ -240,41 +384,72 @@ class Iteration:
 
     def rates(self, pose: IteratedPose, solved: LinkState, velocities: LinkState) -> list[float]:
         """Append the rates of the coordinates and pins that `close` appended."""
-        still = [0.0] * len(pose.unknowns)
-        drift = differentiate_constraints(
-            self._constraints, pose.unknowns, solved, velocities, still, None, still
+        states = LinkState(pose.unknowns, []), solved, velocities
+        if has_symbols(*states):
+            found = self._straight_rates(*states)
+        else:
+            found = self._rates_line(states[0], *map(self._known_part, states[1:])) or []
+        self._append_rates(velocities, found)
+        return found[: self.equation_count]
+
+    def _straight_rates(
+        self, pose: LinkState, solved: LinkState, velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns and of the slides."""
+        unknowns = pose.coordinates
+        rates = self._equations.rates(unknowns, solved, velocities)
+        still = [0.0] * len(rates)
+        motions = (
+            line_motion(slide, unknowns, solved, velocities, rates, None, still)
+            for slide in self._slides
         )
-        rates = _cancel_drift(pose, drift)
-        self._append_rates(velocities, rates)
-        for slide in self._slides:
-            _, rate, _ = line_motion(slide, pose.unknowns, solved, velocities, rates, None, still)
-            velocities.coordinates.append(rate.real)
-        return rates
+        return [*rates, *(rate.real for _, rate, _ in motions)]
 
     def accelerations(
         self,
         pose: IteratedPose,
         rates: list[float],
-        solved_state: LinkState,
+        solved: LinkState,
         velocities: LinkState,
         accelerations: LinkState,
     ) -> None:
         """Append the accelerations of the coordinates and pins that `close` appended."""
-        still = [0.0] * len(rates)
-        drift = differentiate_constraints(
-            self._constraints, pose.unknowns, solved_state, velocities, rates, accelerations, still
+        states = (
+            LinkState(pose.unknowns, []), LinkState(rates, []), solved, velocities, accelerations
+        )  # fmt: skip
+        if has_symbols(*states):
+            found = self._straight_accelerations(*states)
+        else:
+            found = self._accelerations_line(*states[:2], *map(self._known_part, states[2:])) or []
+        self._append_rates(accelerations, found)
+
+    def _straight_accelerations(
+        self,
+        pose: LinkState,
+        pose_rates: LinkState,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns and of the slides."""
+        unknowns, rates = pose.coordinates, pose_rates.coordinates
+        found = self._equations.accelerations(unknowns, solved, velocities, rates, accelerations)
+        motions = (
+            line_motion(slide, unknowns, solved, velocities, rates, accelerations, found)
+            for slide in self._slides
         )
-        solved = _cancel_drift(pose, drift)
-        self._append_rates(accelerations, solved)
-        for slide in self._slides:
-            _, _, change = line_motion(
-                slide, pose.unknowns, solved_state, velocities, rates, accelerations, solved
-            )
-            accelerations.coordinates.append(change.real)
+        return [*found, *(change.real for _, _, change in motions)]
+
+    def _straight_solution(self, solved: LinkState) -> list[Any]:
+        """Return the unknowns, the angles with their turns, and the slides."""
+        status, values = self._close_straight(solved)
+        if status is not Status.CLOSED:
+            raise UndecidedError
+        return values
 
     def conditioning(self, pose: IteratedPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _reciprocal_condition(pose.jacobian)
+        return _reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -301,18 +476,18 @@ class Iteration:
         corrected = self._solve_newton(known, start.unknowns, start.farthest)
         return None if corrected is None else corrected[0]
 
-    def _append_solution(
-        self, solved: LinkState, unknowns: list[float], angles: list[float]
-    ) -> None:
-        """Append a solution; its angles include the turns made before."""
-        solved.coordinates.extend(angles)
-        solved.pins.extend(_body_places(unknowns))
-        for slide in self._slides:
-            solved.coordinates.append(point_in_line_frame(slide, solved, unknowns).real)
+    def _append_solution(self, solved: LinkState, values: Sequence[float]) -> None:
+        """Append a solution: unknowns, angles with the turns made before, and slides."""
+        n = self.equation_count
+        solved.coordinates.extend(values[n:])
+        solved.pins.extend(_body_places(values[:n]))
 
-    def _append_rates(self, state: LinkState, values: list[float]) -> None:
-        state.coordinates.extend(values[0::3])
-        state.pins.extend(_body_places(values))
+    def _append_rates(self, state: LinkState, values: Sequence[float]) -> None:
+        """Append the rates of the unknowns and of the slides, or their accelerations."""
+        n = self.equation_count
+        state.coordinates.extend(values[0:n:3])
+        state.coordinates.extend(values[n:])
+        state.pins.extend(_body_places(values[:n]))
 
     def _evaluate_system(self, solved: LinkState, unknowns: Array) -> tuple[Array, Array]:
         """Return the residuals, and their derivatives by the unknowns."""
@@ -321,13 +496,38 @@ class Iteration:
 
     def _evaluate_lists(
         self, solved: LinkState, unknowns: Sequence[float]
-    ) -> tuple[tuple[float, ...], Array]:
-        numbers = [*solved.coordinates, *solved.pins, *unknowns]
-        if self._straight is None:
-            self._straight = _CompiledSystem(
-                self._constraints, numbers, len(solved.coordinates), len(unknowns)
-            )
-        return self._straight.residuals_at(numbers)
+    ) -> tuple[list[float], Array]:
+        known, n = self._known_part(solved), len(unknowns)
+        numbers = self._system_line(known, LinkState([*unknowns], [])) or []
+        return numbers[:n], np.array(numbers[n:]).reshape(n, n)
+
+    def _list_system(self, solved: LinkState, pose: LinkState) -> list[float]:
+        errors, rows = evaluate_constraints(self._constraints, pose.coordinates, solved)
+        return [*errors, *(slope for row in rows for slope in row)]
+
+    def _evaluate_moving(
+        self, unknowns: list[float], solved: LinkState, velocities: LinkState
+    ) -> tuple[Array, Array]:
+        """Return the residuals, and their derivatives by the unknowns and by time."""
+        numbers = self._moving_line(LinkState(unknowns, []), solved, velocities) or []
+        n = len(unknowns)
+        return np.array(numbers[:n]), np.array(numbers[n:]).reshape(n, n + 1)
+
+    def _list_moving(
+        self, pose: LinkState, solved: LinkState, velocities: LinkState
+    ) -> list[float]:
+        unknowns = pose.coordinates
+        errors, rows = evaluate_constraints(self._constraints, unknowns, solved)
+        still = [0.0] * len(unknowns)
+        drift = differentiate_constraints(
+            self._constraints, unknowns, solved, velocities, still, None, still
+        )
+        return [*errors, *(x for row, d in zip(rows, drift, strict=True) for x in (*row, d))]
+
+    def _known_part(self, state: LinkState) -> LinkState:
+        """Return what a state has of the links before this step."""
+        coordinates, pins = self._known_sizes
+        return LinkState(state.coordinates[:coordinates], state.pins[:pins])
 
     def _known_at(self, inputs: Sequence[float]) -> LinkState | None:
         """Return the state of the links solved before this step, or None."""
@@ -375,6 +575,7 @@ class Iteration:
             self._constraints,
             lambda x: self._known_at(inputs_at(x)),
             lambda x: self._moving_at(inputs_at(x), rates),
+            self._evaluate_moving,
         )
         node = continuation.first_node(solution, 0.0)
         if node is None:
@@ -431,45 +632,7 @@ class Iteration:
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
         gap = float(np.abs(errors).max())
-        return IteratedPose(
-            Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), jacobian
-        )
-
-
-class _CompiledSystem:
-    """
-    The constraints and their derivatives as straight-line code.
-
-    Most derivatives are constants, such as 0 and 1; only the others are evaluated.
-
-    ``numbers`` are coordinates, pins and unknowns, in this order, at which the constraints can be
-    evaluated; ``coordinates`` and ``unknowns`` say how many there are.
-    """
-
-    def __init__(
-        self,
-        constraints: Sequence[Constraint],
-        numbers: Sequence[complex],
-        coordinates: int,
-        unknowns: int,
-    ) -> None:
-        def list_constants(*values: Any) -> list[float]:
-            state = LinkState(list(values[:coordinates]), list(values[coordinates:-unknowns]))
-            errors, rows = evaluate_constraints(constraints, values[-unknowns:], state)
-            return [*errors, *(slope for row in rows for slope in row)]
-
-        self._function = compile_function(list_constants, numbers)
-        self._count = unknowns
-        self._constants = np.array(self._function.results[unknowns:])
-        self._places = np.array([place - unknowns for place in self._function.places[unknowns:]])
-
-    def residuals_at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
-        """Return the residuals, all of which vary, and the Jacobian."""
-        n = self._count
-        varying = self._function.varying(*numbers)
-        jacobian = self._constants.copy()
-        jacobian[self._places] = varying[n:]
-        return varying[:n], jacobian.reshape(n, n)
+        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), solved)
 
 
 def _greatest_magnitude(values: Sequence[float]) -> float:
@@ -478,23 +641,12 @@ def _greatest_magnitude(values: Sequence[float]) -> float:
 
 
 def _body_places(values: Sequence[float]) -> list[complex]:
-    return [x + 1j * y for x, y in zip(values[1::3], values[2::3], strict=True)]
+    return list(map(make_vector, values[1::3], values[2::3]))
 
 
 def _reciprocal_condition(jacobian: Array) -> float:
     values = np.linalg.svd(jacobian, compute_uv=False)
     return float(values[-1] / values[0])
-
-
-def _cancel_drift(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
-    """Return the rates of the unknowns that cancel the drift of the constraints."""
-    rates = call(_solve_linear, pose.jacobian, *drift)
-    return [rates[i] for i in range(len(drift))]
-
-
-def _solve_linear(jacobian: Array, *drift: float) -> list[float]:
-    rates: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
-    return rates
 
 
 def make_iteration(
@@ -535,69 +687,12 @@ def make_iteration(
     places |= {name: pins[i] for name, i in constraints.known_pins.items()}
     angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
     angles |= {link: angle for link, angle in pose.angles.items() if link in links}
-    start = _initial_guess(linkage, links, planner, places, angles)
+    start = guess_unknowns(linkage, links, planner, places, angles)
     far = sum(
         max(abs(one - other) for one in points.values() for other in points.values())
         for points in planner.points.values()
     )
     slides = tuple(constraints.slides.values())
-    return Iteration(tuple(constraints.constraints), slides, inputs, start, before, sliding, far)
-
-
-def _initial_guess(
-    linkage: Linkage,
-    links: Sequence[str],
-    planner: SolvedLinks,
-    given: Mapping[str, complex],
-    angles: dict[str, float],
-) -> list[float]:
-    """Return angle and place of each link, fitted to the given places of points."""
-    points = planner.points
-
-    def by_slider(link: str) -> float | None:
-        """Return the angle of a link from its slider: by the other link or by the direction."""
-        for name, slider in linkage.sliders.items():
-            block, rail = planner.blocks[name], slider.along
-            ends = slider.through, slider.point
-            if link not in (block, rail):
-                continue
-            turn = slider.angle if link == block else 0.0
-            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
-                along = given[ends[1]] - given[ends[0]]
-                return phase(along / complex(*slider.direction)) + turn
-            if link == block:
-                return angle_of(rail) + turn
-            if block in angles:
-                return angles[block] - slider.angle
-        return None
-
-    def angle_of(link: str) -> float:
-        if link not in angles:
-            known = [name for name in points[link] if name in given]
-            apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
-            if apart:
-                there = given[apart[0]] - given[known[0]]
-                angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
-            else:
-                angle = by_slider(link)
-                if angle is None:
-                    raise DefinitionError(
-                        'pose.points',
-                        f'does not say where {link!r} lies',
-                        f'give two of its points: {list_names(points[link])}',
-                    )
-                angles[link] = angle
-        return angles[link]
-
-    start: list[float] = []
-    for link in links:
-        angle = angle_of(link)
-        known = next((name for name in points[link] if name in given), None)
-        if known is None:
-            raise DefinitionError(
-                'pose.points', f'does not say where {link!r} lies', 'give one of its points'
-            )
-        first = next(iter(points[link].values()))
-        place = given[known] + rect(1.0, angle) * (first - points[link][known])
-        start += (angle, place.real, place.imag)
-    return start
+    return Iteration(
+        tuple(constraints.constraints), slides, inputs, start, before, sliding, far, solved
+    )

@@ -17,6 +17,7 @@ import subprocess
 import pytest
 
 from .conftest import Run
+from ..support.scenes import iterated_with_two_inputs
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
@@ -75,11 +76,22 @@ def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: 
     assert linkage('compile', '4.yaml', '-o', 'a.py').returncode == 0
 
 
-def test_iterated_links_are_named_with_their_line(linkage: Run, tmp_path: Path) -> None:
-    shutil.copy(LINKAGES / 'class_3.yaml', tmp_path)
-    said = refused(linkage, 'class_3.yaml', '-o', 'a.c')
-    assert said.startswith('class_3.yaml:10: links: some are only solved by iteration')
+def test_links_iterated_with_two_inputs_are_named_with_their_line(
+    linkage: Run, tmp_path: Path
+) -> None:
+    (tmp_path / 'two.yaml').write_text(iterated_with_two_inputs(), 'utf-8')
+    said = refused(linkage, 'two.yaml', '-o', 'a.c')
+    assert said.startswith('two.yaml:10: links: some are iterated with several inputs')
     assert not (tmp_path / 'a.c').exists()
+
+
+@pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py'])
+def test_links_iterated_with_one_input_are_compiled(
+    linkage: Run, tmp_path: Path, ending: str
+) -> None:
+    shutil.copy(LINKAGES / 'class_3.yaml', tmp_path)
+    assert linkage('compile', 'class_3.yaml', '-o', f'a.{ending}').stdout == f'a.{ending}\n'
+    assert 'row' in (tmp_path / f'a.{ending}').read_text('utf-8')
 
 
 def test_a_linkage_that_closes_nowhere_is_told_to_say_where(linkage: Run, tmp_path: Path) -> None:

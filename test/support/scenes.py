@@ -136,3 +136,19 @@ def scene_of(text: str | bytes, linkage: str | bytes = FOUR_BAR) -> Scene:
 def pipeline_of(text: str | bytes, linkage: str | bytes = FOUR_BAR) -> Pipeline:
     """Return the pipeline of a scene of one linkage."""
     return Pipeline(scene_of(text, linkage))
+
+
+def iterated_with_two_inputs() -> str:
+    """Return a linkage file whose iterated links hang on two cranks: it cannot be compiled."""
+    text = (LINKAGES / 'class_3.yaml').read_text('utf-8')
+    for old, new in {
+        'O2: [0.180, 0.020]': 'O4: [0.170, 0.020]',
+        '  crank_arm:': '  second: {O4: [0, 0], O2: [0.010, 0]}\n  crank_arm:',
+        'input: {joint: crank_joint, parent: ground, child: crank}': 'input:\n'
+        '  - {joint: crank_joint, parent: ground, child: crank}\n'
+        '  - {joint: second_joint, parent: ground, child: second}',
+        'inputs: [0.0]': 'inputs: [0.0, 0.0]',
+    }.items():  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    return text

@@ -33,6 +33,8 @@ from linkage_ros.tools.view import (
 from PIL import Image
 import pytest
 
+from ..support.scenes import iterated_with_two_inputs
+
 NAMES = ('four_bar', 'slider_crank', 'five_bar')
 
 
@@ -126,8 +128,8 @@ def test_other_kinds_are_refused(kind: str, inputs: Any, line: str) -> None:
     assert str(refused.value).startswith(line)
 
 
-def test_a_linkage_that_is_iterated_has_no_source_and_the_error_says_so() -> None:
-    text = shipped_path('linkages/class_3.yaml').read_text('utf-8')
+def test_a_linkage_that_cannot_be_compiled_has_no_source_and_the_error_says_so() -> None:
+    text = iterated_with_two_inputs()
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
     answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))
     assert 'compile' in answer['error']['text']

@@ -28,9 +28,6 @@ import pytest
 
 needs_node = pytest.mark.skipif(shutil.which('node') is None, reason='needs node')
 NEAR = 1e-12
-ITERATED = {'class_3'}
-"""Shipped linkages without a program."""
-
 RUN = """
 const { readFileSync, writeFileSync } = require('node:fs');
 const { program, states } = JSON.parse(readFileSync('given'));
@@ -68,7 +65,7 @@ def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]
 
 
 @needs_node
-@pytest.mark.parametrize('name', sorted({*linkage_names()} - ITERATED))
+@pytest.mark.parametrize('name', sorted(linkage_names()))
 def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: Path) -> None:
     found = build_model(text_of(name), name)
     closure = load(name)
@@ -116,7 +113,7 @@ def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
     json.dumps(found, allow_nan=False)
     closure = load(name)
     linkage = closure.linkage
-    assert (found['program'] is None) == (name in ITERATED)
+    assert found['program']
     assert [each['name'] for each in found['joints']] == list(linkage.joints)
     assert {pin['name'] for pin in found['pins']} == {
         p for at in linkage.links.values() for p in at

@@ -15,7 +15,7 @@ from linkage_ros.kinematics.compiling.numpy_blocks import (
     BlockFunction as BlockFunction,
 )
 from linkage_ros.kinematics.compiling.python import (
-    compile_function as compile_function,
+    compile_line as compile_line,
     python_source as python_source,
 )
 from linkage_ros.kinematics.compiling.real_program import (
@@ -23,7 +23,11 @@ from linkage_ros.kinematics.compiling.real_program import (
     Program as Program,
 )
 from linkage_ros.kinematics.compiling.solve import BLOCK as BLOCK, SolverOutline as SolverOutline
-from linkage_ros.kinematics.compiling.tape import Operation as Operation, Tape as Tape
+from linkage_ros.kinematics.compiling.tape import (
+    Kind as Kind,
+    Operation as Operation,
+    Tape as Tape,
+)
 from linkage_ros.kinematics.compiling.trace import (
     DecisionBranch as DecisionBranch,
     motion_at as motion_at,

@@ -15,6 +15,7 @@ from itertools import islice, product
 from math import inf, pi, tau
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.arithmetic import UndecidedError
 from linkage_ros.kinematics.compiling.python import (
     python_body,
     python_function,
@@ -104,9 +105,12 @@ class Compiled:
             return
         close = self._closure.position if self._within_limits else self._closure.close_unlimited
         if close(*inputs).status is Status.CLOSED:
-            path = trace_path(
-                self._closure, inputs, self.derivatives, self.wanted, self._within_limits
-            )
+            try:
+                path = trace_path(
+                    self._closure, inputs, self.derivatives, self.wanted, self._within_limits
+                )
+            except UndecidedError:
+                return
             if path.outputs:
                 self.paths.append(path)
                 self._functions.append(python_function(path))

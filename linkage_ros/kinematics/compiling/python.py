@@ -141,36 +141,17 @@ def _bracket_text(text: str) -> str:
     return text if text.isidentifier() else f'({text})'
 
 
-class CompiledFunction(NamedTuple):
-    """A function of numbers as straight-line code, without loops, lists and calls."""
-
-    # Takes the arguments and returns those results that depend on them.
-    varying: Callable[..., tuple[float, ...]]
-    places: tuple[int, ...]  # The indices of these among all results
-    results: tuple[float, ...]  # All results, with 0 for those that vary
-
-
-def compile_function(
+def compile_line(
     function: Callable[..., Sequence[float]], values: Sequence[complex]
-) -> CompiledFunction:
+) -> Callable[..., Values | None]:
     """
-    Return a function as straight-line code, which gives the same bits.
+    Return a function as straight-line code, with the same bits, without loops, lists and calls.
 
-    The function takes numbers and returns numbers, and its decisions do not depend on them.
-    ``values`` are arguments for which it works, each real or complex as in all later calls.
+    The function takes numbers and returns numbers, which are the only group of the code; None
+    where it decides otherwise than at ``values``. These are real or complex as in all later calls.
     """
     tape = Tape()
     given = [tape.add_input(f'x{i}', value) for i, value in enumerate(values)]
-    results = [number_of(number) for number in function(*given)]
-    if tape.decisions:
-        raise ValueError('the function decides by its arguments, and cannot be compiled')
-    places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
+    results = tuple(number_of(number) for number in function(*given))
     inputs = tuple(one.operation for one in given)
-    line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))
-
-    def varying_results(*arguments: Any) -> tuple[float, ...]:
-        (group,) = line(*arguments) or ((),)
-        return group
-
-    constants = tuple(0.0 if isinstance(number, Operation) else number for number in results)
-    return CompiledFunction(varying_results, places, constants)
+    return python_function(Path(inputs, tuple(tape.decisions), (results,), tape))

@@ -20,7 +20,7 @@ import operator
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
+from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, UndecidedError, where
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.tape import (
     Decision,
@@ -70,7 +70,7 @@ def lower_path(
     path: Path, fallback_statuses: tuple[Tree, ...] = (), by_squares: bool = False
 ) -> Lowered:
     """
-    Return a path in real numbers only; paths with iterated links have no such form.
+    Return a path in real numbers only; links iterated with several inputs have no such form.
 
     ``fallback_statuses`` has the status of the linkage where each decision differs. ``by_squares``
     computes lengths and quotients by squares, which is fastest for arrays: the last digits differ,
@@ -130,8 +130,16 @@ class Lowering:
         name = operation.name
         if operation.is_input:
             return self.tape.add_input(name, operation.value)
-        given = [self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
-                 for a in operation.arguments]  # fmt: skip
+        given: list[Any] = [
+            self._known.get(a) if isinstance(a, Operation) else self._lower_number(a)
+            for a in operation.arguments
+        ]
+        if name == 'call':
+            function, *numbers = given
+            return self.tape.call(function, *numbers)
+        if name == 'item':
+            # As text: the number could get the name of an equal length.
+            return self.tape.write(name, given[0], str(given[1]))
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
         return self._formulas[name](self, *given)
@@ -272,14 +280,14 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     Return the tree of a linkage, ignoring its limits.
 
     ``wanted`` selects the numbers of the leaves. Derivatives are 0 for positions, 1 with
-    velocities, 2 with accelerations. A DefinitionError says that links are solved by iteration, or
-    that no closed state is found.
+    velocities, 2 with accelerations. A DefinitionError says that links are iterated with several
+    inputs, or that no closed state is found.
     """
-    if is_iterated(closure):
+    if is_iterated(closure) and len(closure.linkage.inputs) > 1:
         raise DefinitionError(
             'links',
-            'some are only solved by iteration, which cannot be compiled',
-            'compile a linkage of dyads',
+            'some are iterated with several inputs, which cannot be compiled',
+            'compile a linkage with one input, or of dyads',
         )
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths
     if not paths:
@@ -305,7 +313,10 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
         state = closure.initial_state(*groups[0])
         for step in closure.steps:
             before = len(tape.decisions)
-            status = step.close(state).status
+            try:
+                status = step.close(state).status
+            except UndecidedError:
+                return None
             if not status.has_rates:
                 return status
             turned = before < first <= len(tape.decisions)

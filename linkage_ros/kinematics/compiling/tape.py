@@ -305,6 +305,10 @@ def _simplify(name: str, given: tuple[Any, ...]) -> Any:
     if name == 'negative':
         (one,) = given
         return _negated_operand(one)
+    if name == 'vector' and all(isinstance(one, Operation) for one in given):
+        x, y = given
+        if (x.name, y.name, x.arguments) == ('real', 'imag', y.arguments):
+            return x.arguments[0]
     if name == 'abs':
         (one,) = given
         if isinstance(one, Operation) and one.name == 'abs':

@@ -15,6 +15,7 @@ from functools import partial
 from itertools import chain, repeat
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
+from linkage_ros.kinematics.arithmetic import UndecidedError
 from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, Tape
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
@@ -193,5 +194,8 @@ def _status_of(
     del solved.coordinates[coordinates:]
     del solved.pins[pins:]
     tape.reset_decisions(decided, settled)
-    status = step.close(solved).status
+    try:
+        status = step.close(solved).status
+    except UndecidedError:
+        return None
     return None if status is Status.CLOSED else status

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from linkage_ros.kinematics import Status
-from linkage_ros.kinematics.compiling import Operation
+from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,
@@ -40,6 +40,9 @@ _TWO = 'two'
 _DECLARED_TWO = (
     f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
 )
+
+
+_TYPES: dict[Kind, str] = {'truth': 'int ', 'other': 'double *const '}
 
 
 class C(Language):
@@ -74,8 +77,31 @@ class C(Language):
             return f'pow({parts[0]}, {_TWO})'
         return super().write_call(operation, parts)
 
-    def assign(self, name: str, text: str, truth: bool = False) -> str:
-        return f'const {"int" if truth else "double"} {name} = {text};'
+    def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
+        return f'const {_TYPES.get(kind, "double ")}{name} = {text};'
+
+    def write_table(self, name: str, ends: Sequence[str], rows: Sequence[str]) -> list[str]:
+        width = rows[0].count(',') + 1
+        return [
+            f'static const double *{name}(double x)',
+            '{',
+            f'    static const double ends[] = {{{", ".join(ends or ["0.0"])}}};',
+            f'    static const double rows[][{width}] = {{',
+            *(f'        {{{row}}},' for row in rows),
+            '    };',
+            '    int low = 0;',
+            f'    int high = {len(ends)};',
+            '    while (low < high) {',
+            '        const int middle = (low + high) / 2;',
+            '        if (ends[middle] < x) {',
+            '            low = middle + 1;',
+            '        } else {',
+            '            high = middle;',
+            '        }',
+            '    }',
+            '    return rows[low];',
+            '}',
+        ]
 
     def return_status(self, status: str) -> str:
         return f'return {status};'
@@ -105,7 +131,9 @@ class C(Language):
             'return status;',
         ]
 
-    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+    def whole_source(
+        self, subject: Subject, head: Sequence[str], tables: Sequence[str], body: Sequence[str]
+    ) -> str:
         name, function = self._name, self.function_name(subject.derivatives)
         driven, joints = len(subject.closure.linkage.inputs), len(subject.joints)
         kind = f'enum {name}_status'
@@ -124,6 +152,7 @@ class C(Language):
         statuses[-1] = statuses[-1].removesuffix(',')
         listed = [f'{kind} {{', *statuses, '};']
         two = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
+        above = [*tables, ''] if tables else []
         definition = [*signature, '{', *two, *body, '}']
         comment = ['/*', *(f' * {line}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
@@ -132,12 +161,12 @@ class C(Language):
             # Headers of one linkage with different derivatives share the statuses.
             listed = [f'#ifndef {once}', f'#define {once}', *listed, f'#endif  /* {once} */']
             lines = [
-                f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *definition,
-                '', f'#endif  /* {guard} */',
+                f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *above,
+                *definition, '', f'#endif  /* {guard} */',
             ]  # fmt: skip
         else:
             declared = ['#ifdef __cplusplus', 'extern "C" {', '#endif', *listed, *signature[:-1]]
             declared += [f'{signature[-1]};', '#ifdef __cplusplus', '}', '#endif']
             heading = '/* What a caller declares: */'
-            lines = [*_CHECK, '', heading, *declared, '', *definition]
+            lines = [*_CHECK, '', heading, *declared, '', *above, *definition]
         return '\n'.join([*comment, '', *lines, ''])

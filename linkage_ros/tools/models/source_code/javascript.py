@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
+from linkage_ros.kinematics.compiling import Kind
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,
@@ -30,6 +31,12 @@ _COPYSIGN = """
 function copysign(size, sign) {
     const negative = sign < 0.0 || Object.is(sign, -0.0);
     return negative ? -Math.abs(size) : Math.abs(size);
+}
+"""
+
+_REMAINDER = """
+function remainder(number, period) {
+    return number - period * Math.round(number / period);
 }
 """
 
@@ -60,8 +67,29 @@ class JavaScript(Language):
     nearest = 'Math.round'
     status = 'Status.{}'
 
-    def assign(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
         return f'const {name} = {text};'
+
+    def write_table(self, name: str, ends: Sequence[str], rows: Sequence[str]) -> list[str]:
+        return [
+            f'const {name}Ends = [{", ".join(ends)}];',
+            f'const {name}Rows = [',
+            *(f'    [{row}],' for row in rows),
+            '];',
+            f'function {name}(x) {{',
+            '    let low = 0;',
+            f'    let high = {name}Ends.length;',
+            '    while (low < high) {',
+            '        const middle = Math.floor((low + high) / 2);',
+            f'        if ({name}Ends[middle] < x) {{',
+            '            low = middle + 1;',
+            '        } else {',
+            '            high = middle;',
+            '        }',
+            '    }',
+            f'    return {name}Rows[low];',
+            '}',
+        ]
 
     def return_status(self, status: str) -> str:
         return f'return nothing({status});'
@@ -88,7 +116,9 @@ class JavaScript(Language):
     def _returned_values(self, subject: Subject) -> Sequence[str]:
         return self._names if subject.frames else self._names[: 1 + subject.derivatives]
 
-    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+    def whole_source(
+        self, subject: Subject, head: Sequence[str], tables: Sequence[str], body: Sequence[str]
+    ) -> str:
         given = GIVEN[: 1 + subject.derivatives]
         empty = ', '.join(f'{name}: []' for name in self._returned_values(subject))
         comment = (f' * {line}'.rstrip() for line in (*head, *_NOTES))
@@ -98,7 +128,9 @@ class JavaScript(Language):
             '/*', *comment, ' */', '',
             f'{self._export}const Status = Object.freeze({{', *statuses, '});',
             '', 'function nothing(status) {', f'    return {{status, {empty}}};', '}',
-            *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()), '',
+            *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()),
+            *(_REMAINDER.splitlines() if any('remainder(' in line for line in body) else ()),
+            *(('', *tables) if tables else ()), '',
             f'{self._export}function {name}({", ".join(given)}) {{', *body, '}',
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from linkage_ros.kinematics.compiling import Operation
+from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,
@@ -76,8 +76,22 @@ class PythonModule(Language):
                 line = f'{indent}if ({condition[:-1]}):'
         return super().wrap_line(line)
 
-    def assign(self, name: str, text: str, truth: bool = False) -> str:
+    def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
         return f'{name} = {text}'
+
+    def write_table(self, name: str, ends: Sequence[str], rows: Sequence[str]) -> list[str]:
+        return [
+            f'_{name}_ends = ({"".join(f"{end}, " for end in ends).rstrip()})',
+            f'_{name}_rows = (',
+            *(f'    ({row}),' for row in rows),
+            ')',
+            '',
+            '',
+            f'def {name}(x):',
+            f'    return _{name}_rows[bisect_left(_{name}_ends, x)]',
+            '',
+            '',
+        ]
 
     def return_status(self, status: str) -> str:
         return f'return ({", ".join([status, *["()"] * self._groups])})'
@@ -98,11 +112,16 @@ class PythonModule(Language):
             f'return (status, {names[0]}{"".join(tuples)})',
         ]
 
-    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+    def whole_source(
+        self, subject: Subject, head: Sequence[str], tables: Sequence[str], body: Sequence[str]
+    ) -> str:
         name = self.function_name(subject.derivatives)
+        imports = ['from bisect import bisect_left'] if tables else []
+        more = ', remainder' if any('remainder(' in line for line in body) else ''
+        imports.append(_IMPORTS.replace(', sin', f'{more}, sin'))
         lines = [
-            _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
-            *(f'{status} = {index}' for index, status in enumerate(STATUSES)), '', '',
+            _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', *imports, '',
+            *(f'{status} = {index}' for index, status in enumerate(STATUSES)), '', '', *tables,
             f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

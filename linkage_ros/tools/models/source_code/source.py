@@ -31,12 +31,14 @@ from linkage_ros.kinematics import (
     ROUNDING,
     SHRINK,
     SMALLEST,
+    StartTable,
     Status,
 )
 from linkage_ros.kinematics.compiling import (
     compile_program,
     count_uses,
     DecisionBranch,
+    Kind,
     Operation,
     Program,
     SolvedLeaf,
@@ -135,6 +137,12 @@ class Language(ABC):
 
     def write_call(self, operation: Operation, parts: list[str]) -> str:
         """Write the call of a function."""
+        if operation.name == 'item':
+            return f'{parts[0]}[{parts[1]}]'
+        if operation.name == 'call':
+            return f'{parts[0]}({parts[1]})'
+        if operation.name == 'round':
+            return f'{self.nearest}({parts[0]})'
         return f'{self.functions.get(operation.name, operation.name)}({", ".join(parts)})'
 
     def write_choice(self, condition: str, one: str, other: str) -> str:
@@ -167,8 +175,8 @@ class Language(ABC):
         return FUNCTIONS[derivatives]
 
     @abstractmethod
-    def assign(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that assigns a number, or a truth value, to a name."""
+    def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
+        """Write a line that assigns a number, a truth value, or the row of a table to a name."""
 
     @abstractmethod
     def return_status(self, status: str) -> str:
@@ -183,8 +191,26 @@ class Language(ABC):
         """Write lines that call the function with scaled rates, and scale its results back."""
 
     @abstractmethod
-    def whole_source(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source from the lines of its head, a comment, and of the function's body."""
+    def write_table(self, name: str, ends: Sequence[str], rows: Sequence[str]) -> list[str]:
+        """
+        Write a function that returns the row of an input in a table.
+
+        Each but the last of the rows ends at one of ``ends``, which belongs to it.
+        """
+
+    def write_list(self, numbers: Sequence[float]) -> str:
+        """Write numbers, separated by commas."""
+        return ', '.join(map(self.write_constant, numbers))
+
+    @abstractmethod
+    def whole_source(
+        self, subject: Subject, head: Sequence[str], tables: Sequence[str], body: Sequence[str]
+    ) -> str:
+        """
+        Write the source.
+
+        It has the lines of its head, a comment, of its tables, and of the function's body.
+        """
 
 
 def write_source(subject: Subject, language: Language) -> str:
@@ -218,7 +244,8 @@ def write_source(subject: Subject, language: Language) -> str:
     compiled = compile_program(closure, subject.derivatives, wanted_numbers)
     body = _SourceBody(subject, language, compiled)
     head = _head_lines(subject, language.function_name(subject.derivatives))
-    return language.whole_source(subject, list(head), body.write_lines())
+    lines = body.write_lines()
+    return language.whole_source(subject, list(head), body.table_lines(), lines)
 
 
 def frame_values(closure: Closure, motion: TracedMotion) -> list[list[Any]]:
@@ -241,12 +268,13 @@ class _SourceBody:
         self._lengths = _length_names(subject.closure)
         self._often = Counter(_used_constants(roots))
         self._named: dict[float, str] = {}
+        self._tables: dict[StartTable, str] = {}
         self._writer = TextWriter(
             roots,
             self._constant_text,
             language.write_call,
             language.write_choice,
-            lambda name, text, operation: language.assign(name, text, operation.kind == 'truth'),
+            lambda name, text, operation: language.assign(name, text, operation.kind),
         )
 
     def write_lines(self) -> list[str]:
@@ -355,7 +383,23 @@ class _SourceBody:
             f'({compare_with_bounds(name)} {language.conjunction} {compare_with_bounds(turned)})'
         )
 
-    def _constant_text(self, value: float) -> str:
+    def table_lines(self) -> list[str]:
+        """Return the lines of the tables that the function uses."""
+        language = self._language
+        lines = []
+        for table, name in self._tables.items():
+            rows = list(map(language.write_list, table.rows))
+            ends = [language.write_constant(end) for end in table.ends]
+            lines += language.write_table(name, ends, rows)
+        return [part for line in lines for part in _wrap_list(line)]
+
+    def _constant_text(self, value: Any) -> str:
+        if isinstance(value, str):
+            return value
+        if isinstance(value, StartTable):
+            function = self._language.function_name(self._subject.derivatives)
+            number = len(self._tables) or ''
+            return self._tables.setdefault(value, f'{function}_row{number}')
         text = self._language.write_constant(value)
         name = self._lengths.get(value) or _THRESHOLDS.get(value)
         if abs(value) in _PLAIN or (self._often[value] < 2 and not name):
@@ -363,6 +407,14 @@ class _SourceBody:
         if value not in self._named:
             self._named[value] = name or f'k{len(self._named)}'
         return self._named[value]
+
+
+def _wrap_list(line: str) -> list[str]:
+    indent = ' ' * (len(line) - len(line.lstrip()))
+    return textwrap.wrap(
+        line, WIDTH, subsequent_indent=f'{indent}    ', break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
 
 
 def _tree_roots(tree: Tree) -> Iterator[Any]:

@@ -1,0 +1,139 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+The equations of a group of links that no dyad covers, as straight lines.
+
+All functions take numbers or symbols and make no decision, so each is recorded on a tape as it
+stands. A pin gives the place of a link from its angle: the places follow from the angles, one link
+after the other, and only the equations that close loops are left to be solved. The derivatives by
+the places are the constants 1 and −1, which the elimination takes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.elimination import Elimination, is_zero, subtract
+from linkage_ros.kinematics.equations import (
+    CoincidentPoints,
+    Constraint,
+    differentiate_constraints,
+    End,
+    end_arm,
+    evaluate_constraints,
+    point_and_arm,
+)
+from linkage_ros.kinematics.step import LinkState
+
+
+class _PlacedBody(NamedTuple):
+    """A body that a pin places: the row of the pin's equations, and its two ends."""
+
+    row: int
+    end: End
+    other: End
+
+
+class GroupEquations:
+    """
+    As many equations as unknowns: for each of ``bodies`` links its angle and its place.
+
+    ``free`` has the indices of the unknowns that no pin gives.
+    """
+
+    def __init__(self, constraints: Sequence[Constraint], bodies: int) -> None:
+        self._constraints = constraints
+        self._count = 3 * bodies
+        self._placed = _place_bodies(constraints, bodies)
+        by_pins = {each.end.body for each in self._placed}
+        self.free = tuple(k for k in range(self._count) if not k % 3 or k // 3 not in by_pins)
+        self._rows_of_pins = {each.row + axis for each in self._placed for axis in (0, 1)}
+        # The last first: its place is in no other of the equations that remain.
+        self._unit_pivots = [
+            (each.row + axis, 3 * each.end.body + 1 + axis)
+            for each in reversed(self._placed)
+            for axis in (0, 1)
+        ]
+
+    def place_bodies(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
+        """Return all unknowns, from those that are free."""
+        unknowns: list[Any] = [0.0] * self._count
+        for k, value in zip(self.free, values, strict=True):
+            unknowns[k] = value
+        for _, end, other in self._placed:
+            k = 3 * end.body
+            place = subtract(point_and_arm(other, unknowns, solved)[0], end_arm(end, unknowns))
+            unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
+        return unknowns
+
+    def correct(self, unknowns: Sequence[Any], solved: LinkState) -> tuple[list[Any], list[Any]]:
+        """Return what Newton's method subtracts from the free unknowns, and its divisors."""
+        errors, jacobian = evaluate_constraints(self._constraints, unknowns, solved)
+        eliminated = Elimination(jacobian, self._unit_pivots)
+        # The places were computed from the pins, which are closed.
+        right = [0.0 if row in self._rows_of_pins else e for row, e in enumerate(errors)]
+        step = eliminated.solve(right)
+        return [step[k] for k in self.free], eliminated.divisors
+
+    def rates(
+        self, unknowns: Sequence[Any], solved: LinkState, velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns."""
+        still = [0.0] * self._count
+        drift = differentiate_constraints(
+            self._constraints, unknowns, solved, velocities, still, None, still
+        )
+        return self._cancel_drift(unknowns, solved, drift)
+
+    def accelerations(
+        self,
+        unknowns: Sequence[Any],
+        solved: LinkState,
+        velocities: LinkState,
+        rates: Sequence[Any],
+        accelerations: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns."""
+        still = [0.0] * self._count
+        drift = differentiate_constraints(
+            self._constraints, unknowns, solved, velocities, rates, accelerations, still
+        )
+        return self._cancel_drift(unknowns, solved, drift)
+
+    def _cancel_drift(
+        self, unknowns: Sequence[Any], solved: LinkState, drift: Sequence[Any]
+    ) -> list[Any]:
+        """Return the rates of the unknowns that cancel the drift of the constraints."""
+        # On a tape the matrix is that of `rates` and of `accelerations`, and is there only once.
+        jacobian = evaluate_constraints(self._constraints, unknowns, solved)[1]
+        right = [0.0 if is_zero(each) else -each for each in drift]
+        return Elimination(jacobian, self._unit_pivots).solve(right)
+
+
+def _place_bodies(constraints: Sequence[Constraint], bodies: int) -> list[_PlacedBody]:
+    """Return the bodies that pins place, each after the one that its pin is on."""
+    pins = []
+    row = 0
+    for constraint in constraints:
+        if isinstance(constraint, CoincidentPoints):
+            one, other = constraint
+            pins += [_PlacedBody(row, one, other), _PlacedBody(row, other, one)]
+        row += 2 if isinstance(constraint, CoincidentPoints) else 1
+    placed = []
+    unknown = list(range(bodies))
+    while unknown:
+        pin = next(
+            (p for p in pins if p.end.body in unknown and p.other.body not in unknown), None
+        )
+        if pin is not None:
+            placed.append(pin)
+        # Where nothing places a body, its own place is free, and others may follow from it.
+        unknown.remove(unknown[0] if pin is None else pin.end.body)
+    return placed
