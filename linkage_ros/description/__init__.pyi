@@ -24,6 +24,7 @@ from linkage_ros.description.linkage_file import (
     find_assemblies as find_assemblies,
     find_closures as find_closures,
     linkage_content as linkage_content,
+    linkage_schema as linkage_schema,
     load as load,
     read_closure as read_closure,
     read_linkage as read_linkage,
@@ -97,7 +98,6 @@ from linkage_ros.description.scene_file import (
 from linkage_ros.description.scene_settings import apply_settings as apply_settings
 from linkage_ros.description.schema import (
     as_text as as_text,
-    linkage_schema as linkage_schema,
     parameter_types as parameter_types,
     scene_schema as scene_schema,
 )

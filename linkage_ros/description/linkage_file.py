@@ -11,13 +11,42 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, MISSING, replace
+from functools import partial
 from itertools import chain, product, repeat
 from math import inf
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from linkage_ros.description.grammar import (
+    DIALECT,
+    Interval,
+    ListOf,
+    Named,
+    OneOrMore,
+    OnlyWith,
+    optional_keys,
+)
+from linkage_ros.description.parameters import (
+    CHARACTER,
+    choice,
+    ChoiceOf,
+    declare,
+    Keys,
+    Number,
+    number,
+    ParameterGroup,
+    parameters_schema,
+    Parts,
+    Point,
+    point,
+    read_parameters,
+    Rule,
+    Schema,
+    text,
+    TextOf,
+)
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES, LENGTHS, Units
 from linkage_ros.description.yaml_file import read_yaml
@@ -43,19 +72,6 @@ from linkage_ros.kinematics import (
 )
 from linkage_ros.resources import linkage_names, named_file
 
-_KEYS = (
-    'units',
-    'angles',
-    'links',
-    'input',
-    'assembly',
-    'sliders',
-    'joints',
-    'ratios',
-    'traced',
-    'pose',
-    'masses',
-)
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
 """Bounds on the links, and on the points of all links; at these a check takes seconds."""
 
@@ -71,8 +87,248 @@ HEAVIEST = 1e12
 STRONGEST = 1e12
 """Bound on efforts, in [N·m] or [N]."""
 
-_DRIVEN_CRANK = Input('crank_joint', GROUND, 'crank')
-"""The input of every shorthand."""
+_Values = dict[str, Any]
+
+
+class _SliderOrLinks(Rule):
+    """A joint is a slider, or it turns a child relative to its parent."""
+
+    def check(self, content: Section) -> None:
+        content.units = replace(content.units, slides='slider' in content)
+
+    def needed_keys(self, content: Section) -> Sequence[str]:
+        return ('slider',) if 'slider' in content else ('parent', 'child')
+
+    def unknown_keys(self, content: Section) -> Sequence[str]:
+        return ('parent', 'child') if 'slider' in content else ()
+
+    def json_schema(self) -> Schema:
+        return {
+            'if': {'required': ['slider']},
+            'then': {'properties': {'parent': False, 'child': False}},
+            'else': {'required': ['parent', 'child']},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Moves(Rule):
+    """The joint of these limits turns or slides."""
+
+    slides: bool = False
+
+    def check(self, content: Section) -> None:
+        content.units = replace(content.units, slides=self.slides)
+
+
+@dataclass(frozen=True, slots=True)
+class _Side(ChoiceOf):
+    """The side of a pin, or of a slider."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        return content.choice(key, _AHEAD if key in parts['slider'] else _LEFT)
+
+
+@dataclass(frozen=True, slots=True)
+class _InputValues(ListOf):
+    """A value for each input; a wrong number of them is refused with the other parts."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
+        values = content.numbers(key, most=FARTHEST)
+        return tuple(map(content.units.to_si, values, chain(parts['unit'], repeat(''))))
+
+
+def _refuse_mass(content: Section, name: str, parts: Parts) -> None:
+    """Refuse the mass of what is not a moving link."""
+    if name == GROUND:
+        raise content.error(name, 'the ground does not move', 'leave its mass out')
+    if name not in parts['link']:
+        moving = sorted({*parts['link']} - {GROUND})
+        reason = f'{quote(name)} is not a link'
+        raise content.error(name, reason, f'name one of {list_names(moving)}')
+
+
+def _refuse_input(content: Section, name: str, parts: Parts) -> None:
+    """Refuse the input among the published joints."""
+    if name in parts['input']:
+        raise content.error(name, 'is the input joint', 'publish the dependent joints')
+
+
+def _length(meaning: str) -> Any:
+    return number(meaning, unit='m', above=0.0, most=FARTHEST)
+
+
+def _bounded(meaning: str, default: float, unit: str = '') -> Any:
+    return number(meaning, default, unit=unit, least=-FARTHEST, most=FARTHEST)
+
+
+_LEFT, _AHEAD = ('left', 'right'), ('ahead', 'behind')
+_LIMITS = {
+    'limits': declare(
+        Interval(
+            'limits of the joint: [low, high] [rad or m]; -.inf or .inf for no limit on a side',
+            'rad or m',
+            FARTHEST,
+        ),
+        None,
+    ),
+    'velocity': number('its highest rate', None, unit='rad/s or m/s', above=0.0, most=FARTHEST),
+    'effort': number(
+        'its highest torque or force', None, unit='N·m or N', above=0.0, most=STRONGEST
+    ),
+}
+
+
+def _split_limits(values: _Values) -> Limits:
+    """Return the limits of a joint and take their keys out; `kinematics.checks` judges them."""
+    low, high = values.pop('limits', (-inf, inf))
+    return Limits(low, high, values.pop('velocity', inf), values.pop('effort', inf))
+
+
+def _build_input(**values: Any) -> Input:
+    return Input(limits=_split_limits(values), **values)
+
+
+def _build_joint(**values: Any) -> RevoluteJoint | SlideJoint:
+    limits = _split_limits(values)
+    build: Any = SlideJoint if 'slider' in values else RevoluteJoint
+    return build(limits=limits, **values)
+
+
+_ENDS = {
+    'parent': text('the link from which the angle is measured', None),
+    'child': text('the link whose angle it is', None),
+    'slider': text('the slider, instead of parent and child', None),
+    **_LIMITS,
+}
+_INPUT = Keys(
+    'The driven joint; several in a list.',
+    _build_input,
+    {'joint': text('a name for the driven joint, as in crank messages'), **_ENDS},
+    (_SliderOrLinks(),),
+)
+_JOINT = Keys(
+    "The child's angle less the parent's [rad], or the slide of a slider [m].",
+    _build_joint,
+    _ENDS,
+    (_SliderOrLinks(),),
+)
+_SLIDER = Keys(
+    'A point that stays on a line of the link `along`.',
+    Slider,
+    {
+        'point': text('the point that stays on the line'),
+        'along': text('the link that carries the line'),
+        'through': text('a point of that link on the line; the slide is measured from it'),
+        'direction': point(
+            'direction of the line, in the frame of `along`: [x, y]', most=FARTHEST
+        ),
+        'block': text('the link that slides without turning', '', pattern=f'^{CHARACTER}*$'),
+        'angle': _bounded('angle of the block relative to `along`', 0.0, 'rad'),
+    },
+    (OnlyWith('angle', 'block'),),
+)
+_RATIO = Keys(
+    'A published joint, as ratio · other joint + offset.',
+    Ratio,
+    {
+        'of': text('an input or a published joint, which this one follows'),
+        'ratio': _bounded(
+            'its displacement [rad or unit of length] when the other joint moves by 1', 1.0
+        ),
+        'offset': _bounded('its value where the other joint is at 0', 0.0, 'rad or m'),
+    },
+)
+_POSE = Keys(
+    'The pose as drawn, where the linkage starts. Points and angles select the assembly: as '
+    'few as are needed; for links outside dyads they start the iteration.',
+    partial(AssemblyPose, points={}),
+    {
+        'inputs': declare(
+            _InputValues(
+                'a value for each input [rad or m]',
+                Number('a value', 'rad or m', -FARTHEST, FARTHEST),
+            )
+        ),
+        'points': declare(
+            Named('points in the frame of the ground, roughly', Point('[x, y]', 'm', FARTHEST)),
+            None,
+        ),
+        'angles': declare(
+            Named(
+                'angles of links to the ground, roughly',
+                Number('the angle', 'rad', -FARTHEST, FARTHEST),
+            ),
+            None,
+        ),
+    },
+)
+_MASS = Keys(
+    'Mass properties of a link.',
+    Mass,
+    {
+        'mass': number('mass; 0: the link is massless', unit='kg', least=0.0, most=HEAVIEST),
+        'center': point("centre of mass in the link's frame: [x, y]", unit='m', most=FARTHEST),
+        'inertia': number(
+            'moment of inertia about the centre of mass', unit='kg·m²', least=0.0, most=HEAVIEST
+        ),
+    },
+)
+_PLACE = Point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
+
+
+def _named(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
+    return declare(Named(meaning, ParameterGroup(of.meaning, of), **rules), default)
+
+
+_WRITTEN_OUT = {
+    'links': declare(
+        Named(
+            'Links, each with its points; a point on two links is a pin; one link is the ground.',
+            Named('points of the link, by name', _PLACE),
+            _MOST_LINKS,
+        )
+    ),
+    'input': declare(OneOrMore(_INPUT.meaning, _INPUT)),
+    'assembly': declare(
+        Named(
+            'Side of each pin or slider that closes a dyad; not needed if `pose` gives it.',
+            _Side('the side', (*_LEFT, *_AHEAD)),
+        ),
+        None,
+    ),
+    'sliders': _named(
+        'Points that stay on lines of other links, by name.', _SLIDER, most=_MOST_LINKS
+    ),
+    'joints': _named(
+        'Published joints, in this order, by name.',
+        _JOINT,
+        MISSING,
+        least=1,
+        most=_MOST_LINKS,
+        check=_refuse_input,
+    ),
+    'ratios': _named(
+        'Joints that follow others: gears, belts, racks, mimic.', _RATIO, most=_MOST_LINKS
+    ),
+    'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
+    'pose': optional_keys(_POSE),
+    'masses': _named('Masses of the links, by link name.', _MASS, check=_refuse_mass),
+}
+
+
+class _ShorthandOrLinks(Rule):
+    """A linkage is written out, or by one shorthand; the written-out keys are read elsewhere."""
+
+    def json_schema(self) -> Schema:
+        needed = [key for key, entry in _WRITTEN_OUT.items() if entry.default is MISSING]
+        return {
+            'if': {'anyOf': [{'required': [shorthand]} for shorthand in _SHORTHANDS]},
+            'then': {
+                'propertyNames': {'enum': [*_UNITS, *_SHORTHANDS]},
+                'not': {'required': list(_SHORTHANDS)},
+            },
+            'else': {'required': needed},
+        }
 
 
 def looks_like_linkage(content: Section) -> bool:
@@ -149,78 +405,69 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
 
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
-    content.units = Units(
-        content.choice('units', tuple(LENGTHS), 'm'),
-        content.choice('angles', ANGLES, ANGLES[0]),
-    )
-    for shorthand, expand in _SHORTHANDS.items():
+    content.units = Units(*(_LINKAGE.read_key(content, key, {}) for key in _UNITS))
+    for shorthand, keys in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
-            written_out = Section(
-                content.file, '', _add_pose(_add_limits(expand(short), short), short)
-            )
-            short.finish()
-            content.finish()
-            return _parse_linkage(written_out, publish_inputs), shorthand
-    for key in _KEYS:
+            written_out = read_parameters(short, keys, {'unit': ('rad',)})
+            pose = written_out.pop('pose', None)
+            if pose is not None and pose.is_drawn and 'assembly' not in short:
+                del written_out['assembly']
+            content.finish(tuple(_UNITS))
+            expanded = Section(content.file, '', written_out)
+            return _parse_linkage(expanded, publish_inputs, pose), shorthand
+    for key in _WRITTEN_OUT:
         content.remove_key(key)
     content.finish(tuple(_SHORTHANDS))
     return _parse_linkage(content, publish_inputs), ''
 
 
-def _parse_linkage(content: Section, publish_inputs: bool) -> Linkage:
-    links = content.section('links')
-    _check_count(content, links, 'links', _MOST_LINKS)
-    points = {}
-    for name in links:
-        link = links.section(name)
-        points[name] = {point: link.point(point, most=FARTHEST, unit='m') for point in link}
+def _parse_linkage(
+    content: Section, publish_inputs: bool, pose: AssemblyPose | None = None
+) -> Linkage:
+    parts: dict[str, Sequence[str]] = {}
 
+    def read(key: str) -> Any:
+        return _LINKAGE.read_key(content, key, parts)
+
+    points = read('links')
     count = sum(map(len, points.values()))
     if count > _MOST_POINTS:
         raise content.error(
             'links', f'have {count} points', f'write at most {_MOST_POINTS} points'
         )
-
     if 'input' not in content:
         raise content.error('', "the key 'input' is missing", f'add {_input_line(points)}')
-    inputs = tuple(_read_input(driven) for driven in content.sections('input'))
-
-    sliders = content.section('sliders', required=False)
-    assembly = content.section('assembly', required=False)
-    sides = {
-        name: assembly.choice(name, ('ahead', 'behind') if name in sliders else ('left', 'right'))
-        for name in assembly
-    }
-
-    joints = content.section('joints')
-    _check_count(content, sliders, 'sliders', _MOST_LINKS)
-    _check_count(content, joints, 'joints', _MOST_LINKS)
-    if not list(joints):
-        raise content.error('joints', 'publishes nothing', 'name a joint')
-    for driven in inputs:
-        if driven.joint in joints:
-            raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
-    published = {name: _read_joint(joints.section(name)) for name in joints}
-    if publish_inputs:
-        published = {driven.joint: _published_joint(driven) for driven in inputs} | published
-    return Linkage(
-        points,
-        inputs,
-        sides,  # type: ignore[arg-type]  # one of the words of the Literal, by `choice`
-        published,
-        {name: _read_slider(sliders.section(name)) for name in sliders},
-        tuple(content.texts('traced')),
-        _read_pose(content.section('pose'), inputs) if 'pose' in content else None,
-        _read_masses(content.section('masses', required=False), tuple(points)),
-        _read_ratios(content.section('ratios', required=False), inputs, published),
+    inputs = tuple(read('input'))
+    sliders = read('sliders') or {}
+    parts.update(
+        link=tuple(points),
+        input=[driven.joint for driven in inputs],
+        unit=[driven.unit for driven in inputs],
+        slider=tuple(sliders),
     )
+    assembly = read('assembly') or {}
+    joints = published = read('joints')
+    if not joints:
+        raise content.error('joints', 'publishes nothing', 'name a joint')
+    if publish_inputs:
+        published = {driven.joint: _published_joint(driven) for driven in inputs} | joints
+    traced, masses = read('traced') or (), read('masses') or {}
+    pose = pose or read('pose')
+    units = {name: joint.unit for name, joint in joints.items()}
+    units |= {driven.joint: driven.unit for driven in inputs}
+    parts['slide'] = [name for name, unit in units.items() if unit == 'm']
+    ratios = {
+        name: replace(one, ratio=_ratio_in_si(one, units.get(name), units.get(one.of), content))
+        for name, one in (read('ratios') or {}).items()
+    }
+    return Linkage(points, inputs, assembly, published, sliders, traced, pose, masses, ratios)
 
 
-def _check_count(content: Section, named: Section, key: str, most: int) -> None:
-    count = len(named.mapping)
-    if count > most:
-        raise content.error(key, f'there are {count}', f'write at most {most}')
+def _ratio_in_si(ratio: Ratio, unit: str | None, driving: str | None, content: Section) -> float:
+    """Return a ratio of the file's units of length: metres for a radian, radians for a metre."""
+    found = content.units.to_si(ratio.ratio, 'm' if unit == 'm' else '')
+    return found / content.units.to_si(1.0, 'm') if driving == 'm' else found
 
 
 def _input_line(points: Mapping[str, Collection[str]]) -> str:
@@ -230,130 +477,10 @@ def _input_line(points: Mapping[str, Collection[str]]) -> str:
     return f'input: {{joint: {crank}_joint, parent: {GROUND}, child: {crank}}}'
 
 
-def _read_input(content: Section) -> Input:
-    joint = content.text('joint', expected='a name for the driven joint, as in crank messages')
-    if 'slider' in content:
-        driven = Input(
-            joint, slider=content.text('slider'), limits=_read_limits(content, slides=True)
-        )
-    else:
-        driven = Input(joint, *_read_ends(content), limits=_read_limits(content))
-    content.finish(('slider',))
-    return driven
-
-
 def _published_joint(driven: Input) -> RevoluteJoint | SlideJoint:
     if driven.slider:
         return SlideJoint(driven.slider)
     return RevoluteJoint(driven.parent, driven.child)
-
-
-def _read_ends(content: Section) -> tuple[str, str]:
-    """Return parent and child of a joint."""
-    return (
-        content.text('parent', expected='the link from which the angle is measured'),
-        content.text('child', expected='the link whose angle it is'),
-    )
-
-
-def _read_limits(content: Section, *, slides: bool = False) -> Limits:
-    """Return the limits of a joint; `kinematics.checks` decides whether they are possible."""
-    content.units = replace(content.units, slides=slides)
-    low, high = content.interval('limits', most=FARTHEST, unit='rad or m')
-    return Limits(
-        low,
-        high,
-        content.number('velocity', inf, above=0.0, most=FARTHEST, unit='rad/s or m/s')
-        if 'velocity' in content
-        else inf,
-        content.number('effort', inf, above=0.0, most=STRONGEST, unit='N·m or N')
-        if 'effort' in content
-        else inf,
-    )
-
-
-def _read_pose(content: Section, driven: Sequence[Input]) -> AssemblyPose:
-    # A wrong number of values is refused with the other parts that do not match.
-    values = content.numbers('inputs', most=FARTHEST)
-    units = chain((given.unit for given in driven), repeat(''))
-    inputs = tuple(map(content.units.to_si, values, units))
-    points = content.section('points', required=False)
-    angles = content.section('angles', required=False)
-    pose = AssemblyPose(
-        inputs,
-        {name: points.point(name, most=FARTHEST, unit='m') for name in points},
-        {name: angles.number(name, least=-FARTHEST, most=FARTHEST, unit='rad') for name in angles},
-    )
-    content.finish()
-    return pose
-
-
-def _read_masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
-    masses = {}
-    for name in content:
-        if name == GROUND:
-            raise content.error(name, 'the ground does not move', 'leave its mass out')
-        if name not in links:
-            moving = sorted({*links} - {GROUND})
-            raise content.error(
-                name, f'{quote(name)} is not a link', f'name one of {list_names(moving)}'
-            )
-        link = content.section(name)
-        masses[name] = Mass(
-            link.number('mass', least=0.0, most=HEAVIEST, unit='kg'),
-            link.point('center', most=FARTHEST, unit='m'),
-            link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
-        )
-        link.finish()
-    return masses
-
-
-def _read_ratios(
-    content: Section,
-    inputs: Sequence[Input],
-    joints: Mapping[str, RevoluteJoint | SlideJoint],
-) -> dict[str, Ratio]:
-    units = {name: joint.unit for name, joint in joints.items()}
-    units |= {given.joint: given.unit for given in inputs}
-    _check_count(content, content, '', _MOST_LINKS)
-    ratios = {}
-    for name in content:
-        one = content.section(name)
-        of = one.text('of', expected='an input or a published joint, which this one follows')
-        unit = units.get(name, 'rad')
-        # In the file's units of length: metres for a radian, or radians for a metre.
-        ratio = one.number('ratio', 1.0, least=-FARTHEST, most=FARTHEST)
-        ratio = one.units.to_si(ratio, unit if unit == 'm' else '')
-        if units.get(of) == 'm':
-            ratio /= one.units.to_si(1.0, 'm')
-        offset = one.number('offset', 0.0, least=-FARTHEST, most=FARTHEST, unit=unit)
-        ratios[name] = Ratio(of, ratio, offset)
-        one.finish()
-    return ratios
-
-
-def _read_slider(content: Section) -> Slider:
-    block = content.text('block', '')
-    slider = Slider(
-        content.text('point', expected='the point that stays on the line'),
-        content.text('along', expected='the link that carries the line'),
-        content.text('through', expected='a point of that link on the line'),
-        content.point('direction', most=FARTHEST),
-        block,
-        content.number('angle', 0.0, least=-FARTHEST, most=FARTHEST, unit='rad') if block else 0.0,
-    )
-    content.finish(('block', 'angle'))
-    return slider
-
-
-def _read_joint(content: Section) -> RevoluteJoint | SlideJoint:
-    joint: RevoluteJoint | SlideJoint
-    if 'slider' in content:
-        joint = SlideJoint(content.text('slider'), _read_limits(content, slides=True))
-    else:
-        joint = RevoluteJoint(*_read_ends(content), _read_limits(content))
-    content.finish(('slider',))
-    return joint
 
 
 def checked_closure(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
@@ -376,50 +503,18 @@ def checked_closure(content: Section, linkage: Linkage, name: str, shorthand: st
     return closure
 
 
-def _add_limits(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
-    """Return an expanded shorthand, with the limits that the shorthand gives to its joints."""
-    driven, joints = written_out['input'], written_out['joints']
-    limited = content.section('joints', required=False)
-    for name in limited:
-        if name not in joints:
-            raise limited.error(
-                name,
-                f'{quote(name)} is not a joint of the linkage',
-                f'name one of {list_names(joints)}',
-            )
-    places = [(driven, content.section('input', required=False))]
-    places += [(joints[name], limited.section(name)) for name in limited]
-    for joint, of in places:
-        limits = _read_limits(of, slides='slider' in joint)
-        of.finish()
-        in_si = {
-            'limits': [limits.low, limits.high],
-            'velocity': limits.velocity,
-            'effort': limits.effort,
-        }
-        joint.update({key: value for key, value in in_si.items() if key in of})
-    return written_out
+def _expand(written_out: _Values, values: _Values) -> _Values:
+    """Return an expanded shorthand, with the limits that it gives to its joints, and its pose."""
+    written_out['input'] |= values.get('input', {})
+    for name, limits in values.get('joints', {}).items():
+        written_out['joints'][name] |= limits
+    return written_out | {key: values[key] for key in ('pose',) if key in values}
 
 
-def _add_pose(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
-    """Return an expanded shorthand with its pose; a drawn pose determines the side."""
-    if 'pose' in content:
-        pose = _read_pose(content.section('pose'), [_DRIVEN_CRANK])
-        if pose.is_drawn and 'assembly' not in content:
-            del written_out['assembly']
-        written_out['pose'] = {
-            'inputs': [*pose.inputs],
-            'points': {name: [*place] for name, place in pose.points.items()},
-            'angles': dict(pose.angles),
-        }
-    return written_out
-
-
-def _four_bar(content: Section) -> dict[str, Any]:
+def _four_bar(**values: Any) -> _Values:
     """Expand crank a, coupler b, rocker c and ground d."""
-    a, b, c, d = (content.number(side, above=0.0, most=FARTHEST, unit='m') for side in 'abcd')
-    side = content.choice('assembly', ('left', 'right'), 'left')
-    return {
+    a, b, c, d = (values[side] for side in 'abcd')
+    written_out = {
         'links': {
             'ground': {'O2': [0, 0], 'O4': [d, 0]},
             'crank': {'O2': [0, 0], 'A': [a, 0]},
@@ -427,24 +522,18 @@ def _four_bar(content: Section) -> dict[str, Any]:
             'rocker': {'O4': [0, 0], 'B': [c, 0]},
         },
         'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
-        'assembly': {'B': side},
+        'assembly': {'B': values['assembly']},
         'joints': {
             'coupler_joint': {'parent': 'crank', 'child': 'coupler'},
             'rocker_joint': {'parent': 'ground', 'child': 'rocker'},
         },
     }
+    return _expand(written_out, values)
 
 
-def _inverted_slider_crank(content: Section) -> dict[str, Any]:
+def _inverted_slider_crank(a: float, swivel: Sequence[float], **values: Any) -> _Values:
     """Expand crank a and the position of the swivel relative to the crank's pivot."""
-    a = content.number('a', above=0.0, most=FARTHEST, unit='m')
-    swivel = content.point('swivel', most=FARTHEST, unit='m')
-    if swivel == (0.0, 0.0):
-        raise content.error(
-            'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'
-        )
-    side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
-    return {
+    written_out = {
         'links': {
             'ground': {'O': [0, 0], 'C': list(swivel)},
             'crank': {'O': [0, 0], 'B': [a, 0]},
@@ -452,15 +541,108 @@ def _inverted_slider_crank(content: Section) -> dict[str, Any]:
         },
         'sliders': {'swivel': {'point': 'C', 'along': 'rod', 'through': 'B', 'direction': [1, 0]}},
         'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
-        'assembly': {'swivel': side},
+        'assembly': {'swivel': values['assembly']},
         'joints': {
             'rod_joint': {'parent': 'crank', 'child': 'rod'},
             'rod_slide': {'slider': 'swivel'},
         },
     }
+    return _expand(written_out, values)
 
 
-_SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_crank}
+@dataclass(frozen=True, slots=True)
+class _Swivel(Point):
+    """A point that is not the pivot."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
+        place = content.point(key, most=self.most, unit=self.unit)
+        if place == (0.0, 0.0):
+            remedy = 'give the swivel another place'
+            raise content.error(key, "[0, 0] is the crank's pivot", remedy)
+        return place
+
+
+def _joint_limits(meaning: str, slides: bool) -> Keys:
+    # In SI, as an expanded shorthand has them: infinite ends as they are.
+    return Keys(meaning, _written_limits, _LIMITS, (_Moves(slides),))
+
+
+def _written_limits(**values: Any) -> _Values:
+    return {key: list(value) if key == 'limits' else value for key, value in values.items()}
+
+
+def _common_keys(side: Any, **joints: bool) -> _Values:
+    """Return the keys of every shorthand, with the joints that it publishes, sliding or not."""
+    each = {name: _joint_limits('Limits of the joint.', slides) for name, slides in joints.items()}
+    limited = Keys(
+        'Limits of the published joints, by name.',
+        dict,
+        {name: optional_keys(of) for name, of in each.items()},
+    )
+    return {
+        'assembly': side,
+        'pose': optional_keys(_POSE),
+        'input': optional_keys(_joint_limits('Limits of the driven joint.', slides=False)),
+        'joints': optional_keys(limited),
+    }
+
+
+_SHORTHANDS = {
+    'four_bar': Keys(
+        'A four-bar by the lengths of its links; shorthand for a full file.',
+        _four_bar,
+        {
+            **dict(
+                zip('abcd', map(_length, ('crank', 'coupler', 'rocker', 'ground')), strict=True)
+            ),
+            **_common_keys(
+                choice('side of A→O4 on which B lies', _LEFT, _LEFT[0]),
+                coupler_joint=False,
+                rocker_joint=False,
+            ),
+        },
+    ),
+    'inverted_slider_crank': Keys(
+        'A crank whose rod slides through a swivel; shorthand for a full file.',
+        _inverted_slider_crank,
+        {
+            'a': _length('crank'),
+            'swivel': declare(_Swivel("the swivel from the crank's pivot: [x, y]", 'm', FARTHEST)),
+            **_common_keys(
+                choice('side of B on which the swivel lies', _AHEAD, _AHEAD[0]),
+                rod_joint=False,
+                rod_slide=True,
+            ),
+        },
+    ),
+}
+LENGTH_UNIT = choice(
+    'Unit of the lengths in this file: of all values whose unit is m, m/s or m/s². All other '
+    'units are SI.',
+    tuple(LENGTHS),
+    'm',
+)
+_UNITS = {
+    'units': LENGTH_UNIT,
+    'angles': choice('Unit of the angles.', ANGLES, ANGLES[0]),
+}
+_LINKAGE = Keys(
+    'A planar linkage.',
+    dict,
+    {
+        **_UNITS,
+        **_WRITTEN_OUT,
+        **{name: optional_keys(keys) for name, keys in _SHORTHANDS.items()},
+    },
+    (_ShorthandOrLinks(),),
+)
+
+
+def linkage_schema() -> Schema:
+    """Return the schema of a linkage file."""
+    whole = parameters_schema(_LINKAGE)
+    del whole['required']  # in the rule: a shorthand needs none of them
+    return {'$schema': DIALECT, 'title': 'Linkage', **whole}
 
 
 def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:

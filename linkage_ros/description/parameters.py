@@ -7,20 +7,22 @@
 # language governing permissions and limitations under the License.
 
 """
-Declare the parameters of drives, effects and faults once, for reader, table and schema.
+Declare the keys of a mapping in a file once, for reader, table and schema.
 
-Parameters are a frozen dataclass whose fields are made by the functions below. Each field has a
-kind, which reads the value from a section of a file, describes it in tables, and gives its JSON
-Schema.
+The parameters of a drive, an effect or a fault are a frozen dataclass whose fields are made by the
+functions below. Mappings that are read into another type are `Keys`, with the same fields. Each
+field has a kind, which reads the value from a section of a file, describes it in tables, and gives
+its JSON Schema.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING, replace
 from math import inf
 from os.path import join
+from re import fullmatch
 from typing import Any, ClassVar
 
 from linkage_ros.description.section import Section
@@ -81,6 +83,46 @@ class Kind(ABC):
 
     def _described_schema(self, **schema: Any) -> Schema:
         return {'description': self.meaning + (f' [{self.unit}]' if self.unit else ''), **schema}
+
+
+class Rule:
+    """A rule between the keys of a mapping."""
+
+    def check(self, content: Section) -> None:
+        """Refuse a mapping that breaks the rule, before its values are read."""
+
+    def needed_keys(self, content: Section) -> Sequence[str]:
+        """Return the optional keys that this mapping must have."""
+        return ()
+
+    def unknown_keys(self, content: Section) -> Sequence[str]:
+        """Return the keys that this mapping cannot have."""
+        return ()
+
+    def json_schema(self) -> Schema:
+        """Return what the rule adds to the JSON Schema of the mapping."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """The keys of a mapping that is read into a type which knows nothing of files."""
+
+    meaning: str
+    build: Callable[..., Any]  # Called with the values by key; without keys that have no value
+    entries: Mapping[str, Any]  # A field for each key, by the functions below
+    rules: tuple[Rule, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, entry in self.entries.items():
+            entry.name = name
+
+    def read_key(self, content: Section, key: str, parts: Parts, folder: str = '') -> Any:
+        """Return the value of a key, or its default."""
+        entry = self.entries[key]
+        if key in content or is_required(entry):
+            return entry.metadata[_KEY].read(content, key, parts, folder)
+        return entry.default if entry.default_factory is MISSING else entry.default_factory()
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +261,9 @@ class TextOf(Kind):
     pattern: str = f'^{CHARACTER}+$'
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
-        return content.text(key)
+        if content.mapping.get(key) == '' and fullmatch(self.pattern, ''):
+            return content.text(key, '')
+        return content.text(key, expected=self.meaning)
 
     def json_schema(self) -> Schema:
         return self._described_schema(type='string', pattern=self.pattern)
@@ -368,74 +412,74 @@ def number(
     above: float = -inf,
 ) -> Any:
     """Declare a number; it is required if it has no default."""
-    return _declare(Number(meaning, unit, least, most, above), default)
+    return declare(Number(meaning, unit, least, most, above), default)
 
 
 def whole_number(
     meaning: str, default: Any = MISSING, *, unit: str = '', least: float, most: float
 ) -> Any:
     """Declare a whole number."""
-    return _declare(Number(meaning, unit, least, most, whole=True), default)
+    return declare(Number(meaning, unit, least, most, whole=True), default)
 
 
 def number_list(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
     """Declare a list of numbers, read as a tuple."""
-    return _declare(NumberList(meaning, unit, most), default)
+    return declare(NumberList(meaning, unit, most), default)
 
 
 def number_rows(
     meaning: str, columns: Sequence[str], *, default: Any = MISSING, most: float = inf
 ) -> Any:
     """Declare a list of rows of numbers, read as a tuple of tuples."""
-    return _declare(RowsOf(meaning, tuple(columns), most), default)
+    return declare(RowsOf(meaning, tuple(columns), most), default)
 
 
 def flag(meaning: str, default: Any = MISSING) -> Any:
     """Declare a boolean."""
-    return _declare(Flag(meaning), default)
+    return declare(Flag(meaning), default)
 
 
 def choice(meaning: str, words: Sequence[str], default: Any = MISSING) -> Any:
     """Declare one of a set of words."""
-    return _declare(ChoiceOf(meaning, tuple(words)), default)
+    return declare(ChoiceOf(meaning, tuple(words)), default)
 
 
-def text(meaning: str, default: Any = MISSING) -> Any:
+def text(meaning: str, default: Any = MISSING, *, pattern: str = f'^{CHARACTER}+$') -> Any:
     """Declare a string."""
-    return _declare(TextOf(meaning), default)
+    return declare(TextOf(meaning, pattern), default)
 
 
 def file(meaning: str) -> Any:
     """Declare the path of a file, read as a string with the scene's folder prepended."""
-    return _declare(File(meaning), MISSING)
+    return declare(File(meaning), MISSING)
 
 
 def point(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
     """Declare a point or a vector, read as a tuple of two."""
-    return _declare(Point(meaning, unit, most), default)
+    return declare(Point(meaning, unit, most), default)
 
 
 def part_name(meaning: str, kind: str, default: Any = MISSING) -> Any:
     """Declare the name of a part of the linkage."""
-    return _declare(Name(meaning, kind), default)
+    return declare(Name(meaning, kind), default)
 
 
 def part_names(meaning: str, kind: str, default: Any = ()) -> Any:
     """Declare names of parts, read as a tuple; the default () stands for all parts."""
-    return _declare(NamesOf(meaning, kind), default)
+    return declare(NamesOf(meaning, kind), default)
 
 
 def each_part(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
     """Declare values for parts by name, read as a mapping; empty if not required."""
     declared = Each(meaning, kind, of)
     if required:
-        return _declare(declared, MISSING)
+        return declare(declared, MISSING)
     return field(default_factory=dict, metadata={_KEY: declared})
 
 
 def own_parameters(meaning: str, of: Any) -> Any:
     """Declare parameters for each joint, read as a mapping; if absent, None."""
-    return _declare(Each(meaning, 'joint', of), None)
+    return declare(Each(meaning, 'joint', of), None)
 
 
 def parameter_section(meaning: str, of: Any) -> Any:
@@ -445,15 +489,18 @@ def parameter_section(meaning: str, of: Any) -> Any:
 
 def optional_section(meaning: str, of: Any) -> Any:
     """Declare a section of parameters; if absent, None."""
-    return _declare(ParameterGroup(meaning, of), None)
+    return declare(ParameterGroup(meaning, of), None)
 
 
-def _declare(kind: Kind, default: Any) -> Any:
+def declare(kind: Kind, default: Any = MISSING) -> Any:
+    """Declare a value of a kind; it is required if it has no default."""
     return field(default=default, metadata={_KEY: kind})
 
 
 def declared_fields(parameters: Any) -> list[tuple[Field[Any], Kind]]:
-    """Return the fields of a parameter type, each with its kind."""
+    """Return the fields of a parameter type, or of `Keys`, each with its kind."""
+    if isinstance(parameters, Keys):
+        return [(entry, entry.metadata[_KEY]) for entry in parameters.entries.values()]
     return [(entry, entry.metadata[_KEY]) for entry in fields(parameters)]
 
 
@@ -464,16 +511,16 @@ def is_required(entry: Field[Any]) -> bool:
 
 def default_of(entry: Field[Any]) -> Any:
     """Return the default of an optional parameter, in the form of JSON."""
-    value = entry.default
-    if entry.default_factory is not MISSING:
-        value = entry.default_factory()
+    value = entry.default if entry.default_factory is MISSING else entry.default_factory()
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     return list(value) if isinstance(value, tuple) else value
 
 
 def first_docstring_line(parameters: Any) -> str:
-    """Return the first line of the docstring of a parameter type."""
+    """Return the first line of the docstring of a parameter type, or the meaning of `Keys`."""
+    if isinstance(parameters, Keys):
+        return parameters.meaning
     return str(parameters.__doc__).strip().splitlines()[0]
 
 
@@ -485,13 +532,27 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
     """
     entries = declared_fields(of)
     _refuse_misplaced(content, entries, parts)
+    if not isinstance(of, Keys):
+        values = {
+            entry.name: kind.read(content, entry.name, parts, folder)
+            for entry, kind in entries
+            if entry.name in content or is_required(entry)
+        }
+        content.finish([entry.name for entry, _ in entries])
+        return of(**values)
+    for rule in of.rules:
+        rule.check(content)
+    unknown = {key for rule in of.rules for key in rule.unknown_keys(content)}
+    needed = {key for rule in of.rules for key in rule.needed_keys(content)}
     values = {
-        entry.name: kind.read(content, entry.name, parts, folder)
-        for entry, kind in entries
-        if entry.name in content or is_required(entry)
+        key: kind.read(content, key, parts, folder)
+        if key in needed
+        else of.read_key(content, key, parts, folder)
+        for key, kind in ((entry.name, kind) for entry, kind in entries)
+        if key not in unknown
     }
-    content.finish([entry.name for entry, _ in entries])
-    return of(**values)
+    content.finish([key for key in of.entries if key not in unknown])
+    return of.build(**{key: value for key, value in values.items() if value is not None})
 
 
 def _refuse_misplaced(
@@ -522,19 +583,22 @@ def under_part(key: str, section: str, keys: Sequence[str], names: Sequence[str]
 def parameters_schema(of: Any) -> Schema:
     """Return the JSON Schema of the section of a parameter type."""
     entries = declared_fields(of)
-    return mapping_schema(
+    schema = mapping_schema(
         first_docstring_line(of),
         {
             entry.name: kind.json_schema()
             | (
                 {}
                 if is_required(entry) or entry.default is None
-                else {'default': default_of(entry)}
+                else {'default': _plain_default(default_of(entry))}
             )
             for entry, kind in entries
         },
         required=tuple(entry.name for entry, _ in entries if is_required(entry)),
     )
+    for rule in of.rules if isinstance(of, Keys) else ():
+        schema |= rule.json_schema()
+    return schema
 
 
 def parameter_rows(of: Any, prefix: str = '') -> Iterator[tuple[str, ...]]:
@@ -577,6 +641,13 @@ def _bounds_schema(least: float, most: float, above: float = -inf, unit: str = '
     least, most, above = least * scale, most * scale, above * scale
     bounds = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
     return {word: _without_decimals(bound) for word, bound in bounds if abs(bound) < inf}
+
+
+def _plain_default(default: Any) -> Any:
+    """Return a default whose whole numbers have no decimals."""
+    if isinstance(default, list):
+        return list(map(_plain_default, default))
+    return _without_decimals(default) if isinstance(default, float) else default
 
 
 def _without_decimals(bound: float) -> float:

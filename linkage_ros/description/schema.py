@@ -22,7 +22,7 @@ import json
 from math import inf
 from typing import Any
 
-from linkage_ros.description.linkage_file import FARTHEST, HEAVIEST, STRONGEST
+from linkage_ros.description.grammar import DIALECT
 from linkage_ros.description.parameters import (
     CHARACTER,
     declared_fields,
@@ -50,8 +50,6 @@ from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
 
-DIALECT = 'https://json-schema.org/draft/2020-12/schema'
-
 ROS_NAME = '^[A-Za-z][A-Za-z0-9_]*$'
 
 DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
@@ -71,20 +69,10 @@ _OWN_EFFECT: Schema = {
     'type': 'object',
     'additionalProperties': True,
 }
-_SHORTHANDS = ('four_bar', 'inverted_slider_crank')
-_WRITTEN_OUT = ('links', 'input', 'joints')
-
-
 _NAMED = (
     'path of the linkage file, relative to the folder of this file; or the name of a linkage that '
     'comes with the package'
 )
-
-_either_slider: Schema = {
-    'if': {'required': ['slider']},
-    'then': {'properties': {'parent': False, 'child': False}},
-    'else': {'required': ['parent', 'child']},
-}
 
 
 def as_text(schema: Schema) -> str:
@@ -391,260 +379,3 @@ def _record_schema() -> Schema:
 def _wanted_schema(key: str) -> Schema:
     """Return the schema of a mapping in which a number is given and not 0."""
     return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}
-
-
-def linkage_schema() -> Schema:
-    """Return the schema of a linkage file."""
-    units = {
-        'units': _units_schema(),
-        'angles': _choice_schema('Unit of the angles.', ANGLES, ANGLES[0]),
-    }
-    whole = mapping_schema(
-        'A planar linkage.', {**units, **_linkage_keys(), **_shorthand_schemas()}
-    )
-    return {
-        '$schema': DIALECT,
-        'title': 'Linkage',
-        **whole,
-        'if': {'anyOf': [{'required': [shorthand]} for shorthand in _SHORTHANDS]},
-        'then': {
-            'propertyNames': {'enum': [*units, *_SHORTHANDS]},
-            'not': {'required': list(_SHORTHANDS)},
-        },
-        'else': {'required': list(_WRITTEN_OUT)},
-    }
-
-
-def _linkage_keys() -> dict[str, Schema]:
-    place = _point_schema('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
-    return {
-        'links': named_mapping(
-            'Links, each with its points; a point on two links is a pin; one link is the ground.',
-            named_mapping('points of the link, by name', place),
-        ),
-        'input': _input_schema(),
-        'assembly': named_mapping(
-            'Side of each pin or slider that closes a dyad; not needed if `pose` gives it.',
-            _choice_schema('the side', ('left', 'right', 'ahead', 'behind')),
-        ),
-        'sliders': named_mapping(
-            'Points that stay on lines of other links, by name.', _slider_schema()
-        ),
-        'joints': {
-            **named_mapping('Published joints, in this order, by name.', _joint_schema()),
-            'minProperties': 1,
-        },
-        'ratios': named_mapping(
-            'Joints that follow others: gears, belts, racks, mimic.', _ratio_schema()
-        ),
-        'traced': {
-            'description': 'Points whose paths are drawn.',
-            'type': 'array',
-            'items': _text_schema('a point'),
-        },
-        'pose': _pose_schema(),
-        'masses': named_mapping('Masses of the links, by link name.', _mass_schema()),
-    }
-
-
-def _shorthand_schemas() -> dict[str, Schema]:
-    lengths = {
-        key: _number_schema(link, 'm', above=0.0, most=FARTHEST)
-        for key, link in zip('abcd', ('crank', 'coupler', 'rocker', 'ground'), strict=True)
-    }
-    left, ahead = ('left', 'right'), ('ahead', 'behind')
-    return {
-        'four_bar': mapping_schema(
-            'A four-bar by the lengths of its links; shorthand for a full file.',
-            {
-                **lengths,
-                'assembly': _choice_schema('side of A→O4 on which B lies', left, left[0]),
-                'pose': _pose_schema(),
-                **_limits_of('coupler_joint', 'rocker_joint'),
-            },
-            required=tuple(lengths),
-        ),
-        'inverted_slider_crank': mapping_schema(
-            'A crank whose rod slides through a swivel; shorthand for a full file.',
-            {
-                'a': _number_schema('crank', 'm', above=0.0, most=FARTHEST),
-                'swivel': _point_schema(
-                    "the swivel from the crank's pivot: [x, y]", 'm', FARTHEST
-                ),
-                'assembly': _choice_schema('side of B on which the swivel lies', ahead, ahead[0]),
-                'pose': _pose_schema(),
-                **_limits_of('rod_joint', 'rod_slide'),
-            },
-            required=('a', 'swivel'),
-        ),
-    }
-
-
-def _input_schema() -> Schema:
-    """Return the schema of one input, or a list of them."""
-    one = {
-        **mapping_schema(
-            'The driven joint; several in a list.',
-            {
-                'joint': _text_schema('its name in crank messages'),
-                'parent': _text_schema('the link that carries the motor'),
-                'child': _text_schema('the link that is turned'),
-                'slider': _text_schema('the driven slider, instead of parent and child'),
-                **_limits_schemas(),
-            },
-            required=('joint',),
-        ),
-        **_either_slider,
-    }
-    return {
-        'description': one['description'],
-        'if': {'type': 'array'},
-        'then': {'minItems': 1, 'items': one},
-        'else': one,
-    }
-
-
-def _ratio_schema() -> Schema:
-    return mapping_schema(
-        'A published joint, as ratio · other joint + offset.',
-        {
-            'of': _text_schema('the joint that it follows: an input, or a published joint'),
-            'ratio': _number_schema(
-                'its displacement [rad or unit of length] when the other joint moves by 1',
-                least=-FARTHEST,
-                most=FARTHEST,
-            )
-            | {'default': 1},
-            'offset': _number_schema(
-                'its value where the other joint is at 0',
-                'rad or m',
-                least=-FARTHEST,
-                most=FARTHEST,
-            )
-            | {'default': 0},
-        },
-        required=('of',),
-    )
-
-
-def _joint_schema() -> Schema:
-    return {
-        **mapping_schema(
-            "The child's angle less the parent's [rad], or the slide of a slider [m].",
-            {
-                'parent': _text_schema('the link from which the angle is measured'),
-                'child': _text_schema('the link whose angle it is'),
-                'slider': _text_schema('the slider, instead of parent and child'),
-                **_limits_schemas(),
-            },
-        ),
-        **_either_slider,
-    }
-
-
-def _limits_schemas() -> dict[str, Schema]:
-    """Return the schemas of a joint's limits."""
-    return {
-        'limits': {
-            'description': 'limits of the joint: [low, high] [rad or m]; '
-            '-.inf or .inf for no limit on a side',
-            'type': 'array',
-            'minItems': 2,
-            'maxItems': 2,
-            # The bounds may be -.inf and .inf: JSON Schema accepts these as numbers.
-            'items': {'type': 'number'},
-        },
-        'velocity': _number_schema('its highest rate', 'rad/s or m/s', above=0.0, most=FARTHEST),
-        'effort': _number_schema(
-            'its highest torque or force', 'N·m or N', above=0.0, most=STRONGEST
-        ),
-    }
-
-
-def _limits_of(*joints: str) -> dict[str, Schema]:
-    """Return the schemas of the limits that a shorthand gives to its joints."""
-    return {
-        'input': mapping_schema('Limits of the driven joint.', _limits_schemas()),
-        'joints': mapping_schema(
-            'Limits of the published joints, by name.',
-            {name: mapping_schema('Limits of the joint.', _limits_schemas()) for name in joints},
-        ),
-    }
-
-
-def _slider_schema() -> Schema:
-    return {
-        **mapping_schema(
-            'A point that stays on a line of the link `along`.',
-            {
-                'point': _text_schema('the point, on another link than `along`'),
-                'along': _text_schema('the link that carries the line'),
-                'through': _text_schema(
-                    'point of `along` on the line; the slide is measured from it'
-                ),
-                'direction': _point_schema(
-                    'direction of the line, in the frame of `along`: [x, y]', '', FARTHEST
-                ),
-                'block': {
-                    **_text_schema('the link that slides without turning', f'^{CHARACTER}*$'),
-                    'default': '',
-                },
-                'angle': {
-                    **_number_schema(
-                        'angle of the block relative to `along`',
-                        'rad',
-                        least=-FARTHEST,
-                        most=FARTHEST,
-                    ),
-                    'default': 0,
-                },
-            },
-            required=('point', 'along', 'through', 'direction'),
-        ),
-        'if': {'required': ['block']},
-        'else': {'properties': {'angle': False}},
-    }
-
-
-def _pose_schema() -> Schema:
-    return mapping_schema(
-        'The pose as drawn, where the linkage starts. Points and angles select the assembly: as '
-        'few as are needed; for links outside dyads they start the iteration.',
-        {
-            'inputs': {
-                'description': 'a value for each input [rad or m]',
-                'type': 'array',
-                'items': _number_schema('a value', 'rad or m', least=-FARTHEST, most=FARTHEST),
-            },
-            'points': named_mapping(
-                'points in the frame of the ground, roughly',
-                _point_schema('[x, y]', 'm', FARTHEST),
-            ),
-            'angles': named_mapping(
-                'angles of links to the ground, roughly',
-                _number_schema('the angle', 'rad', least=-FARTHEST, most=FARTHEST),
-            ),
-        },
-        required=('inputs',),
-    )
-
-
-def _mass_schema() -> Schema:
-    return mapping_schema(
-        'Mass properties of a link.',
-        {
-            'mass': _number_schema(
-                'mass; 0: the link is massless', 'kg', least=0.0, most=HEAVIEST
-            ),
-            'center': _point_schema("centre of mass in the link's frame: [x, y]", 'm', FARTHEST),
-            'inertia': _number_schema(
-                'moment of inertia about the centre of mass', 'kg·m²', least=0.0, most=HEAVIEST
-            ),
-        },
-        required=('mass', 'center', 'inertia'),
-    )
-
-
-def _choice_schema(description: str, words: tuple[str, ...], default: str = '') -> Schema:
-    schema: Schema = {'description': description, 'enum': list(words)}
-    return {**schema, 'default': default} if default else schema

@@ -1,0 +1,150 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Kinds of values in scene and linkage files, beside those of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from linkage_ros.description.parameters import (
+    declare,
+    Keys,
+    Kind,
+    named_mapping,
+    Number,
+    NumberList,
+    ParameterGroup,
+    parameters_schema,
+    Parts,
+    read_parameters,
+    Rule,
+    Schema,
+)
+from linkage_ros.description.section import Section
+
+DIALECT = 'https://json-schema.org/draft/2020-12/schema'
+
+
+@dataclass(frozen=True, slots=True)
+class Named(Kind):
+    """
+    Values of one kind by name, at most ``most`` of them.
+
+    ``check`` refuses a name; ``names`` is the schema of the names. Where the parts name the
+    slides, 'rad or m' is [m] for these names.
+    """
+
+    of: Kind
+    most: int | None = None
+    least: int = 0  # Their reader refuses fewer
+    check: Callable[[Section, str, Parts], None] | None = None
+    names: Schema | None = None
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
+        named, values = content.section(key), {}
+        if self.most is not None and len(named.mapping) > self.most:
+            count = len(named.mapping)
+            raise content.error(key, f'there are {count}', f'write at most {self.most}')
+        for name in named:
+            if self.check is not None:
+                self.check(named, name, parts)
+            if 'slide' in parts:
+                named.units = replace(named.units, slides=name in parts['slide'])
+            values[name] = self.of.read(named, name, parts, folder)
+        return values
+
+    def json_schema(self) -> Schema:
+        schema = named_mapping(self.meaning, self.of.json_schema())
+        if self.names is not None:
+            schema['propertyNames'] = self.names
+        return schema | ({'minProperties': self.least} if self.least else {})
+
+    def values_text(self) -> str:
+        return 'by name'
+
+
+@dataclass(frozen=True, slots=True)
+class OneOrMore(Kind):
+    """A mapping, or a list of them; read as a list."""
+
+    of: Keys
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> list[Any]:
+        return [read_parameters(one, self.of, parts, folder) for one in content.sections(key)]
+
+    def json_schema(self) -> Schema:
+        return one_or_more(self.meaning, parameters_schema(self.of))
+
+    def values_text(self) -> str:
+        return 'a mapping, or a list of them'
+
+
+def one_or_more(meaning: str, one: Schema) -> Schema:
+    """Return the JSON Schema of one mapping, or a list of them."""
+    return {
+        'description': meaning,
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf(Kind):
+    """A list of numbers of one kind, or of names."""
+
+    of: Kind
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[Any, ...]:
+        if isinstance(self.of, Number):
+            return tuple(content.numbers(key, most=self.of.most, unit=self.of.unit))
+        return tuple(content.texts(key))
+
+    def json_schema(self) -> Schema:
+        return {'description': self.meaning, 'type': 'array', 'items': self.of.json_schema()}
+
+    def values_text(self) -> str:
+        return f'a list, each {self.of.values_text()}'
+
+
+@dataclass(frozen=True, slots=True)
+class Interval(NumberList):
+    """Two numbers [low, high]; infinite for no limit on a side."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
+        return content.interval(key, most=self.most, unit=self.unit)
+
+    def json_schema(self) -> Schema:
+        # Infinite numbers are numbers in JSON Schema, and within no bounds.
+        ends = {'type': 'array', 'minItems': 2, 'maxItems': 2, 'items': {'type': 'number'}}
+        return {'description': self.meaning, **ends}
+
+
+def optional_keys(of: Keys) -> Any:
+    """Declare a mapping; if absent, nothing is passed on."""
+    return declare(ParameterGroup(of.meaning, of), None)
+
+
+@dataclass(frozen=True, slots=True)
+class OnlyWith(Rule):
+    """A key that means something only where another one has a value."""
+
+    key: str
+    other: str
+
+    def check(self, content: Section) -> None:
+        if self.key in content and content.mapping.get(self.other, '') == '':
+            remedy = f'write {self.other} too, or leave it out'
+            raise content.error(self.key, f'is without {self.other}', remedy)
+
+    def json_schema(self) -> Schema:
+        absent = {'properties': {self.key: False}}
+        return {'if': {'required': [self.other]}, 'else': absent}
