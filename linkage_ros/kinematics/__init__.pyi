@@ -108,6 +108,7 @@ from linkage_ros.kinematics.ranges import (
     golden_section as golden_section,
     is_iterated as is_iterated,
     link_lengths as link_lengths,
+    sample_inputs as sample_inputs,
     slide_bound as slide_bound,
 )
 from linkage_ros.kinematics.results import (
@@ -161,7 +162,6 @@ from linkage_ros.kinematics.sweep_analysis import (
     grid_positions as grid_positions,
     InputSweep as InputSweep,
     pose_alone as pose_alone,
-    sample_inputs as sample_inputs,
     starts_at_pose as starts_at_pose,
     SweptCurve as SweptCurve,
     transmission_angles as transmission_angles,

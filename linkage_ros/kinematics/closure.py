@@ -312,12 +312,15 @@ class Closure:
         once = Acceleration(*_multiply(found, 1.0 / SHRINK), self)
         return Acceleration(*_multiply(once, 1.0 / SHRINK), self)
 
-    def compile_linkage(self, derivatives: int, wanted: OutputSelection | None = None) -> Compiled:
+    def compile_linkage(
+        self, derivatives: int, wanted: OutputSelection | None = None, given_count: int = 0
+    ) -> Compiled:
         """
         Return the linkage compiled; for the same numbers it is compiled once.
 
         ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
-        selects the numbers; without it they are all published joints.
+        selects the numbers, by the motion and ``given_count`` numbers beside it; without it they
+        are all published joints.
         """
         from linkage_ros.kinematics.compiling import (
             linkage,  # local import: they trace
@@ -329,8 +332,9 @@ class Closure:
             for compiled in self._compiled:
                 if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
                     return compiled
-            self._compiled.append(linkage.Compiled(self, derivatives, wanted))
-            return self._compiled[-1]
+            compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
+            self._compiled.append(compiled)
+            return compiled
 
     def solve(
         self,

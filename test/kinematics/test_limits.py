@@ -177,6 +177,33 @@ def test_a_narrow_gap_between_samples_is_found():
     assert not one.is_whole
 
 
+@pytest.mark.parametrize('near', [1e-2, 1e-4, 1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize('width', [1e-3, 1e-2, 0.1])
+def test_a_narrow_window_of_a_joint_is_found_up_to_the_toggle(near, width):
+    """Next to a toggle joints move as the square root: a window is crossed in a short range."""
+    draw = random.Random(f'{near} {width}')
+    missed = []
+    for _ in range(8):
+        sides = dict(zip('abcd', (draw.uniform(0.2, 1.0) for _ in range(4)), strict=True))
+        try:
+            free = closure_of(f'four_bar: {sides}'.replace("'", ''))
+        except FileError:
+            continue
+        one = free.input_ranges[0]
+        if one.is_whole:
+            continue
+        inside = near * (one.highest - one.lowest)
+        value = draw.choice((one.lowest + inside, one.highest - inside))
+        name, joint = next(iter(free.linkage.joints.items()))
+        angle = free.position(value).joints[0]
+        limits = Limits(angle - width, angle + width)
+        joints = {**free.linkage.joints, name: replace(joint, limits=limits)}
+        ranges = Closure(replace(free.linkage, joints=joints)).input_ranges
+        if not any(part.lowest < value < part.highest for part in ranges):
+            missed.append((sides, value, limits))
+    assert not missed
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     sides=st.tuples(*[st.floats(0.2, 1.0)] * 4),
