@@ -15,7 +15,6 @@ import random
 from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, CODES, InputSweep, Limits, Status
-from linkage_ros.solvers import NewtonClosure, TableClosure
 import numpy as np
 import pytest
 
@@ -118,27 +117,6 @@ def test_without_limits_nothing_is_asked():
     assert 'position' not in vars(closed(CRANK_ROCKER))
     assert 'position' not in vars(closed(CRANK_ROCKER, ', input: {velocity: 1}'))
     assert 'position' in vars(closed(CRANK_ROCKER, ', input: {limits: [0, 1]}'))
-
-
-@pytest.mark.parametrize('make', [
-    lambda linkage: NewtonClosure(linkage, 1e-9), lambda linkage: TableClosure(linkage, 1e-6),
-])  # fmt: skip
-def test_every_solver_knows_of_them(make):
-    linkage = closed(CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}').linkage
-    values = (0.4, 0.5, 1.0, 1.5, 1.6)
-    expected = [LIMITED, CLOSED, CLOSED, CLOSED, LIMITED]
-    solver = make(linkage)
-    assert [solver.position(value).status for value in values] == expected
-    assert solver.solve(np.array(values), derivatives=0).status.tolist() == [
-        CODES[status] for status in expected
-    ]
-
-
-def test_a_table_covers_the_range_within_the_limits():
-    """So there is one where the linkage toggles, if the machine does not come there."""
-    closure = closed(DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}')
-    table = TableClosure(closure.linkage, 1e-6)
-    assert table.position(0.3).joints == pytest.approx(closure.position(0.3).joints, abs=1e-6)
 
 
 # Linkage, limits; the ranges, and what ends them.
