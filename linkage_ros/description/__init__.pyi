@@ -87,20 +87,20 @@ from linkage_ros.description.scene import (
     StorageParameters as StorageParameters,
 )
 from linkage_ros.description.scene_file import (
-    HIGHEST_RATE as HIGHEST_RATE,
     kind_of as kind_of,
     LINKAGE_FILE as LINKAGE_FILE,
     load_scene as load_scene,
-    LOWEST_RATE as LOWEST_RATE,
     parse_scene as parse_scene,
     SCENE_FILE as SCENE_FILE,
 )
-from linkage_ros.description.scene_settings import apply_settings as apply_settings
-from linkage_ros.description.schema import (
+from linkage_ros.description.scene_grammar import (
     as_text as as_text,
+    HIGHEST_RATE as HIGHEST_RATE,
+    LOWEST_RATE as LOWEST_RATE,
     parameter_types as parameter_types,
     scene_schema as scene_schema,
 )
+from linkage_ros.description.scene_settings import apply_settings as apply_settings
 from linkage_ros.description.section import Section as Section
 from linkage_ros.description.tables import (
     block_rows as block_rows,

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from linkage_ros.description.parameters import (
+    choice,
     declare,
     Keys,
     Kind,
@@ -29,8 +30,15 @@ from linkage_ros.description.parameters import (
     Schema,
 )
 from linkage_ros.description.section import Section
+from linkage_ros.description.units import LENGTHS
 
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
+LENGTH_UNIT = choice(
+    'Unit of the lengths in this file: of all values whose unit is m, m/s or m/s². All other '
+    'units are SI.',
+    tuple(LENGTHS),
+    'm',
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +75,6 @@ class Named(Kind):
             schema['propertyNames'] = self.names
         return schema | ({'minProperties': self.least} if self.least else {})
 
-    def values_text(self) -> str:
-        return 'by name'
-
 
 @dataclass(frozen=True, slots=True)
 class OneOrMore(Kind):
@@ -82,9 +87,6 @@ class OneOrMore(Kind):
 
     def json_schema(self) -> Schema:
         return one_or_more(self.meaning, parameters_schema(self.of))
-
-    def values_text(self) -> str:
-        return 'a mapping, or a list of them'
 
 
 def one_or_more(meaning: str, one: Schema) -> Schema:
@@ -110,9 +112,6 @@ class ListOf(Kind):
 
     def json_schema(self) -> Schema:
         return {'description': self.meaning, 'type': 'array', 'items': self.of.json_schema()}
-
-    def values_text(self) -> str:
-        return f'a list, each {self.of.values_text()}'
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from typing import Any
 from linkage_ros.description.grammar import (
     DIALECT,
     Interval,
+    LENGTH_UNIT,
     ListOf,
     Named,
     OneOrMore,
@@ -48,7 +49,7 @@ from linkage_ros.description.parameters import (
     TextOf,
 )
 from linkage_ros.description.section import Section
-from linkage_ros.description.units import ANGLES, LENGTHS, Units
+from linkage_ros.description.units import ANGLES, Units
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import DefinitionError, FileError, list_names, quote
 from linkage_ros.kinematics import (
@@ -413,7 +414,7 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
             pose = written_out.pop('pose', None)
             if pose is not None and pose.is_drawn and 'assembly' not in short:
                 del written_out['assembly']
-            content.finish(tuple(_UNITS))
+            content.finish()
             expanded = Section(content.file, '', written_out)
             return _parse_linkage(expanded, publish_inputs, pose), shorthand
     for key in _WRITTEN_OUT:
@@ -616,12 +617,6 @@ _SHORTHANDS = {
         },
     ),
 }
-LENGTH_UNIT = choice(
-    'Unit of the lengths in this file: of all values whose unit is m, m/s or m/s². All other '
-    'units are SI.',
-    tuple(LENGTHS),
-    'm',
-)
 _UNITS = {
     'units': LENGTH_UNIT,
     'angles': choice('Unit of the angles.', ANGLES, ANGLES[0]),

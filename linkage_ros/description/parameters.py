@@ -69,9 +69,9 @@ class Kind(ABC):
     def json_schema(self) -> Schema:
         """Return the JSON Schema of the value."""
 
-    @abstractmethod
     def values_text(self) -> str:
-        """Return the allowed values, for a table."""
+        """Return the allowed values, for a table of parameters; '' for what no parameter is."""
+        return ''
 
     def default_text(self, default: Any) -> str:
         """Return a default, for a table."""
@@ -90,6 +90,9 @@ class Rule:
 
     def check(self, content: Section) -> None:
         """Refuse a mapping that breaks the rule, before its values are read."""
+
+    def check_values(self, content: Section, values: Mapping[str, Any]) -> None:
+        """Refuse values that break the rule."""
 
     def needed_keys(self, content: Section) -> Sequence[str]:
         """Return the optional keys that this mapping must have."""
@@ -122,30 +125,45 @@ class Keys:
         entry = self.entries[key]
         if key in content or is_required(entry):
             return entry.metadata[_KEY].read(content, key, parts, folder)
+        content.remove_key(key)
         return entry.default if entry.default_factory is MISSING else entry.default_factory()
 
 
 @dataclass(frozen=True, slots=True)
 class Number(Kind):
-    """A finite number: least ≤ value ≤ most, and value > above; with ``whole`` an integer."""
+    """
+    A finite number: least ≤ value ≤ most, and value > above; with ``whole`` an integer.
+
+    It may be 0, for never, where it is otherwise at least ``unless_zero``.
+    """
 
     unit: str = ''  # type: ignore[misc]  # a constant without a unit
     least: float = -inf
     most: float = inf
     above: float = -inf
     whole: bool = False
+    unless_zero: float = 0.0
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
+        bounds = {'least': self.least, 'most': self.most, 'unit': self.unit}
         if self.whole:
-            return content.whole_number(key, least=self.least, most=self.most, unit=self.unit)
-        bounds = {'least': self.least, 'most': self.most, 'above': self.above}
-        return content.number(key, **bounds, unit=self.unit)
+            found = content.whole_number(key, **bounds)
+        else:
+            found = content.number(key, above=self.above, **bounds)
+        if 0 < found < self.unless_zero:
+            remedy = f'write {self.unless_zero:.9g} or more, or 0'
+            raise content.error(key, f'{found:g} is too small', remedy)
+        return found
 
     def json_schema(self) -> Schema:
         kind = 'integer' if self.whole else 'number'
-        return self._described_schema(
+        schema = self._described_schema(
             type=kind, **_bounds_schema(self.least, self.most, self.above, self.unit)
         )
+        if self.unless_zero:
+            least = {'minimum': _without_decimals(self.unless_zero)}
+            schema |= {'if': {'exclusiveMinimum': 0}, 'then': least}
+        return schema
 
     def values_text(self) -> str:
         least, most, above = map(number_text, (self.least, self.most, self.above))
@@ -410,16 +428,23 @@ def number(
     least: float = -inf,
     most: float = inf,
     above: float = -inf,
+    unless_zero: float = 0.0,
 ) -> Any:
     """Declare a number; it is required if it has no default."""
-    return declare(Number(meaning, unit, least, most, above), default)
+    return declare(Number(meaning, unit, least, most, above, False, unless_zero), default)
 
 
 def whole_number(
-    meaning: str, default: Any = MISSING, *, unit: str = '', least: float, most: float
+    meaning: str,
+    default: Any = MISSING,
+    *,
+    unit: str = '',
+    least: float,
+    most: float,
+    unless_zero: float = 0.0,
 ) -> Any:
     """Declare a whole number."""
-    return declare(Number(meaning, unit, least, most, whole=True), default)
+    return declare(Number(meaning, unit, least, most, -inf, True, unless_zero), default)
 
 
 def number_list(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
@@ -552,6 +577,8 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
         if key not in unknown
     }
     content.finish([key for key in of.entries if key not in unknown])
+    for rule in of.rules:
+        rule.check_values(content, values)
     return of.build(**{key: value for key, value in values.items() if value is not None})
 
 
@@ -652,4 +679,4 @@ def _plain_default(default: Any) -> Any:
 
 def _without_decimals(bound: float) -> float:
     """Return a whole number without decimals: users see 1, not 1.0."""
-    return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound
+    return int(bound) if float(bound).is_integer() and abs(bound) <= 2**53 else bound

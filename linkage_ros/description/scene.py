@@ -23,18 +23,15 @@ from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Fault
 
-SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
+SPLITS = ('split_bytes', 'split_seconds')
 """
-What makes files of a bag, and the least that it may be where it is not 0.
+What makes files of a bag.
 
 Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
 """
 
 LEAST_FLUSH_PERIOD = 0.05
 """Least flush period, in [s]."""
-
-LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
-"""Least value of a setting that may also be 0, for never."""
 
 AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
 """Settings without effect if the run is kept in memory and written at once."""
@@ -59,6 +56,7 @@ class StorageParameters(Storage):
         unit='bytes',
         least=0,
         most=10**15,
+        unless_zero=1_000_000,
     )
     split_seconds: float = number(
         'time after which the next file begins; 0: never',
@@ -66,6 +64,7 @@ class StorageParameters(Storage):
         unit='s',
         least=0.0,
         most=1e9,
+        unless_zero=1.0,
     )
     keep_files: int = whole_number(
         'number of files to keep: a new file replaces the oldest one; 0: all',
@@ -87,6 +86,7 @@ class StorageParameters(Storage):
         unit='s',
         least=0.0,
         most=86_400.0,
+        unless_zero=0.1,
     )
     snapshot_bytes: int = whole_number(
         'memory for snapshot_seconds: if it is too little, less time is kept; twice as much while '

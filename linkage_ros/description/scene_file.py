@@ -10,70 +10,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from os import PathLike
 from os.path import isfile
 from pathlib import Path
-from re import fullmatch
 from typing import Any, Literal, TYPE_CHECKING
 from zlib import crc32
 
 from linkage_ros.description.linkage_file import looks_like_linkage, read_closure
-from linkage_ros.description.parameters import declared_fields, is_required, Parts, read_parameters
-from linkage_ros.description.scene import (
-    AS_THE_RUN_GOES,
-    LEASTS,
-    parts_of,
-    RecordParameters,
-    Scene,
-    SceneLinkage,
-    SPLITS,
-    StorageParameters,
+from linkage_ros.description.parameters import Parts
+from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
+from linkage_ros.description.scene_grammar import (
+    DRIVE,
+    drive_name,
+    EFFECTS_BY_NAME,
+    OF_A_LINKAGE,
+    SCENE,
 )
 from linkage_ros.description.section import Section
-from linkage_ros.description.units import ANGLES, LENGTHS, Units
+from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
-from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
-from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS, in_order, module_of
 
 if TYPE_CHECKING:
-    from linkage_ros.stages.faults import Fault
+    pass
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of a scene's files in a bag; further linkage files are numbered."""
 
-LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
-"""Bounds of the tick rate, in [Hz]; the higher was measured as what one core sustains."""
-
 _MOST_LINKAGES = 400
 """A hundred linkages at 1 kHz fill a core."""
 
-PUBLISHED_ANGLES = ('continuous', 'wrapped')
-"""How angles are published; see `Scene.wrapped`."""
-
-_WHEN = ('at', 'seconds')
+_SCENE_KEYS = {*SCENE.entries} - {'units', 'angles'}
+"""Keys that tell a scene from a linkage, beside its linkages."""
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
-
-_LINKAGE_KEYS = (
-    'prefix',
-    'publish_input',
-    'drive',
-    'effects',
-    'loads',
-    'beyond_limits',
-)
-"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
-
-_SCENE_KEYS = ('rate', 'seed', 'faults', 'record', 'robot_description', *_LINKAGE_KEYS)
-"""Keys of a scene beside the linkages."""
 
 
 @dataclass(frozen=True)
@@ -249,25 +224,32 @@ def _build_scene(
 
 
 def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
-    wrapped = _read_units(content)
+    published, angle = SCENE.read_key(content, 'angles', {})
+    content.units = Units(SCENE.read_key(content, 'units', {}), angle)
     members, linkage_files = _read_linkages(content, source)
-    seed = seed_of(source.name) if source.seed is None else source.seed
+    parts = _prefixed_parts(members)
+
+    def read(key: str) -> Any:
+        return SCENE.read_key(content, key, parts)
+
+    rate, seed = read('rate'), read('seed')
+    if seed is None:
+        seed = seed_of(source.name) if source.seed is None else source.seed
     scene = Scene(
         name=source.name,
         linkages=tuple(members),
-        rate=_read_rate(content),
-        wrapped=wrapped,
-        seed=content.whole_number('seed', seed, least=0, most=2**53),
-        faults=_read_faults(content, members),
-        record=_read_record(content.section('record')) if 'record' in content else None,
+        rate=rate,
+        wrapped=published == 'wrapped',
+        seed=seed,
+        faults=read('faults') or {},
+        record=read('record'),
         files={SCENE_FILE: data, **linkage_files},
         folder=source.folder,
-        robot_description=content.flag('robot_description', False),
+        robot_description=read('robot_description'),
     )
-    for key in _LINKAGE_KEYS:
-        if key in content:
-            content.remove_key(key)
-    content.finish(('record', 'linkages', *_LINKAGE_KEYS))
+    for key in OF_A_LINKAGE.entries:
+        content.remove_key(key)
+    content.finish(('linkages', *SCENE.entries))
     for scene_linkage in members:
         drive, _ = scene_linkage.drive
         if scene.rate == 0.0 and drive != 'topic':
@@ -277,6 +259,15 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
                 'name a rate',
             )
     return scene
+
+
+def _prefixed_parts(members: Sequence[SceneLinkage]) -> Parts:
+    """Return the parts of all linkages, with their prefixes, which faults name."""
+    parts: dict[str, tuple[str, ...]] = {}
+    for scene_linkage in members:
+        for kind, names in parts_of(scene_linkage.linkage).items():
+            parts[kind] = (*parts.get(kind, ()), *(scene_linkage.prefix + name for name in names))
+    return parts
 
 
 def _read_linkages(
@@ -311,7 +302,7 @@ def _read_linkages(
                 f'a second linkage publishes {list_names(sorted(twice))}',
                 'give each linkage its own prefix, or its joints other names',
             )
-        entry.finish(_LINKAGE_KEYS)
+        entry.finish(tuple(OF_A_LINKAGE.entries))
     return members, files
 
 
@@ -326,49 +317,34 @@ def _read_scene_linkage(
     def section_with(key: str) -> Section:
         return own if key in own else scene
 
-    drives = section_with('drive').section('drive', required=False)
-    drive = _drive_name(drives)
+    drive = drive_name(section_with('drive').section('drive', required=False))
     effects = section_with('effects').section('effects', required=False)
-    loads = section_with('loads').section('loads') if 'loads' in section_with('loads') else None
-    default = drive != 'topic' or 'effort' in effects
-    published = section_with('publish_input').flag('publish_input', default)
+    published = OF_A_LINKAGE.read_key(section_with('publish_input'), 'publish_input', {})
+    if published is None:
+        published = drive != 'topic' or 'effort' in effects
     if closure is None:
         closure = read_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
     _refuse_effects(effects, drive, published)
-    parts = parts_of(linkage)
-    _set_slide_units((drives, effects, *([] if loads is None else [loads]), own, scene), linkage)
+    kinds = {bool(given.slider) for given in linkage.inputs}
+    for section in (own, scene):
+        section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
     not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
-    for effect in not_imported:
-        effects.section(effect)
-    types = _effect_types(effects, not_imported)
-    parameters = import_module(DRIVES[drive]).PARAMETERS
-    driven = drives.section(drive, required=False)
-    scene_linkage = SceneLinkage(
+    parts = {**parts_of(linkage), 'left_out': not_imported}
+    prefix = OF_A_LINKAGE.read_key(section_with('prefix'), 'prefix', parts)
+    return SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
-        drive=(drive, read_parameters(driven, parameters, parts, source.folder)),
-        effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
-        loads=_read_loads(loads, parts) if loads is not None else None,
-        prefix=_read_prefix(section_with('prefix'), f'{name}_' if name else ''),
+        drive=DRIVE.read(section_with('drive'), 'drive', parts, source.folder),
+        effects=EFFECTS_BY_NAME.read(section_with('effects'), 'effects', parts, ''),
+        loads=OF_A_LINKAGE.read_key(section_with('loads'), 'loads', parts),
+        prefix=prefix if prefix is not None else f'{name}_' if name else '',
         content=own,
         linkage_content=linkage_content,
         silent_beyond_limits=_is_silent_beyond(section_with('beyond_limits'), linkage),
         not_imported=not_imported,
     )
-    effects.finish(tuple(EFFECTS))
-    return scene_linkage
-
-
-def _drive_name(drives: Section) -> str:
-    """Return the name of the drive in its section."""
-    named = list(drives) or ['topic']
-    if len(named) > 1:
-        raise drives.error(named[1], 'is a second drive', f'leave it, or {named[0]}, out')
-    if named[0] not in DRIVES:
-        drives.finish(tuple(DRIVES))
-    return named[0]
 
 
 def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
@@ -387,37 +363,9 @@ def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
         )
 
 
-def _set_slide_units(sections: Collection[Section], linkage: Linkage) -> None:
-    """Tell sections whether the inputs slide or turn; None where some do this and some that."""
-    kinds = {bool(given.slider) for given in linkage.inputs}
-    slides = kinds.pop() if len(kinds) == 1 else None
-    for section in sections:
-        section.units = replace(section.units, slides=slides)
-
-
-def _read_prefix(content: Section, default: str) -> str:
-    """Return the prefix of the names of a linkage; '' is one too."""
-    prefix = content.text('prefix', '') if 'prefix' in content else default
-    if not fullmatch('[A-Za-z0-9_/.-]*', prefix):
-        raise content.error(
-            'prefix', f'{quote(prefix)} cannot begin a joint name', 'use letters, digits and _/.-'
-        )
-    return prefix
-
-
-def _effect_types(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
-    """Return the parameter types of the named effects, in physical order."""
-    known = [name for name in effects if name in EFFECTS or '.' in name]
-    try:
-        named = in_order([name for name in known if name not in left_out])
-        return {name: module_of(name).PARAMETERS for name in named}
-    except DefinitionError as error:
-        raise effects.locate_error(error) from None
-
-
 def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:
     """Return whether nothing is published while a joint is beyond its limits."""
-    policy = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
+    policy = OF_A_LINKAGE.read_key(content, 'beyond_limits', {})
     if (
         'beyond_limits' in content
         and 'linkages' not in content
@@ -429,155 +377,3 @@ def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:
             'leave it out, or write limits: [low, high] into the linkage file',
         )
     return policy == 'silent'
-
-
-def _read_units(content: Section) -> bool:
-    """Set the units of a scene; return whether it publishes wrapped angles."""
-    words = content.choose_words('angles', (PUBLISHED_ANGLES, ANGLES))
-    content.units = Units(content.choice('units', tuple(LENGTHS), 'm'), words[1])
-    return words[0] == 'wrapped'
-
-
-def _read_rate(content: Section) -> float:
-    rate = content.number('rate', 1000.0, least=0.0, most=HIGHEST_RATE, unit='Hz')
-    if 0.0 < rate < LOWEST_RATE:
-        raise content.error(
-            'rate',
-            f'{rate:g} is out of bounds',
-            f'write {LOWEST_RATE:g} to {HIGHEST_RATE:g} [Hz], or 0 for once for every sample',
-        )
-    return rate
-
-
-def _read_record(content: Section) -> RecordParameters:
-    record = RecordParameters(
-        directory=content.text('directory', 'runs'),
-        name=content.text('name', ''),
-        queue=content.whole_number('queue', 20_000, least=100, most=10_000_000),
-        storage=_read_storage(content),
-    )
-    if record.name != Path(record.name).name or record.name == '..':
-        raise content.error(
-            'name', f'{record.name!r} is not a plain name', 'leave out the folders'
-        )
-    return record
-
-
-def _read_loads(content: Section, parts: Parts) -> Loads:
-    """Read gravity, springs, the inertia of the drive, and the loads on joints and points."""
-    springs = content.section('springs', required=False)
-    loads = Loads(
-        gravity=content.point('gravity', most=1e3, unit='m/s²')
-        if 'gravity' in content
-        else (0.0, 0.0),
-        springs=tuple(_read_spring(name, springs.section(name)) for name in springs),
-        drive_inertia=content.number(
-            'drive_inertia', 0.0, least=0.0, most=GREATEST_LOAD, unit='kg·m², or kg of a slide'
-        ),
-    )
-    # Only here: what is read below refuses the keys that it does not know.
-    content.remove_key('gravity')
-    return replace(loads, applied=read_parameters(content, AppliedLoads, parts))
-
-
-def _read_spring(name: str, content: Section) -> Spring:
-    spring = Spring(
-        *_read_spring_end(content, 'from'),
-        *_read_spring_end(content, 'to'),
-        content.number('stiffness', least=0.0, most=STIFFEST, unit='N/m'),
-        content.number('free_length', 0.0, least=0.0, most=GREATEST_LOAD, unit='m'),
-        content.number('damping', 0.0, least=0.0, most=STIFFEST, unit='N·s/m'),
-        name,
-    )
-    content.finish()
-    return spring
-
-
-def _read_spring_end(content: Section, key: str) -> tuple[str, str]:
-    """Return link and point of a spring's end."""
-    link, dot, point = content.text(key).rpartition('.')
-    if not dot or not link or not point:
-        raise content.error(key, f'{content.text(key)!r} is not a point', 'write LINK.POINT')
-    return link, point
-
-
-def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
-    """Return the faults of a scene, by name."""
-    section = content.section('faults', required=False)
-    parts: dict[str, tuple[str, ...]] = {}
-    for scene_linkage in members:
-        for kind, names in parts_of(scene_linkage.linkage).items():
-            parts[kind] = (*parts.get(kind, ()), *(scene_linkage.prefix + name for name in names))
-    return {
-        section.ros_name(name): _read_fault(name, section.section(name), parts) for name in section
-    }
-
-
-def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
-    """Return reason and remedy for a fault that names no kind, or several."""
-    from linkage_ros.stages.faults import (
-        FAULTS,  # local import: only section_with a scene has faults
-    )
-
-    if kinds:
-        return (
-            f'names {len(kinds)} kinds of fault',
-            f'leave all but one of {list_names(kinds)} out',
-        )
-    kind = name if name in FAULTS else 'freeze'
-    needed = declared_fields(FAULTS[kind])
-    parameters = ', '.join(f'{entry.name}: …' for entry, _ in needed if is_required(entry))
-    shape = f'{name}: {{{kind}: {{{parameters}}}, at: [1], seconds: 2}}'
-    return 'names no kind of fault', f'write {shape}; kinds: {list_names(FAULTS)}'
-
-
-def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
-    from linkage_ros.stages.faults import Fault, FAULTS  # local import: as above
-
-    kinds = [key for key in content if key in FAULTS]
-    for key in () if kinds else content:
-        if remedy := did_you_mean(key, FAULTS, ''):
-            raise content.error(key, 'unknown key', remedy)
-    if len(kinds) != 1:
-        raise content.error('', *kinds_of_fault(name, kinds))
-    parameters: Any = read_parameters(content.section(kinds[0]), FAULTS[kinds[0]], parts)
-    at = content.numbers('at', most=1e9) if 'at' in content else []
-    if any(time < 0.0 for time in at):
-        raise content.error(
-            'at', f'{at} has a negative time', 'write seconds after the first tick'
-        )
-    seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
-    content.finish(_WHEN)
-    return Fault(kinds[0], parameters, tuple(at), seconds)
-
-
-def _read_storage(content: Section) -> StorageParameters:
-    """Read the storage of a bag from the ``record`` section."""
-    storage: StorageParameters = read_parameters(content, StorageParameters, {})
-    for key, least in LEASTS.items():
-        value = getattr(storage, key)
-        if 0 < value < least:
-            raise content.error(key, f'{value:g} is too small', f'write {least:.9g} or more, or 0')
-    if storage.snapshot_seconds:
-        _refuse_what_is_for_a_run(content)
-    elif 'snapshot_bytes' in content:
-        raise content.error(
-            'snapshot_bytes', 'nothing is kept in memory', 'write snapshot_seconds too'
-        )
-    if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
-        raise content.error(
-            'keep_files', 'the bag has only one file', f'write {" or ".join(SPLITS)} too'
-        )
-    return storage
-
-
-def _refuse_what_is_for_a_run(content: Section) -> None:
-    """Raise FileError for a key that has no effect on a snapshot, unless its value is 0."""
-    for key in AS_THE_RUN_GOES:
-        if content.mapping.get(key, 0) != 0:
-            raise content.error(
-                key,
-                'is for a bag that is written as the run goes, and snapshot_seconds keeps the run '
-                'in memory',
-                'leave one of the two out',
-            )

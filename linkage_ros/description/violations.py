@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.description.parameters import Schema, under_part
-from linkage_ros.description.scene_file import kinds_of_fault
+from linkage_ros.description.scene_grammar import kinds_of_fault
 from linkage_ros.description.section import LinedDict, Section
 from linkage_ros.description.units import ANGLES, LENGTHS, most_in_one, unit_of, Units
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote

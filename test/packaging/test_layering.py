@@ -46,7 +46,7 @@ HEIGHTS = (
         'description.scene_file',
         'description.notes',
         'description.scene_settings',
-        'description.schema',
+        'description.scene_grammar',
         'description.violations',
     ),
     ('tick',),
