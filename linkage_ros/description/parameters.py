@@ -145,7 +145,8 @@ class Number(Kind):
     unless_zero: float = 0.0
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
-        bounds = {'least': self.least, 'most': self.most, 'unit': self.unit}
+        bounds: dict[str, Any] = {'least': self.least, 'most': self.most, 'unit': self.unit}
+        found: float | int
         if self.whole:
             found = content.whole_number(key, **bounds)
         else:

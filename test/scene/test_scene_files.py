@@ -439,41 +439,6 @@ def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path):
     assert (beside.linkages, beside.rate) == (alone.linkages, alone.rate)
 
 
-NEITHER = 'is neither a scene nor a linkage; write linkage: FILE for a scene, links: {…} for a'
-
-# Text of the file, and the error.
-WRONG = {
-    'nothing': ('{}', f': {NEITHER}'),
-    'parameters of a node': ('/**: {ros__parameters: {scene: x.yaml}}', f': {NEITHER}'),
-    'a scene without a linkage': (
-        'rate: 5',
-        ": the key 'linkage' is missing; add linkage: a string",
-    ),
-    'a linkage with a rate': (
-        FOLDS + 'rate: 5',
-        ':9: rate: is a key of scenes, and this is a linkage; write it beside linkage: file.',
-    ),
-    'a linkage with a slip': (FOLDS + 'pse: {}', ":9: pse: unknown key; did you mean 'pose'?"),
-    'a scene with links': ('linkage: x.yaml\nlinks: {}', ":1: linkage: '"),
-    'a linkage that is none': (
-        'links: {}',
-        ": the key 'input' is missing; add input: {joint: crank_",
-    ),
-    'half a shorthand': ('four_bar: {a: 1}', ":1: four_bar: the key 'b' is missing; add b: a"),
-    'a linkage that closes nowhere': ('four_bar: {a: 1, b: 1, c: 1, d: 9}', ':1: four_bar: the l'),
-}
-
-
-@pytest.mark.parametrize('kind', WRONG)
-def test_a_file_that_is_no_scene_and_no_linkage(tmp_path, kind):
-    text, said = WRONG[kind]
-    (tmp_path / 'file.yaml').write_text(text)
-    with pytest.raises(FileError) as caught:
-        load_scene(tmp_path / 'file.yaml')
-    assert is_one_line(caught.value)
-    assert f'file.yaml{said}' in str(caught.value)
-
-
 def test_a_scene_names_a_linkage_that_comes_with_the_package(tmp_path):
     file = tmp_path / 'scene.yaml'
     for name in ('hoeken', 'four_bar'):

@@ -9,7 +9,6 @@
 """The JSON Schemas say what the strict reader takes: of shipped files, bad files, random ones."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -51,7 +50,6 @@ from linkage_ros.description import (
     part_names,
     Point,
     point,
-    read_linkage,
     read_parameters,
     RowsOf,
     scene_schema,
@@ -68,9 +66,7 @@ from linkage_ros.stages.faults import FAULTS
 import pytest
 import yaml
 
-from . import test_bad_files as bad
-from .conftest import CONFIG, SCENE
-from .test_bad_files import WRITTEN_OUT
+from .conftest import CONFIG
 
 if find_spec('jsonschema') is None:
     pytest.skip('needs jsonschema', allow_module_level=True)
@@ -148,95 +144,6 @@ def test_no_mapping_lets_strangers_in():
             assert one['additionalProperties'] != {}
 
 
-def of_yaml(rows, before=b''):
-    """Return those bad files that are YAML, so that an editor compares them with a schema."""
-    found = {}
-    for kind, (data, _) in rows.items():
-        with suppress(FileError):
-            content_of(before + data)
-            found[kind] = before + data
-    return found
-
-
-# Appended to a scene with only a linkage, beside the bad scenes of `test_bad_files`. Errors that
-# a schema cannot detect follow in SEEN_BY_THE_READER.
-BAD_SCENES = {
-    'two drives': 'drive: {topic: {}, sine: {amplitude: 1, frequency: 1}}',
-    'unknown parameter of a drive': 'drive: {topic: {age: 1}}',
-    'parameter of a drive that is missing': 'drive: {constant_rate: {}}',
-    'drive without a mapping': 'drive: {topic: }',
-    'parameter of an effect that is missing': 'effects: {delay: {}}',
-    'parameter of an effect out of bounds': 'effects: {dropout: {probability: 1.5}}',
-    'parameter of an effect of a wrong type': 'effects: {delay: {seconds: soon}}',
-    'choice that is none': 'effects: {delay: {seconds: 0.1, between: guessed}}',
-    'number that is not whole': 'effects: {encoder: {joints: {rocker_joint: {counts: 0.5}}}}',
-    'nested parameter unknown': 'effects: {noise: {joints: {rocker_joint: {whit: 1}}}}',
-    'nested parameter out of bounds': 'effects: {noise: {joints: {rocker_joint: {white: -1}}}}',
-    'seed below 0': 'seed: -1',
-    'seed that is not whole': 'seed: 0.5',
-    'publish_input of text': 'publish_input: yes',
-    'gravity of three': 'loads: {gravity: [0, 0, -9.81]}',
-    'spring without stiffness': 'loads: {springs: {s: {from: ground.O2, to: crank.A}}}',
-    'spring from no point': 'loads: {springs: {s: {from: O2, to: crank.A, stiffness: 1}}}',
-    'unknown load': 'loads: {wind: 1}',
-    'fault of no kind': 'faults: {f: {}}',
-    'fault of two kinds': 'faults: {f: {freeze: {}, silence: {}}}',
-    'fault whose name is none of ROS': 'faults: {a-b: {freeze: {}}}',
-    'unknown fault': 'faults: {f: {frieze: {}}}',
-    'fault before the first tick': 'faults: {f: {freeze: {}, at: [-1], seconds: 1}}',
-    'fault without an end': 'faults: {f: {freeze: {}, at: [1]}}',
-    'fault with an end and no beginning': 'faults: {f: {freeze: {}, seconds: 1}}',
-    'bag here': 'record: {name: .}',
-    'bag without a folder': "record: {directory: ''}",
-    'hardly a queue': 'record: {queue: 1}',
-    'half a byte': 'record: {split_bytes: 1000000.5}',
-    'time that goes back': 'record: {split_seconds: -1}',
-    'room below nothing': 'record: {min_free_bytes: -1}',
-    'memory of a week': 'record: {snapshot_seconds: 604800}',
-    'room for nothing that is said': 'record: {snapshot_bytes: 5000000, snapshot_seconds: 0}',
-    'hardly room': 'record: {snapshot_seconds: 30, snapshot_bytes: 1000}',
-    'linkages beside linkage': 'linkages: [{name: a, linkage: linkage.yaml}]',
-}
-
-SEEN_BY_THE_READER = {
-    'joint that does not exist': 'effects: {bias: {joints: {wrist: 0.1}}}',
-    'link that does not exist': 'faults: {f: {broken_link: {link: boom}}}',
-    'effort of an input that is not published': 'publish_input: false\neffects: {effort: {}}',
-}
-
-ALL_BAD_SCENES = of_yaml(bad.SCENES, SCENE) | {
-    kind: SCENE + text.encode() for kind, text in (BAD_SCENES | SEEN_BY_THE_READER).items()
-}
-
-
-@pytest.mark.parametrize('kind', ALL_BAD_SCENES)
-def test_a_bad_scene_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(
-    kind, build, valid
-):
-    scene = ALL_BAD_SCENES[kind]
-    with pytest.raises(FileError):
-        build(scene)
-    assert valid('scene', content_of(scene)) == (kind in ('NaN', *SEEN_BY_THE_READER))
-
-
-@pytest.mark.parametrize(
-    'scene',
-    [
-        '{}',
-        'linkages: []',
-        'linkages: [{linkage: linkage.yaml}]',
-        'linkages: [{name: a}]',
-        'linkages: [{name: 1a, linkage: linkage.yaml}]',
-        'linkages: [{name: a, linkage: linkage.yaml, rate: 100}]',
-        'linkages: {name: a, linkage: linkage.yaml, effects: {velocty: {}}}',
-    ],
-)
-def test_bad_linkages_of_a_scene(scene, build, valid):
-    with pytest.raises(FileError):
-        build(scene.encode())
-    assert not valid('scene', content_of(scene.encode()))
-
-
 @pytest.mark.parametrize(
     'scene',
     [
@@ -261,54 +168,6 @@ def test_bad_linkages_of_a_scene(scene, build, valid):
 def test_the_schema_takes_good_scenes(scene, build, valid):
     build(scene.encode())
     assert valid('scene', content_of(scene.encode()))
-
-
-def slider(text: bytes) -> bytes:
-    full = (CONFIG / 'linkages' / 'scotch_yoke.yaml').read_bytes()
-    old = b'{point: Y, block: yoke, angle: 0, along: ground, through: O2, direction: [1, 0]}'
-    assert old in full
-    return full.replace(old, text)
-
-
-# The whole file, beside the bad linkages of `test_bad_files`.
-BAD_LINKAGES = {
-    'side that is none': WRITTEN_OUT.replace(b'B: left', b'B: above'),
-    'input of nothing': WRITTEN_OUT.replace(
-        b'input: {joint: crank_joint, parent: ground, child: crank}', b'input: []'
-    ),
-    'input without a parent': WRITTEN_OUT.replace(b'parent: ground, child: crank}', b'}'),
-    'slider and parent': WRITTEN_OUT.replace(
-        b'{parent: crank, child: coupler}', b'{slider: s, parent: crank}'
-    ),
-    'joints missing': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')],
-    'paths of no names': WRITTEN_OUT.replace(b'traced: [P]', b'traced: [1]'),
-    'pose without inputs': WRITTEN_OUT + b'pose: {points: {A: [0, 0]}}',
-    'mass below 0': WRITTEN_OUT + b'masses: {crank: {mass: -1, center: [0, 0], inertia: 0}}',
-    'mass without a place': WRITTEN_OUT + b'masses: {crank: {mass: 1, inertia: 0}}',
-    'angle of no block': slider(
-        b'{point: Y, angle: 0, along: ground, through: O2, direction: [1, 0]}'
-    ),
-    'slider without a direction': slider(b'{point: Y, block: yoke, along: ground, through: O2}'),
-}
-ALL_BAD_LINKAGES = of_yaml(bad.LINKAGES) | BAD_LINKAGES
-# Names, lengths that close, places that coincide.
-SEEN_IN_A_LINKAGE = (
-    'NaN length',
-    'closes nowhere', 'swivel on the pivot', 'link without length', 'no ground',
-    'no pin', 'crank that is no link', 'no side', 'joint of no link', 'the input published',
-    'joint of no text', 'slide of no slider',
-)  # fmt: skip
-
-
-@pytest.mark.parametrize('kind', ALL_BAD_LINKAGES)
-def test_a_bad_linkage_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(kind, valid):
-    data = ALL_BAD_LINKAGES[kind]
-    if b'masses:' in data:  # those that the shipped file has make room
-        head, _, tail = data.rpartition(b'masses:')
-        data = head.partition(b'masses:')[0] + b'masses:' + tail
-    with pytest.raises(FileError):
-        read_linkage(parse_yaml(data, 'linkage.yaml'))
-    assert valid('linkage', content_of(data)) == (kind in SEEN_IN_A_LINKAGE)
 
 
 ODD = [

@@ -15,7 +15,6 @@ from hypothesis import given, strategies as st
 from linkage_ros.cli.main import main
 from linkage_ros.description import LENGTHS, load, load_scene, parse_scene, Units
 from linkage_ros.errors import FileError
-from linkage_ros.stages.drives import LARGEST
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -199,89 +198,6 @@ def test_a_driven_slide_is_given_as_a_length(write):
     assert (sine.amplitude, sine.mean, sine.phase) == (0.04, 0.5, 0.5 * pi)
 
 
-MESSAGES = {
-    'a length out of bounds': (
-        'units: mm\nfour_bar: {a: -40, b: 120, c: 80, d: 100}',
-        (
-            'file.yaml:2: four_bar.a: -40 is out of bounds; '
-            'write a finite number, more than 0 and at most 1e+12 [mm]'
-        ),
-    ),
-    'a length that is missing': (
-        'units: in\nfour_bar: {a: 1}',
-        "file.yaml:2: four_bar: the key 'b' is missing; add b: a number in [in]",
-    ),
-    'a unit that is not one': (
-        'units: ft\nfour_bar: {a: 1}',
-        "file.yaml:1: units: 'ft' is not a choice; write m or cm or mm or in",
-    ),
-    'a limit that is never met': (
-        IN_MM.replace('pose: {inputs: [30]}\n', '').replace('velocity: 180', 'limits: [0, 10]'),
-        (
-            "file.yaml:11: joints.rocker_joint.limits: [0, 10] deg of 'rocker_joint' are never "
-            'met: it goes from 55.372 to 80.552 deg; widen them'
-        ),
-    ),
-    'a limit that is none': (
-        IN_MM.replace('limits: [0, 90]', 'limits: [.inf, 90]'),
-        (
-            "file.yaml:9: input.limits: [inf, 90] deg of 'crank_joint' are not valid limits; "
-            'write [low, high]; -.inf or .inf for none on a side'
-        ),
-    ),
-    'a pose beyond its limits': (
-        IN_MM.replace('inputs: [30]', 'inputs: [135]'),
-        (
-            'file.yaml:11: pose.inputs: 135 deg is beyond the limits [0, 90] deg of '
-            "'crank_joint'; start within the limits, or widen them"
-        ),
-    ),
-}
-
-
-@pytest.mark.parametrize('kind', MESSAGES)
-def test_an_error_is_told_in_the_units_of_the_file(write, kind):
-    text, line = MESSAGES[kind]
-    with pytest.raises(FileError) as caught:
-        load(write(text))
-    assert str(caught.value).endswith(f'/{line}')
-
-
-MOST = LARGEST * 180.0 / pi
-SCENE_MESSAGES = {
-    'a value beyond its bound': (
-        'drive: {constant_rate: {rate: 1.0e+30}}',
-        (
-            'file.yaml:3: drive.constant_rate.rate: 1e+30 is out of bounds; write a finite '
-            f'number, at least -{MOST:g} and at most {MOST:g} [deg/s]'
-        ),
-    ),
-    'a row without its value': (
-        'drive: {profile: {table: [[0, 1], [1]]}}',
-        (
-            'file.yaml:3: drive.profile.table: row 2, [1], is not [time [s], value [deg]]; '
-            'write finite numbers'
-        ),
-    ),
-    'a drive beyond limits': (
-        'drive: {sine: {amplitude: 60, frequency: 1, mean: 45}}',
-        (
-            "file.yaml:3: drive.sine: takes 'crank_joint' from -15 deg to 105 deg, beyond its "
-            'limits [0, 90] deg; stay within them, or widen them in the linkage file'
-        ),
-    ),
-}
-
-
-@pytest.mark.parametrize('kind', SCENE_MESSAGES)
-def test_an_error_in_a_scene_is_told_in_its_units(write, kind):
-    text, line = SCENE_MESSAGES[kind]
-    write(IN_SI, 'linkage.yaml')
-    with pytest.raises(FileError) as caught:
-        Pipeline(load_scene(write(f'linkage: linkage.yaml\nangles: degrees\n{text}')))
-    assert str(caught.value).endswith(f'/{line}')
-
-
 def test_what_is_set_has_the_units_of_the_scene(write):
     write(IN_SI, 'linkage.yaml')
     settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
@@ -330,93 +246,6 @@ def test_a_design_in_millimetres_needs_one_line_more(write, tmp_path):
     assert abs(other.points['B'] - one.points['B']) < 1e-12
 
 
-IN_MM_AND_DEGREES = {
-    'the start of a torque drive': (
-        IN_MM,
-        'drive: {torque: {start: 120}}',
-        'drive.torque.start: 120 deg is not between the stops; reachable: 0 to 90 deg; start',
-    ),
-    'the start of a driven slide': (
-        SLIDE_WITH_MASSES,
-        'drive: {torque: {start: 600}}',
-        'drive.torque.start: 600 mm is not between the stops; reachable: 450 to 550 mm; start',
-    ),
-    'a table over the position of a joint': (
-        IN_MM,
-        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_position: [[90, 1], [45, 2]]}}}}}}',
-        (
-            'loads.efforts.rocker_joint.over_position: row 2 begins with 45 deg, '
-            'not after 90 deg of row 1; write rows'
-        ),
-    ),
-    'a table over the rate of a slide': (
-        SLIDE_WITH_MASSES,
-        f'{PUSHED}loads: {{efforts: {{push: {{over_rate: [[90, 1], [45, 2]]}}}}}}',
-        (
-            'loads.efforts.push.over_rate: row 2 begins with 45 mm/s, '
-            'not after 90 mm/s of row 1; write rows'
-        ),
-    ),
-    'a table over time': (
-        IN_MM,
-        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_time: [[9, 1], [4, 2]]}}}}}}',
-        'loads.efforts.rocker_joint.over_time: row 2 begins with 4 s, not after 9 s of row 1',
-    ),
-    'a force over the position of a driven slide': (
-        SLIDE_WITH_MASSES,
-        (
-            f'{PUSHED}loads: {{forces: {{rod.P: {{direction: [1, 0], '
-            'over_position: [[550, 1], [500, 2]]}}}'
-        ),
-        (
-            'loads.forces.rod.P.over_position: row 2 begins with 500 mm, '
-            'not after 550 mm of row 1; write rows'
-        ),
-    ),
-    'a row beyond its bound': (
-        IN_MM,
-        f'{TORQUE}loads: {{efforts: {{rocker_joint: {{over_rate: [[0, 1], [1.0e+30, 2]]}}}}}}',
-        (
-            'loads.efforts.rocker_joint.over_rate: [1e+30, 2] is out of bounds; '
-            'write numbers of at most 5.72958e+10 [deg/s]'
-        ),
-    ),
-    'gravity beyond its bound': (
-        IN_MM,
-        f'{TORQUE}loads: {{gravity: [0, -1.0e+9]}}',
-        (
-            'loads.gravity: [0, -1000000000.0] is out of bounds; '
-            'write numbers of at most 1e+06 [mm/s²]'
-        ),
-    ),
-    'the length of a spring': (
-        IN_MM,
-        (
-            f'{TORQUE}loads: {{springs: {{s: {{from: ground.O4, to: coupler.B, stiffness: 5, '
-            'free_length: -10}}}'
-        ),
-        (
-            'loads.springs.s.free_length: -10 is out of bounds; '
-            'write a finite number, at least 0 and at most 1e+12 [mm]'
-        ),
-    ),
-    'the range of a sensor': (
-        IN_MM,
-        'effects: {measuring_range: {joints: {rocker_joint: {low: 90, high: 45}}}}',
-        'effects.measuring_range.joints.rocker_joint: low 90 deg is not below high 45 deg; write',
-    ),
-}
-
-
-@pytest.mark.parametrize('kind', IN_MM_AND_DEGREES)
-def test_an_error_in_a_scene_is_told_in_millimetres_and_degrees(write, kind):
-    linkage, text, beginning = IN_MM_AND_DEGREES[kind]
-    write(linkage, 'linkage.yaml')
-    with pytest.raises(FileError) as caught:
-        Pipeline(load_scene(write(f'linkage: linkage.yaml\nunits: mm\nangles: degrees\n{text}')))
-    assert str(caught.value).partition('.yaml:')[2].partition(': ')[2].startswith(beginning)
-
-
 FORCES = """
 linkage: linkage.yaml
 drive: {{torque: {{start: {start}}}}}
@@ -448,11 +277,3 @@ def test_angles_of_a_scene_name_how_they_are_published_and_their_unit(write, wor
     write(IN_SI, 'linkage.yaml')
     scene = load_scene(write(f'linkage: linkage.yaml\nangles: {words}'))
     assert (scene.wrapped, scene.linkages[0].content.units.angle) == WORDS[words]
-
-
-def test_two_words_for_one_thing_are_refused(write):
-    write(IN_SI, 'linkage.yaml')
-    with pytest.raises(
-        FileError, match=r"angles: \['wrapped', 'continuous'\] is not a choice; write cont"
-    ):
-        load_scene(write('linkage: linkage.yaml\nangles: [wrapped, continuous]'))
