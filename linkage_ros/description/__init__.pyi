@@ -20,15 +20,17 @@ from linkage_ros.description.file_kinds import (
 )
 from linkage_ros.description.linkage_file import (
     checked_closure as checked_closure,
-    FARTHEST as FARTHEST,
     find_assemblies as find_assemblies,
     find_closures as find_closures,
     linkage_content as linkage_content,
-    linkage_schema as linkage_schema,
     load as load,
     read_closure as read_closure,
     read_linkage as read_linkage,
     written_linkage as written_linkage,
+)
+from linkage_ros.description.linkage_grammar import (
+    FARTHEST as FARTHEST,
+    linkage_schema as linkage_schema,
 )
 from linkage_ros.description.linkage_writer import (
     content_of as content_of,
