@@ -175,8 +175,9 @@ def _build_input(**values: Any) -> Input:
 
 def _build_joint(**values: Any) -> RevoluteJoint | SlideJoint:
     limits = _split_limits(values)
-    build: Any = SlideJoint if 'slider' in values else RevoluteJoint
-    return build(limits=limits, **values)
+    if 'slider' in values:
+        return SlideJoint(limits=limits, **values)
+    return RevoluteJoint(limits=limits, **values)
 
 
 _ENDS = {

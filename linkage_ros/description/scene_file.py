@@ -376,4 +376,4 @@ def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:
             'no joint of the linkage has limits',
             'leave it out, or write limits: [low, high] into the linkage file',
         )
-    return policy == 'silent'
+    return bool(policy == 'silent')

@@ -147,8 +147,9 @@ class _SpringEnd(TextOf):
         return link, point_name
 
 
-def _build_spring(stiffness: float, free_length: float, damping: float, **ends: Any) -> Spring:
-    return Spring(*ends['from'], *ends['to'], stiffness, free_length, damping)
+def _build_spring(**values: Any) -> Spring:
+    ends = (*values.pop('from'), *values.pop('to'))
+    return Spring(*ends, **values)
 
 
 _END = _SpringEnd('its end: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
