@@ -15,23 +15,21 @@ Only the stages that the scene names are built; a tick never reads the scene.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
-from itertools import chain
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics import all_finite, Closure, Position, Status
+from linkage_ros.kinematics import Closure, Position, Status
 from linkage_ros.messages import JointStateWriter, Rejection
 from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
 from linkage_ros.stages.effects import (
     Continuous,
     first_values,
-    FORCE_EFFECTS,
     MechanismState,
     SensorReading,
     SensorStage,
@@ -39,20 +37,17 @@ from linkage_ros.stages.effects import (
     WriterStage,
 )
 from linkage_ros.tick.compiled_tick import (
-    compile_contribution,
-    compile_linkage_state,
-    compile_scene_tick,
+    compile_linkage,
+    compile_state,
     compile_tick,
-    CompiledState,
     CompiledTick,
-    StateTuple,
 )
+from linkage_ros.tick.linkage_state import LinkageState, Tick
 from linkage_ros.tick.sample_router import SampleRouter
 from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import AppliedForces, HeldWrench
-    from linkage_ros.kinematics.compiling import TracedMotion as CompiledMotion
     from linkage_ros.solvers import SolverChoice
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
@@ -63,54 +58,8 @@ _SUPPRESSING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 _RUNNING_IN_GAPS = {'backlash'}
 """Effects that keep running while a loop is open."""
 
-_KINEMATIC = ('velocity', 'acceleration')
-"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
-
 _FORCES_ONLY = {'pin_forces'}
 """Effects whose messages contain joint forces only."""
-
-
-class LinkageState(NamedTuple):
-    """The state of one linkage at a tick, step by step."""
-
-    crank: CrankState | None  # State of the crank; None without a crank state
-    position: Position | None  # Solution of the loops; None without a crank state
-    motion: MechanismState | None  # Motion of the mechanism; None where the loops do not close
-    # Published values; None where nothing is published. A delay stage may publish a reading
-    # although the linkage has no pose.
-    reading: SensorReading | None
-
-
-class Tick(NamedTuple):
-    """
-    The result of a tick.
-
-    Attributes
-    ----------
-    message
-        The serialized JointState; empty where nothing is published.
-    extras
-        One serialized message for each auxiliary topic, b'' where that topic has none; an empty
-        tuple where no auxiliary topic has a message.
-    states
-        State of each linkage, as far as the message needed it.
-    linkages
-        The linkage pipelines.
-
-    """
-
-    message: bytes
-    extras: tuple[bytes, ...]
-    states: Sequence[LinkageState | CompiledState | StateTuple]
-    linkages: Sequence[LinkagePipeline]
-
-    @property
-    def full_states(self) -> tuple[LinkageState, ...]:
-        """State of each linkage in full; computes here what the message did not need."""
-        return tuple(
-            linkage.complete_state(state)
-            for linkage, state in zip(self.linkages, self.states, strict=True)
-        )
 
 
 class AuxiliaryOutput(NamedTuple):
@@ -122,18 +71,10 @@ class AuxiliaryOutput(NamedTuple):
     message: str
     writer: WriterStage  # Serializes the message
 
-
-@dataclass(frozen=True)
-class _OutputSelection:
-    """Picks the values that the scene publishes from the motion of a compiled linkage."""
-
-    # Two objects with equal keys pick the same values.
-    key: list[Any]
-    select_values: Callable[..., Sequence[Sequence[float]]] = field(compare=False)
-
-    def __call__(self, motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
-        """Return the values, in groups."""
-        return self.select_values(motion, *given)
+    @property
+    def forces_only(self) -> bool:
+        """Return whether the message contains joint forces only."""
+        return self.effect in _FORCES_ONLY
 
 
 class LinkagePipeline:
@@ -163,7 +104,7 @@ class LinkagePipeline:
         self, scene: Scene, closure: Closure | None, injection: Injection | None
     ) -> None:
         scene_linkage = self.scene_linkage
-        wanted = choose_effects(scene_linkage)
+        self.wanted = wanted = choose_effects(scene_linkage)
         self.effect_names = tuple(effect.name for effect in wanted.effects)
         """Names of the computed effects, in physical order."""
         seed = f'{scene.seed}/{scene_linkage.name}'
@@ -185,7 +126,6 @@ class LinkagePipeline:
         self._build_mechanism(wanted, injection)
         self._build_sensors(wanted, injection, wrapped=scene.wrapped)
         self._build_outputs(wanted)
-        self._compiled_tick = self._compile_tick(wanted)
 
     def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the crank state: the drive, its messages and the effects on it."""
@@ -202,26 +142,26 @@ class LinkagePipeline:
             raise DefinitionError(
                 'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
             )
-        self._drive_stages = [*wanted.build('drive_stage', self.context).values()]
+        self.drive_stages = [*wanted.build('drive_stage', self.context).values()]
 
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
         loads = self.scene_linkage.loads if wanted.computes_forces else None
-        self._applied: AppliedForces | None = None
+        self.changing_loads: AppliedForces | None = None
         """Loads that change with the time or by messages; None without any."""
         self.wrenches: dict[str, HeldWrench] = {}
         """The wrenches that messages give, by the name of the link."""
         if loads is not None and (loads.applied.changes_with_time or loads.applied.wrenches):
-            self._applied = self.context.mechanics.applied
-            assert self._applied is not None
-            self.wrenches = self._applied.wrenches
+            self.changing_loads = self.context.mechanics.applied
+            assert self.changing_loads is not None
+            self.wrenches = self.changing_loads.wrenches
         self._solve_loops = self.closure.position
         if self.scene_linkage.silent_beyond_limits and self.closure.bounds:
             self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
-        self._mechanism_faults = (
+        self.mechanism_faults = (
             injection.build_functions('mechanism', self.context) if injection is not None else []
         )
-        self._mechanism_stages = [*wanted.build('stage', self.context).values()]
+        self.mechanism_stages = [*wanted.build('stage', self.context).values()]
 
     def _build_sensors(
         self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
@@ -234,17 +174,17 @@ class LinkagePipeline:
         broken = injection.build_functions('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
-        self._running = angles if behind or not wrapped else None
-        self._observed_effects = wanted.named
+        self.running = angles if behind or not wrapped else None
+        self.observed_effects = wanted.named
         if behind and 'velocity' in self.effect_names and 'velocity' not in wanted.named:
             # Only used between readings; not published.
-            self._observed_effects |= {'velocity'}
+            self.observed_effects |= {'velocity'}
             behind.append(_remove_rates)
         if wrapped:
             behind.append(wrap_all(self.closure.turning))
-        running = [] if self._running is None else [self._running]
+        running = [] if self.running is None else [self.running]
         self._sensor_stages = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
-        self._apply_later_sensors = (
+        self.apply_later_sensors = (
             partial(self._apply_sensors, first=len(running)) if behind else None
         )
 
@@ -277,97 +217,62 @@ class LinkagePipeline:
                     )
                 )
 
-    def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
-        """Generate the tick up to the reading; None where a part has no generated form."""
-        moved = {effect.name for effect in wanted.effects if effect.stage is not None}
-        if not self.closure.by_steps or self._mechanism_faults:
-            return None
-        if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
-            return None
-        outputs, applied = None, None if moved.isdisjoint(FORCE_EFFECTS) else self._applied
-        if 'acceleration' in moved:
-            of = [wanted.parameters[name] for name in self.effect_names if name in moved]
-            of += [self._observed_effects, self.context.loads, self.context.friction]
-            outputs = _OutputSelection(of, self._symbolic_outputs)
-        compiled = self.closure.compile_linkage(
-            len(moved.intersection(_KINEMATIC)), outputs, applied.given_count if applied else 0
-        )
-        # Where the forces have no solution, a compiled path has fewer values.
-        if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
-            return None
-        return compile_tick(self.drive, self._drive_stages, compiled, self._running, applied)
-
-    @property
-    def whole_tick(self) -> CompiledTick | None:
-        """Return the generated tick up to the reading; None if a stage is not generated."""
-        of_seen = all(
-            extra.writer.of_reading or extra.effect in _FORCES_ONLY for extra in self.extras
-        )
-        return self._compiled_tick if self._apply_later_sensors is None and of_seen else None
+    @cached_property
+    def compiled(self) -> CompiledTick | None:
+        """Return the usual tick up to the reading, compiled; None if a part has no such form."""
+        return compile_linkage(self)
 
     @cached_property
-    def compute_state(self) -> Callable[[int], LinkageState | CompiledState]:
+    def compute_state(self) -> Callable[[int], LinkageState]:
         """Return a function from the time, in [ns], to the state of the linkage."""
-        if self._compiled_tick is None:
-            return self._interpret_state
-        return compile_linkage_state(
-            self._compiled_tick, self._apply_later_sensors, self.interpret_from_crank
-        )
+        return compile_state(self) or self.interpret
 
-    def _interpret_state(self, now: int) -> LinkageState:
+    def interpret(self, now: int) -> LinkageState:
         """Return the state of the linkage at a time, in [ns], step by step."""
         crank = self.drive.state(now)
         if crank is not None:
-            for stage in self._drive_stages:
+            for stage in self.drive_stages:
                 crank = stage(crank)
-        return self.interpret_from_crank(now, crank)
+        return self.interpret_from(now, crank)
 
-    def interpret_from_crank(self, now: int, crank: CrankState | None) -> LinkageState:
-        """Return the state of the linkage, given the crank state."""
+    def interpret_from(self, now: int, crank: CrankState | None) -> LinkageState:
+        """Return the state of the linkage, step by step from the crank state on."""
         if crank is None:
-            return LinkageState(None, None, None, self._apply_sensors_in_gap(now))
+            reading = self._apply_sensors_in_gap(now)
+            return LinkageState(self, None, reading, solution=(None, None))
         position = self._solve_loops(*crank.angles)
-        for fault in self._mechanism_faults:
+        for fault in self.mechanism_faults:
             position = fault(position)
         if not position.joints:
-            return LinkageState(crank, position, None, self._apply_sensors_in_gap(now))
+            reading = self._apply_sensors_in_gap(now)
+            return LinkageState(self, crank, reading, solution=(position, None))
         # The time of the loads begins here: a bag does not know of ticks before the first pose.
-        given = self._applied.given_at(now) if self._applied is not None else ()
+        given = self.changing_loads.given_at(now) if self.changing_loads is not None else ()
         motion = self._mechanism_motion(crank, position, given)
-        return LinkageState(
-            crank, position, motion, self._apply_sensors(now, self._observe(now, motion))
-        )
+        reading = self._apply_sensors(now, self.observe(now, motion))
+        return LinkageState(self, crank, reading, (), given, (position, motion))
 
-    def _symbolic_outputs(
-        self, motion: CompiledMotion, *given: float
-    ) -> Sequence[Sequence[float]]:
-        """Return the ideal reading of a symbolic motion, and the joint forces."""
-        acceleration = motion.acceleration
-        if acceleration is None or not all_finite(acceleration.joints):
-            return []
-        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), given)
-        _velocity, _acceleration, *stages = self._mechanism_stages
-        for stage in stages:
-            moved = stage(moved)
-        reactions = (
-            [] if _FORCES_ONLY.isdisjoint(self._observed_effects) else [*chain(*moved.reactions)]
-        )
-        return [*self._observe(0, moved)[1:], reactions]
+    def solve_mechanism(
+        self, crank: CrankState, given: tuple[float, ...]
+    ) -> tuple[Position, MechanismState]:
+        """Return position and motion of the linkage for a crank state of a compiled tick."""
+        position = self._solve_loops(*crank.angles)
+        return position, self._mechanism_motion(crank, position, given)
 
     def _mechanism_motion(
         self, crank: CrankState, position: Position, given: tuple[float, ...]
     ) -> MechanismState:
         """Return the motion of the mechanism in a pose."""
         motion = MechanismState(crank, position, None, None, (), (), (), given)
-        for stage in self._mechanism_stages:
+        for stage in self.mechanism_stages:
             motion = stage(motion)
         return motion
 
-    def _observe(self, now: int, motion: MechanismState) -> SensorReading:
+    def observe(self, now: int, motion: MechanismState) -> SensorReading:
         """Return the ideal reading of a motion, with the values that the scene asks for."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
-        if 'effort' in self._observed_effects and motion.efforts:
+        if 'effort' in self.observed_effects and motion.efforts:
             # Efforts of the inputs, which are published first; 0 for the other joints.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
@@ -375,9 +280,9 @@ class LinkagePipeline:
             tuple(map(add, position.joints, motion.deflection))
             if motion.deflection
             else position.joints,
-            velocity.joints if velocity and 'velocity' in self._observed_effects else (),
+            velocity.joints if velocity and 'velocity' in self.observed_effects else (),
             acceleration.joints
-            if acceleration and 'acceleration' in self._observed_effects
+            if acceleration and 'acceleration' in self.observed_effects
             else (),
             efforts,
         )
@@ -406,40 +311,9 @@ class LinkagePipeline:
                 reading = sensor.gap(now)
         return reading
 
-    def complete_state(self, state: LinkageState | CompiledState | StateTuple) -> LinkageState:
-        """Return the full state of a linkage; the generated tick leaves a part out."""
-        if isinstance(state, LinkageState):
-            return state
-        crank_numbers, numbers, _, given = state
-        crank = _crank_state(crank_numbers)
-        position = self._solve_loops(*crank.angles)
-        reading = None if numbers is None else SensorReading(*numbers)
-        return LinkageState(
-            crank, position, self._mechanism_motion(crank, position, given), reading
-        )
-
-    def write_extras(self, now: int, state: LinkageState | CompiledState) -> list[bytes]:
+    def write_extras(self, now: int, state: LinkageState) -> list[bytes]:
         """Return the auxiliary messages at a time, in [ns]; b'' for none."""
-        return [self._write_extra(extra, now, state) for extra in self.extras]
-
-    def _write_extra(
-        self, extra: AuxiliaryOutput, now: int, state: LinkageState | CompiledState
-    ) -> bytes:
-        writer = extra.writer
-        if writer.due is not None and not writer.due(now):
-            return b''
-        reading = state.reading
-        forces = (
-            state if extra.effect in _FORCES_ONLY and isinstance(state, CompiledState) else None
-        )
-        if writer.of_reading or forces is not None:
-            return b'' if reading is None else writer.write(now, forces, reading)
-        _, position, motion, _ = self.complete_state(state)
-        if motion is not None:
-            return b'' if reading is None else writer.write(now, motion, reading)
-        if position is None or writer.no_pose is None:
-            return b''
-        return writer.no_pose(now, position)
+        return [_write_extra(extra, now, state) for extra in self.extras]
 
     @property
     def gap_begins(self) -> bool:
@@ -467,6 +341,21 @@ class LinkagePipeline:
             return sample
         rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
         return rejection
+
+
+def _write_extra(extra: AuxiliaryOutput, now: int, state: LinkageState) -> bytes:
+    writer, reading = extra.writer, state.reading
+    if writer.due is not None and not writer.due(now):
+        return b''
+    if writer.of_reading:
+        return b'' if reading is None else writer.write(now, None, reading)
+    if state.is_compiled and extra.forces_only:
+        return b'' if reading is None else writer.write(now, state, reading)
+    if state.motion is not None:
+        return b'' if reading is None else writer.write(now, state.motion, reading)
+    if state.position is None or writer.no_pose is None:
+        return b''
+    return writer.no_pose(now, state.position)
 
 
 def _make_output(
@@ -599,7 +488,7 @@ class Pipeline:
         self._offer_count = 0
         self._newest_offers: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
-        self.tick = self._build_tick()
+        self.tick = compile_tick(self) or self.interpret
         """Computes the tick at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
@@ -640,7 +529,11 @@ class Pipeline:
         self._newest_offers.clear()
         return len(fresh), len(stale)
 
-    def _make_tick(self, now: int, states: Sequence[LinkageState | CompiledState]) -> Tick:
+    def interpret(self, now: int) -> Tick:
+        """Return the tick at a time, in [ns], step by step."""
+        return self.make_tick(now, [linkage.interpret(now) for linkage in self.linkages])
+
+    def make_tick(self, now: int, states: Sequence[LinkageState]) -> Tick:
         """Return the result of a tick; joints without a reading are left out."""
         extras: tuple[bytes, ...] = ()
         if self.extras:
@@ -652,63 +545,19 @@ class Pipeline:
         if not readings:
             return Tick(b'', extras if any(extras) else (), states, self.linkages)
         present = tuple([state.reading is not None for state in states])
-        writer = self._writers.get(present) or self._make_writer(present)
+        writer = self._writers.get(present) or self.make_writer(present)
         stamp = max([reading.stamp for reading in readings])
         return Tick(writer.write(stamp, *_join_readings(readings)), extras, states, self.linkages)
-
-    def _build_tick(self) -> Callable[[int], Tick]:
-        """Return the tick as a function of the time, in [ns]; generated text if possible."""
-        compiled = [tick for linkage in self.linkages if (tick := linkage.whole_tick) is not None]
-        several = len(self.linkages) > 1
-        if len(compiled) < len(self.linkages) or (several and self.extras):
-            computes = [linkage.compute_state for linkage in self.linkages]
-            return lambda now: self._make_tick(now, [compute(now) for compute in computes])
-        if several:
-            return self._combine_ticks(compiled)
-        (linkage,), (compiled_tick,) = self.linkages, compiled
-        return compile_scene_tick(
-            compiled_tick,
-            self._make_writer((True,)),
-            [extra.writer for extra in self.extras],
-            Tick,
-            self.linkages,
-            lambda now, crank: self._make_tick(now, [linkage.interpret_from_crank(now, crank)]),
-        )
-
-    def _combine_ticks(self, compiled_ticks: Sequence[CompiledTick]) -> Callable[[int], Tick]:
-        """Return the tick of several linkages that all have generated ticks."""
-        linkages = self.linkages
-        contributions = [
-            compile_contribution(compiled, linkage.interpret_from_crank)
-            for compiled, linkage in zip(compiled_ticks, linkages, strict=True)
-        ]
-        write = self._make_writer((True,) * len(linkages)).write
-        count = sum(len(compiled.joints) for compiled in compiled_ticks)
-
-        def tick(now: int) -> Tick:
-            positions: list[float] = []
-            rates: list[float] = []
-            efforts: list[float] = []
-            states = [add(now, positions, rates, efforts) for add in contributions]
-            if len(positions) < count:
-                return self._make_tick(now, [_name_fields(state) for state in states])
-            message = write(
-                now, positions, _if_complete(rates, count), _if_complete(efforts, count)
-            )
-            return Tick(message, (), states, linkages)
-
-        return tick
 
     def changes_state(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes the state of the pipeline."""
         return any(
-            not isinstance(state, LinkageState)
-            or linkage.gap_begins
-            or (state.position is not None and (bool(state.position.joints) or self._has_state))
+            state.has_pose or linkage.gap_begins or (self._has_state and state.crank is not None)
             for linkage, state in zip(self.linkages, tick.states, strict=True)
         )
 
-    def _make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
+    def make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
+        """Return the writer of the joints of the linkages that are present."""
         joints = [
             joint
             for linkage, there in zip(self.linkages, present, strict=True)
@@ -759,21 +608,4 @@ def _join_readings(
     rates = [value for reading in readings for value in reading.rates]
     efforts = [value for reading in readings for value in reading.efforts]
     n = len(positions)
-    return positions, _if_complete(rates, n), _if_complete(efforts, n)
-
-
-def _if_complete(values: list[float], count: int) -> list[float]:
-    """Return the values if there is one for each joint, else an empty list."""
-    return values if len(values) == count else []
-
-
-def _name_fields(state: LinkageState | StateTuple) -> LinkageState | CompiledState:
-    """Return the state of a linkage as a named tuple."""
-    if isinstance(state, LinkageState):
-        return state
-    crank, reading, *more = state
-    return CompiledState(_crank_state(crank), SensorReading(*reading), *more)
-
-
-def _crank_state(crank: tuple[Any, ...]) -> CrankState:
-    return crank if isinstance(crank, CrankState) else CrankState(*crank)
+    return positions, rates if len(rates) == n else [], efforts if len(efforts) == n else []

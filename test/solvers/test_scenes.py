@@ -87,7 +87,7 @@ def test_a_scene_runs_with_it(name):
     for index in range(3000):
         now = BEGIN + index * 1_000_000
         tick = pipeline.tick(now)
-        (look,), (expected,) = tick.full_states, plain.tick(now).full_states
+        (look,), (expected,) = tick.states, plain.tick(now).states
         assert tick.message
         assert all(tick.extras)
         assert apart(closure, look.reading.joints, expected.reading.joints) <= of_position
