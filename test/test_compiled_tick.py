@@ -236,4 +236,5 @@ def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch
 
     monkeypatch.setattr(linkage, 'solve_mechanism', count)
     drawn = sum(any(tick.extras) for tick in ticks(work))
-    assert drawn == len(worked_out) == TICKS * 50 // 1000
+    # The first tick is interpreted, which works it out anyway.
+    assert drawn == len(worked_out) + 1 == TICKS * 50 // 1000

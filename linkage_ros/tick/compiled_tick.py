@@ -63,7 +63,7 @@ def compile_tick(pipeline: Pipeline) -> Callable[[int], Tick] | None:
     linkages = pipeline.linkages
     if not any(linkage.compiled for linkage in linkages):
         return None
-    whole = [linkage.compiled for linkage in linkages if _is_whole(linkage)]
+    whole = [one.compiled for one in linkages if one.compiled is not None and _is_whole(one)]
     if len(whole) == len(linkages) == 1:
         return _compile_single(pipeline, whole[0])
     if len(whole) == len(linkages) and not pipeline.extras:
@@ -85,11 +85,10 @@ def compile_state(linkage: LinkagePipeline) -> Callable[[int], LinkageState] | N
 
 
 def _is_whole(linkage: LinkagePipeline) -> bool:
-    """Return whether all of a linkage's tick is compiled, its sensors and messages too."""
+    """Return whether sensors and messages of a linkage take nothing that is interpreted."""
     return (
-        linkage.compiled is not None
+        all(one.writer.of_reading or one.forces_only for one in linkage.extras)
         and linkage.apply_later_sensors is None
-        and all(one.writer.of_reading or one.forces_only for one in linkage.extras)
     )
 
 

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from itertools import chain, count
+from typing import Any
 
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.compiling import (
@@ -36,9 +37,10 @@ def compile_drive(drive: Drive, inputs: int, leave: str, leave_without_crank: st
         return Lines([*lines, f'{fields} = crank'], {'drive_state': drive.state})
     now, held = drive.usual(inputs)
     tape, numbers = Tape(), count()
-    time = tape.add_input('now', now)
+    time: Any = tape.add_input('now', now)
     # Of each held part its symbols, and how it is written: as its number, or as a whole tuple.
-    parts, names = [], []
+    parts: list[tuple[Any, ...]] = []
+    names: list[str] = []
     for part in held if isinstance(held, tuple) else (held,):
         several = part if isinstance(part, tuple) else (part,)
         parts.append(tuple([tape.add_input(f'h{next(numbers)}', number) for number in several]))
