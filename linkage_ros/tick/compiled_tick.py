@@ -194,7 +194,7 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     """Compile the tick of a linkage up to the reading; None where a part has no such form."""
     wanted = linkage.wanted
     moved = {effect.name for effect in wanted.effects if effect.stage is not None}
-    if not linkage.closure.by_steps or linkage.mechanism_faults:
+    if linkage.mechanism_faults:
         return None
     if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
         return None

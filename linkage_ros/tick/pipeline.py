@@ -25,7 +25,6 @@ from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import Closure, Position, Status
 from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
 from linkage_ros.stages.effects import (
     Continuous,
@@ -48,7 +47,6 @@ from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import AppliedForces, HeldWrench
-    from linkage_ros.solvers import SolverChoice
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
 
@@ -320,12 +318,6 @@ class LinkagePipeline:
         """Return whether a gap in the readings began at the last tick, if that had no pose."""
         return any(sensor.gap_begins for sensor in self._sensor_stages)
 
-    @property
-    def solver_choice(self) -> SolverChoice | None:
-        """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
-        choice: SolverChoice | None = getattr(self.closure, 'choice', None)
-        return choice
-
     def is_stale(self, now: int) -> bool:
         """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
         return now - self.drive.stamp > self.drive.max_age > 0
@@ -387,22 +379,12 @@ def _suppress_beyond_limits(
 
 
 def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
-    """Return the closure of a linkage as its effects alter it, by the solver that it names."""
+    """Return the closure of a linkage as its effects alter it."""
     linkage = scene_linkage.linkage
     for effect in wanted.effects:
         if effect.alter is not None:
             random = Context.generator(seed, effect.name)
             linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
-    if scene_linkage.accuracy is not None:
-        from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
-
-        if wanted.computes_forces:
-            return choose.only_closed_form(linkage, 'forces start from it')
-        return choose.choose_solver(linkage, scene_linkage.accuracy)
-    if scene_linkage.solver is not None:
-        name, solving = scene_linkage.solver
-        closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
-        return closure
     return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
 
 
