@@ -16,7 +16,7 @@ import re
 from linkage_ros.description import linkage_text, parse_scene, parse_yaml, read_linkage
 from linkage_ros.kinematics import assur_groups, GROUND, Mass
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.tick import Pipeline
+from linkage_ros.tick import InterpretedTick, LinkagePipeline, Pipeline
 import pytest
 
 from .support.messages import wrench_stamped
@@ -112,7 +112,7 @@ def with_forces(linkage):
 def check(linkage, scene, looked=1):
     """Hold the straight ticks of a scene against the plain ones; every so many in full."""
     straight, plain = pipeline(linkage, scene), pipeline(linkage, scene)
-    plain.tick = plain.interpret
+    plain.tick = InterpretedTick(plain.linkages).run
     for index, (one, other) in enumerate(zip(ticks(straight), ticks(plain), strict=True)):
         assert (one.message, one.extras) == (other.message, other.extras)
         if index % looked:
@@ -226,15 +226,14 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
 
 def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch):
     file = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
-    work = pipeline(file.read_bytes(), f'{DRIVES["turning"]}\neffects: {{markers: {{rate: 50}}}}')
-    (linkage,) = work.linkages
-    solve, worked_out = linkage.solve_mechanism, []
+    solve, worked_out = LinkagePipeline.solve_mechanism, []
 
     def count(*state):
         worked_out.append(state)
         return solve(*state)
 
-    monkeypatch.setattr(linkage, 'solve_mechanism', count)
+    monkeypatch.setattr(LinkagePipeline, 'solve_mechanism', count)
+    work = pipeline(file.read_bytes(), f'{DRIVES["turning"]}\neffects: {{markers: {{rate: 50}}}}')
     drawn = sum(any(tick.extras) for tick in ticks(work))
     # The first tick is interpreted, which works it out anyway.
     assert drawn == len(worked_out) + 1 == TICKS * 50 // 1000

@@ -29,11 +29,12 @@ from linkage_ros.generated_code import define_function, Lines
 from linkage_ros.kinematics import all_finite
 from linkage_ros.stages.drives import compile_drive, CrankState
 from linkage_ros.stages.effects import FORCE_EFFECTS, MechanismState, SensorReading
-from linkage_ros.tick.linkage_state import LinkageState, Tick
+from linkage_ros.tick.interpreted_tick import InterpretedTick, Tick
+from linkage_ros.tick.linkage_pipeline import LinkagePipeline
+from linkage_ros.tick.linkage_state import LinkageState
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling import Compiled, TracedMotion
-    from linkage_ros.tick.pipeline import LinkagePipeline, Pipeline
 
 _CRANK_FIELDS = ', '.join(CrankState._fields)
 
@@ -58,25 +59,30 @@ class CompiledTick(NamedTuple):
     reactions: list[str]  # All reaction values in sequence, as expressions; likewise
 
 
-def compile_tick(pipeline: Pipeline) -> Callable[[int], Tick] | None:
-    """Return the tick of a scene as a function of the time, in [ns]; None if nothing compiles."""
-    linkages = pipeline.linkages
-    if not any(linkage.compiled for linkage in linkages):
+def compile_tick(interpreted: InterpretedTick) -> Callable[[int], Tick] | None:
+    """Return a tick as a function of the time, in [ns], with the same bits, or None."""
+    linkages = interpreted.linkages
+    compiled = [compile_linkage(linkage) for linkage in linkages]
+    if not any(compiled):
         return None
-    whole = [one.compiled for one in linkages if one.compiled is not None and _is_whole(one)]
+    pairs = zip(linkages, compiled, strict=True)
+    whole = [one for linkage, one in pairs if one is not None and _is_whole(linkage)]
     if len(whole) == len(linkages) == 1:
-        return _compile_single(pipeline, whole[0])
-    if len(whole) == len(linkages) and not pipeline.extras:
-        return _combine_ticks(pipeline, whole)
-    computes = [linkage.compute_state for linkage in linkages]
-    return lambda now: pipeline.make_tick(now, [compute(now) for compute in computes])
+        return _compile_single(interpreted, whole[0])
+    if len(whole) == len(linkages) and not interpreted.extras:
+        return _combine_ticks(interpreted, whole)
+    computes = [
+        linkage.interpret if one is None else _compile_state(linkage, one)
+        for linkage, one in zip(linkages, compiled, strict=True)
+    ]
+    return lambda now: interpreted.make_tick(now, [compute(now) for compute in computes])
 
 
-def compile_state(linkage: LinkagePipeline) -> Callable[[int], LinkageState] | None:
-    """Return the state of a linkage as a function of the time, in [ns], or None."""
-    compiled, apply_sensors = linkage.compiled, linkage.apply_later_sensors
-    if compiled is None:
-        return None
+def _compile_state(
+    linkage: LinkagePipeline, compiled: CompiledTick
+) -> Callable[[int], LinkageState]:
+    """Return the state of a linkage as a function of the time, in [ns]."""
+    apply_sensors = linkage.apply_later_sensors
     lines = [f'reading = new(Reading, {_reading_text(compiled)})']
     if apply_sensors is not None:
         lines.append('reading = apply_sensors(now, reading)')
@@ -92,14 +98,14 @@ def _is_whole(linkage: LinkagePipeline) -> bool:
     )
 
 
-def _compile_single(pipeline: Pipeline, compiled: CompiledTick) -> Callable[[int], Tick]:
+def _compile_single(interpreted: InterpretedTick, compiled: CompiledTick) -> Callable[[int], Tick]:
     """Return the whole tick of a scene with one linkage."""
-    (linkage,) = pipeline.linkages
-    packed = pipeline.make_writer((True,)).compile_write(
+    (linkage,) = interpreted.linkages
+    packed = interpreted.make_writer((True,)).compile_write(
         'now', compiled.joints, compiled.rates, compiled.efforts
     )
     lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
-    writers = [extra.writer for extra in pipeline.extras]
+    writers = [extra.writer for extra in interpreted.extras]
     if writers:
         lines.append('reading = new(Reading, reading)')
     state = _values_text(compiled)
@@ -113,22 +119,22 @@ def _compile_single(pipeline: Pipeline, compiled: CompiledTick) -> Callable[[int
         lines.append(f'state = {_state_text(compiled)}')
         state = 'state'
     lines.append(f'return new(Tick, (message, {messages}, ({state},), linkages))')
-    bound: dict[str, Any] = {'Tick': Tick, 'linkages': pipeline.linkages}
+    bound: dict[str, Any] = {'Tick': Tick, 'linkages': interpreted.linkages}
     bound |= {f'write{index}': writer.write for index, writer in enumerate(writers)}
-    bound['interpret'] = pipeline.interpret
-    bound['interpret_from'] = lambda now, crank: pipeline.make_tick(
+    bound['interpret'] = interpreted.run
+    bound['interpret_from'] = lambda now, crank: interpreted.make_tick(
         now, [linkage.interpret_from(now, crank)]
     )
     return _define_function(linkage, compiled, lines, bound | packed.bound)
 
 
 def _combine_ticks(
-    pipeline: Pipeline, compiled_ticks: Sequence[CompiledTick]
+    interpreted: InterpretedTick, compiled_ticks: Sequence[CompiledTick]
 ) -> Callable[[int], Tick]:
     """Return the whole tick of a scene with several linkages and one message."""
-    linkages = pipeline.linkages
+    linkages = interpreted.linkages
     adders = [*map(_compile_adder, linkages, compiled_ticks)]
-    write = pipeline.make_writer((True,) * len(linkages)).write
+    write = interpreted.make_writer((True,) * len(linkages)).write
     numbers = [
         sum(len(getattr(compiled, group)) for compiled in compiled_ticks)
         for group in ('joints', 'rates', 'efforts')
@@ -143,7 +149,7 @@ def _combine_ticks(
         states = [add(now, positions, rates, efforts) for add in adders]
         if len(positions) < count:
             named = Tick(b'', (), states, linkages).states
-            return pipeline.make_tick(now, named)
+            return interpreted.make_tick(now, named)
         message = write(now, positions, rates if all_rates else [], efforts if all_efforts else [])
         return Tick(message, (), states, linkages)
 
@@ -306,7 +312,7 @@ def _define_function(
         'CrankState': CrankState,
         'Reading': SensorReading,
         'LinkageState': LinkageState,
-        'linkage': linkage,
+        'complete': linkage.solve_mechanism,
         'interpret': linkage.interpret,
         'interpret_from': linkage.interpret_from,
     }
@@ -323,7 +329,7 @@ def _reading_text(compiled: CompiledTick) -> str:
 def _state_text(compiled: CompiledTick) -> str:
     """Write the state of a linkage, whose reading is an object."""
     crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
-    return f'LinkageState(linkage, {crank}, {_tail_text(compiled)})'
+    return f'LinkageState(complete, {crank}, {_tail_text(compiled)})'
 
 
 def _values_text(compiled: CompiledTick) -> str:

@@ -6,12 +6,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The result of a tick, and the state of each linkage at it."""
+"""The state of a linkage at a tick."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
 
 from linkage_ros.stages.drives import CrankState
 from linkage_ros.stages.effects import MechanismState, SensorReading
@@ -19,7 +19,6 @@ from linkage_ros.stages.effects import MechanismState, SensorReading
 if TYPE_CHECKING:
     from linkage_ros.dynamics import Reaction
     from linkage_ros.kinematics import Position
-    from linkage_ros.tick.pipeline import LinkagePipeline
 
 Solution: TypeAlias = 'tuple[Position | None, MechanismState | None]'
 """Position and motion of a linkage, each None where there is none."""
@@ -28,18 +27,26 @@ Solution: TypeAlias = 'tuple[Position | None, MechanismState | None]'
 class LinkageState:
     """The state of one linkage at a tick; what its messages did not need is computed on demand."""
 
-    __slots__ = ('_linkage', '_reactions', '_solution', 'crank', 'given', 'is_compiled', 'reading')
+    __slots__ = (
+        '_complete',
+        '_reactions',
+        '_solution',
+        'crank',
+        'given',
+        'is_compiled',
+        'reading',
+    )
 
     def __init__(
         self,
-        linkage: LinkagePipeline,
+        complete: Callable[[CrankState, tuple[float, ...]], Solution],
         crank: CrankState | None,
         reading: SensorReading | None,
         reactions: tuple[Reaction, ...] = (),
         given: tuple[float, ...] = (),
         solution: Solution | None = None,
     ) -> None:
-        self._linkage = linkage
+        self._complete = complete
         self._reactions = reactions
         self._solution = solution
         self.crank = crank
@@ -77,45 +84,5 @@ class LinkageState:
     def _solve(self) -> Solution:
         if self._solution is None:
             assert self.crank is not None
-            self._solution = self._linkage.solve_mechanism(self.crank, self.given)
+            self._solution = self._complete(self.crank, self.given)
         return self._solution
-
-
-class Tick(NamedTuple):
-    """
-    The result of a tick.
-
-    Attributes
-    ----------
-    message
-        The serialized JointState; empty where nothing is published.
-    extras
-        One serialized message for each auxiliary topic, b'' where that topic has none; an empty
-        tuple where no auxiliary topic has a message.
-    computed
-        State of each linkage; instead of a compiled state that is published, the values of its
-        crank state and of its reading, its reactions and its given numbers, as plain tuples.
-    linkages
-        The linkage pipelines.
-
-    """
-
-    message: bytes
-    extras: tuple[bytes, ...]
-    computed: Sequence[LinkageState | tuple[Any, ...]]
-    linkages: Sequence[LinkagePipeline]
-
-    @property
-    def states(self) -> tuple[LinkageState, ...]:
-        """State of each linkage."""
-        return tuple(
-            state if isinstance(state, LinkageState) else _name_values(linkage, *state)
-            for linkage, state in zip(self.linkages, self.computed, strict=True)
-        )
-
-
-def _name_values(
-    linkage: LinkagePipeline, crank: Any, reading: Any, reactions: Any, given: Any
-) -> LinkageState:
-    crank = crank if isinstance(crank, CrankState) else CrankState(*crank)
-    return LinkageState(linkage, crank, SensorReading(*reading), reactions, given)

@@ -27,7 +27,8 @@ from linkage_ros.bag import Recorder
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Position, Status
 from linkage_ros.messages import Rejection, time_message
-from linkage_ros.tick.linkage_state import LinkageState, Tick
+from linkage_ros.tick.interpreted_tick import Tick
+from linkage_ros.tick.linkage_state import LinkageState
 from linkage_ros.tick.pipeline import Pipeline
 
 if TYPE_CHECKING:
