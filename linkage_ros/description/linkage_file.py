@@ -18,9 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.description.linkage_grammar import LINKAGE, SHORTHANDS, UNITS, WRITTEN_OUT
-from linkage_ros.description.parameters import (
-    read_parameters,
-)
+from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import read_yaml

@@ -430,18 +430,11 @@ SHORTHANDS = {
         },
     ),
 }
-UNITS = {
-    'units': LENGTH_UNIT,
-    'angles': choice('Unit of the angles.', ANGLES, ANGLES[0]),
-}
+UNITS = {'units': LENGTH_UNIT, 'angles': choice('Unit of the angles.', ANGLES, ANGLES[0])}
 LINKAGE = Keys(
     'A planar linkage.',
     dict,
-    {
-        **UNITS,
-        **WRITTEN_OUT,
-        **{name: optional_keys(keys) for name, keys in SHORTHANDS.items()},
-    },
+    {**UNITS, **WRITTEN_OUT, **{name: optional_keys(keys) for name, keys in SHORTHANDS.items()}},
     (_ShorthandOrLinks(),),
 )
 

@@ -122,11 +122,7 @@ class Keys:
 
     def read_key(self, content: Section, key: str, parts: Parts, folder: str = '') -> Any:
         """Return the value of a key, or its default."""
-        entry = self.entries[key]
-        if key in content or is_required(entry):
-            return entry.metadata[_KEY].read(content, key, parts, folder)
-        content.remove_key(key)
-        return entry.default if entry.default_factory is MISSING else entry.default_factory()
+        return _read_entry(self.entries[key], content, parts, folder)
 
 
 @dataclass(frozen=True, slots=True)
@@ -558,29 +554,32 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
     """
     entries = declared_fields(of)
     _refuse_misplaced(content, entries, parts)
-    if not isinstance(of, Keys):
-        values = {
-            entry.name: kind.read(content, entry.name, parts, folder)
-            for entry, kind in entries
-            if entry.name in content or is_required(entry)
-        }
-        content.finish([entry.name for entry, _ in entries])
-        return of(**values)
-    for rule in of.rules:
+    rules = of.rules if isinstance(of, Keys) else ()
+    for rule in rules:
         rule.check(content)
-    unknown = {key for rule in of.rules for key in rule.unknown_keys(content)}
-    needed = {key for rule in of.rules for key in rule.needed_keys(content)}
+    unknown = {key for rule in rules for key in rule.unknown_keys(content)}
+    needed = {key for rule in rules for key in rule.needed_keys(content)}
     values = {
-        key: kind.read(content, key, parts, folder)
-        if key in needed
-        else of.read_key(content, key, parts, folder)
-        for key, kind in ((entry.name, kind) for entry, kind in entries)
-        if key not in unknown
+        entry.name: kind.read(content, entry.name, parts, folder)
+        if entry.name in needed
+        else _read_entry(entry, content, parts, folder)
+        for entry, kind in entries
+        if entry.name not in unknown
     }
-    content.finish([key for key in of.entries if key not in unknown])
-    for rule in of.rules:
+    content.finish([entry.name for entry, _ in entries if entry.name not in unknown])
+    for rule in rules:
         rule.check_values(content, values)
-    return of.build(**{key: value for key, value in values.items() if value is not None})
+    if isinstance(of, Keys):
+        return of.build(**{key: value for key, value in values.items() if value is not None})
+    return of(**values)
+
+
+def _read_entry(entry: Field[Any], content: Section, parts: Parts, folder: str) -> Any:
+    """Return the value of a key, or its default."""
+    if entry.name in content or is_required(entry):
+        return entry.metadata[_KEY].read(content, entry.name, parts, folder)
+    content.remove_key(entry.name)
+    return entry.default if entry.default_factory is MISSING else entry.default_factory()
 
 
 def _refuse_misplaced(

@@ -425,8 +425,7 @@ SCENE = Keys(
     dict,
     {
         'rate': declare(
-            _Rate('ticks a second; 0: one for every crank sample', 'Hz', 0.0, HIGHEST_RATE),
-            1000.0,
+            _Rate('ticks a second; 0: one for every crank sample', 'Hz', 0.0, HIGHEST_RATE), 1000.0
         ),
         'units': LENGTH_UNIT,
         'angles': declare(
