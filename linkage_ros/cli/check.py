@@ -361,6 +361,10 @@ def _lengths_text(lengths: Sequence[float], units: DisplayUnits, form: str = '.6
     return ', '.join(f'{units.convert(length, "m"):{form}}' for length in lengths)
 
 
+def _margin_text(margin: float, units: DisplayUnits) -> str:
+    return f'{units.convert(margin, "m"):+.4g}' if margin else '0'
+
+
 _GROUP, _LINKS = Column('>', 'group'), Column('links', 'links', form=_join)
 _ORDER = (
     Column('>', 'number'),
@@ -391,7 +395,7 @@ def _four_bars_table(account: Mapping[str, Any], units: DisplayUnits) -> Table:
         _GROUP,
         _LINKS,
         Column(f'lengths [{units.length}]', 'lengths_m', form=_lengths_text),
-        Column('>Grashof margin', 'grashof_margin_m', 'm', '+.4g'),
+        Column(f'>Grashof margin [{units.length}]', 'grashof_margin_m', 'm', _margin_text),
         Column('Barker', 'barker'),
         Column('name', 'name'),
     )
@@ -484,10 +488,10 @@ def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         units.value_text(value, given['unit'] == 'rad')
         for value, given in zip(worst['inputs'], inputs, strict=True)
     )
+    residual = units.format_length(worst['residual_m'], '.1e')
     yield (
         'worst residual',
-        f'{units.format_length(worst["residual_m"], ".1e")}, of {worst["positions"]} positions, '
-        f'at {place}',
+        f'{residual}, of {worst["positions"]} positions, at {place}',
     )
 
 

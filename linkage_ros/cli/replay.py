@@ -559,6 +559,7 @@ def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
     if account['joints']:
         yield joints_table(account, account['begin_ns'] or 0)
     if account['new_bag']:
+        yield ''
         counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
         yield f'{account["new_bag"]}: {counts}'
 

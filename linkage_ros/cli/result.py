@@ -93,16 +93,19 @@ def as_json(result: Result) -> str:
 
 def as_text(result: Result, units: DisplayUnits) -> str:
     """Return a result as text, without frames."""
-    return '\n\n'.join(
-        part if isinstance(part, str) else table_text(part.as_texts(units))
-        for part in result.parts
-    )
+    lines: list[str] = []
+    for part in result.parts:
+        if isinstance(part, str):
+            lines.append(part)
+        else:
+            lines += [''] * bool(lines) + [table_text(part.as_texts(units))]
+    return '\n'.join(lines)
 
 
 def show_parts(parts: Sequence[Table | str], units: DisplayUnits) -> None:
-    """Print lines and tables, with an empty line before and after a table."""
+    """Print lines and tables, with an empty line before a table."""
     for index, part in enumerate(parts):
-        if index and not (isinstance(part, str) and isinstance(parts[index - 1], str)):
+        if index and isinstance(part, Table):
             print()
         if isinstance(part, str):
             print(part)
