@@ -24,6 +24,7 @@ from linkage_ros.cli.arguments import (
     output_path as output_path,
     PICTURES as PICTURES,
     read_inputs as read_inputs,
+    RESULTS as RESULTS,
     SCENE_HELP as SCENE_HELP,
 )
 from linkage_ros.cli.bag_reading import (
@@ -56,7 +57,6 @@ from linkage_ros.cli.replay import (
 from linkage_ros.cli.result import (
     add_result as add_result,
     Result as Result,
-    RESULTS as RESULTS,
     show_result as show_result,
 )
 from linkage_ros.cli.scene import (

@@ -17,12 +17,15 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description import check_new, check_output_name, Units
+from linkage_ros.description import check_new, check_output_name, TABLE_KINDS, Units
 from linkage_ros.errors import decimal_comma, LinkageError, list_names
 from linkage_ros.kinematics import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Suffixes of the pictures that matplotlib writes."""
+
+RESULTS = (*TABLE_KINDS, '.json', '.txt')
+"""Suffixes of the files that a result is written to."""
 
 LINKAGES = ('.yaml', '.yml')
 """Suffixes of linkage and scene files."""
@@ -80,6 +83,10 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
         path = getattr(arguments, name, None)
         if isinstance(path, Path):
             check_new(path, force=getattr(arguments, 'force', False))
+            for option in ('json', 'csv') if path.suffix.lower() in RESULTS else ():
+                if getattr(arguments, option, False):
+                    remedy = 'leave it out: the suffix of the file selects its format'
+                    raise LinkageError(f'--{option}', 'is for a printed result', remedy)
             bag = getattr(arguments, 'bag', None)
             if bag is not None and bag.resolve().is_relative_to(path.resolve()):
                 raise LinkageError(path, 'is the bag that is read', 'name another with -o')

@@ -20,8 +20,8 @@ from pathlib import Path
 import re
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, LINKAGES
-from linkage_ros.cli.result import add_result, Result, RESULTS, show_result, tables_json
+from linkage_ros.cli.arguments import add_output, LINKAGES, RESULTS
+from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.description import atomic_write, check_output_name
 from linkage_ros.errors import FileError

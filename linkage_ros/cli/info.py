@@ -36,6 +36,7 @@ from linkage_ros.cli.bag_reading import (
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
 from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description import Scene
 from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.replay import examine_states
 from linkage_ros.signals import heed_signals
@@ -64,17 +65,19 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Describe the bag; return 1 if stopped."""
     bag = open_bag(arguments.bag, stop)
     with heed_signals():  # a signal ends the reading; the part read so far is still shown
-        account = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
-    result = Result(account, [*bag_tables(account, arguments.angles)])
+        account, scene = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
+    result = Result(account, [*bag_tables(account, arguments.angles, scene)])
     show_result(result, arguments, arguments.angles)
     if account['stopped']:
         print('linkage info: stopped; not all of the bag was read', file=sys.stderr)
     return int(account['stopped'])
 
 
-def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
+def describe_bag(
+    bag: Bag, stop: Event, *, trust_effects: bool = False
+) -> tuple[dict[str, Any], Scene | None]:
     """
-    Return the description of a bag, as JSON holds it.
+    Return the description of a bag, as JSON holds it, and its scene.
 
     A BagError is raised if a file of the bag cannot be read.
     """
@@ -84,6 +87,7 @@ def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[
         contents = contents_of(bag, lambda read: advance(read // _MIB, size), stop.is_set)
     account = bag_json(bag, layouts, contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
+    scene = None
     try:
         scene = scene_of(bag, trust_effects=trust_effects)
         account['scene'] = scene_json(scene)
@@ -94,16 +98,18 @@ def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[
             )
     except LinkageError as error:
         account['scene_missing'] = f'{error.where}: {error.reason}'
-        return account
+        return account, scene
     account['replay'] = replay_account(examined)
     account['stopped'] |= examined.stopped
     for linkage, worst in zip(account['scene']['linkages'], examined.linkages, strict=True):
         linkage.update(worst_account(worst))
-    return account
+    return account, scene
 
 
-def bag_tables(account: dict[str, Any], units: DisplayUnits = DEGREES) -> Iterator[Table]:
-    """Yield the description of a bag as tables."""
+def bag_tables(
+    account: dict[str, Any], units: DisplayUnits = DEGREES, scene: Scene | None = None
+) -> Iterator[Table]:
+    """Yield the description of a bag as tables, with the lengths of its scene's linkages."""
     yield _facts_table(account['bag'], _bag_facts(account))
     counters = [
         Column('>discarded' if word == 'let_go' else f'>{word}', word, form=_count_text)
@@ -113,7 +119,9 @@ def bag_tables(account: dict[str, Any], units: DisplayUnits = DEGREES) -> Iterat
     columns = (*_TOPIC, *counters, Column('QoS', 'qos'))
     rows = ({**topic, 'qos': _qos_text(topic)} for topic in account['topics'])
     yield table_of_rows('Topics', 'topics', columns, rows)
-    for linkage in (account['scene'] or {'linkages': []})['linkages']:
+    files = [each.linkage_content.units for each in scene.linkages] if scene else []
+    for index, linkage in enumerate((account['scene'] or {'linkages': []})['linkages']):
+        units = units.of_file(files[index]) if files else units
         title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
         yield _facts_table(title, _linkage_rows(linkage, account['begin_ns'], units))
 
@@ -175,7 +183,7 @@ def _linkage_rows(
     linkage: dict[str, Any], begin: int | None, units: DisplayUnits
 ) -> Iterator[tuple[str, str]]:
     bars = [
-        f'{bar["kind"]} ({", ".join(f"{length:g}" for length in bar["lengths_m"])} m)'
+        f'{bar["kind"]} ({_lengths_text(bar["lengths_m"], units)})'
         for bar in linkage.get('four_bars', ())
     ]
     yield 'links', '; '.join([str(linkage['links']), *bars])
@@ -191,16 +199,19 @@ def _linkage_rows(
     yield 'states', f'{linkage["states"]} closed{toggles}{limited}'
     worst, near = linkage['worst_residual'], linkage['nearest_to_toggle']
     if worst:
-        yield (
-            'worst residual',
-            f'{worst["residual_m"]:.1e} m, {_event_text(worst, inputs, begin, units)}',
-        )
+        residual = units.format_length(worst['residual_m'], '.1e')
+        yield 'worst residual', f'{residual}, {_event_text(worst, inputs, begin, units)}'
     if near:
         distance = near['input_to_toggle']
         away = '' if distance is None else f', {_input_text(distance, inputs[0], units)} from one'
         angle = f'transmission angle {units.format_angle(near["transmission_angle_rad"])}'
         nearness = f'conditioning {near["conditioning"]:.4g}, {angle}{away}'
         yield 'nearest toggle', f'{nearness}, {_event_text(near, inputs, begin, units)}'
+
+
+def _lengths_text(lengths: list[float], units: DisplayUnits) -> str:
+    texts = (f'{units.convert(length, "m"):g}' for length in lengths)
+    return f'{", ".join(texts)} {units.length}'
 
 
 def _event_text(

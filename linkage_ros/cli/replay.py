@@ -38,6 +38,7 @@ from linkage_ros.cli.arguments import (
     DEGREES,
     DisplayUnits,
     finite_or_none,
+    RESULTS,
     SCENE_HELP,
 )
 from linkage_ros.cli.bag_reading import (
@@ -49,7 +50,7 @@ from linkage_ros.cli.bag_reading import (
     unfinished_text,
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
-from linkage_ros.cli.result import add_result, Result, RESULTS, show_result
+from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table, table_of_rows
 from linkage_ros.description import load_scene, remove_bag, Scene
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names

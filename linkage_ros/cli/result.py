@@ -17,7 +17,7 @@ from pathlib import Path
 import sys
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.arguments import add_output, DEGREES, DisplayUnits
+from linkage_ros.cli.arguments import add_output, DEGREES, DisplayUnits, RESULTS
 from linkage_ros.cli.table import Table
 from linkage_ros.cli.terminal import print_tables, table_text
 from linkage_ros.description import (
@@ -46,10 +46,6 @@ def add_result(
     shown.add_argument('--csv', action='store_true', help='print the first table as CSV')
     if output:
         add_output(parser, RESULTS, f'{what} is printed')
-
-
-RESULTS = (*TABLE_KINDS, '.json', '.txt')
-"""Suffixes of the files that a result is written to."""
 
 
 def show_result(

@@ -143,7 +143,7 @@ def by_hand(a: float, b: float, c: float, d: float, phi: float) -> tuple[float, 
 
 
 def test_solve_gives_full_precision_at_the_inputs_asked_for(linkage: Run) -> None:
-    answer = linkage('solve', FOUR_BAR, '--at', '40', '--at=-100.5', '--format', 'json')
+    answer = linkage('solve', FOUR_BAR, '--at', '40', '--at=-100.5', '--json')
     assert answer.returncode == 0, answer.stderr
     told = json.loads(answer.stdout)
     assert told['units'] == {
@@ -159,7 +159,7 @@ def test_solve_gives_full_precision_at_the_inputs_asked_for(linkage: Run) -> Non
 
 
 def test_solve_reads_and_tells_radians(linkage: Run) -> None:
-    answer = linkage('solve', FOUR_BAR, '--radians', '--at', '1', '--format', 'csv')
+    answer = linkage('solve', FOUR_BAR, '--radians', '--at', '1', '--csv')
     (row,) = csv.DictReader(io.StringIO(answer.stdout))
     coupler, rocker = by_hand(0.04, 0.12, 0.08, 0.1, 1.0)
     assert row['crank_joint [rad]'] == '1.0'
@@ -176,7 +176,7 @@ def test_a_table_says_that_it_is_in_degrees(linkage: Run) -> None:
 
 
 def test_a_sweep_goes_over_the_whole_range_from_toggle_to_toggle(linkage: Run) -> None:
-    answer = linkage('solve', shipped('elliptic_trammel'), '--steps', '6', '--format', 'csv')
+    answer = linkage('solve', shipped('elliptic_trammel'), '--steps', '6', '--csv')
     rows = list(csv.DictReader(io.StringIO(answer.stdout)))
     assert len(rows) == 7
     assert [row['status'] for row in rows] == ['toggle', *['closed'] * 5, 'toggle']
@@ -189,7 +189,7 @@ def test_a_sweep_goes_over_the_whole_range_from_toggle_to_toggle(linkage: Run) -
 def test_a_sweep_can_be_bounded_and_told_where_it_is_open(linkage: Run) -> None:
     answer = linkage(
         *('solve', shipped('double_rocker'), '--from', '30', '--to', '60', '--steps', '3'),
-        *('--format', 'json'),
+        '--json',
     )
     states = json.loads(answer.stdout)['states']
     assert [state['left_rocker_joint'] for state in states] == pytest.approx(
@@ -207,7 +207,7 @@ def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
     at = [f'{50.0 + 20.0 * t + 0.5 * 5.0 * t * t!r}' for t in (-step, 0.0, step)]
     answer = linkage(
         *('solve', shipped('jansen_leg'), '--at', at[0], '--at', at[1], '--at', at[2]),
-        *('--rate', '20', '--acceleration', '5', '--points', '--format', 'json'),
+        *('--rate', '20', '--acceleration', '5', '--points', '--json'),
     )
     assert answer.returncode == 0, answer.stderr
     before, now, after = json.loads(answer.stdout)['states']
@@ -221,9 +221,7 @@ def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
 
 
 def test_several_inputs_come_with_commas(linkage: Run) -> None:
-    answer = linkage(
-        *('solve', shipped('five_bar'), '--at', '120,60', '--points', '--format', 'json')
-    )
+    answer = linkage(*('solve', shipped('five_bar'), '--at', '120,60', '--points', '--json'))
     (state,) = json.loads(answer.stdout)['states']
     assert (state['left_crank_joint'], state['right_crank_joint']) == (radians(120), radians(60))
     assert state['P.x'] == pytest.approx(0.06, abs=1e-15)  # in the middle, by symmetry
@@ -243,7 +241,7 @@ def test_rates_at_a_toggle_are_left_out(linkage: Run) -> None:
     limit = degrees(acos(0.8))
     answer = linkage(
         *('solve', shipped('double_rocker'), '--at', repr(limit), '--rate', '1'),
-        *('--format', 'json'),
+        '--json',
     )
     (state,) = json.loads(answer.stdout)['states']
     if state['status'] == 'toggle':  # within the last floats of it
@@ -329,7 +327,6 @@ BAD = [
     (['solve', FOUR_BAR, '--steps', 'x'], "'x' is not a whole number"),
     (['solve', FOUR_BAR, '--from', '1,2'], "'1,2' is not a number; a decimal has a point"),
     (['solve', shipped('drag_link'), '--points'], 'the linkage traces none'),
-    (['solve', FOUR_BAR, '--format', 'xml'], 'xml'),
     (['solve', FOUR_BAR, '--at', '1', '-o', 'no/such.csv'], 'no/such.csv: there is no folder no'),
     (['draw', FOUR_BAR, '-o', 'no/such.png'], 'no/such.png: there is no folder no'),
     (['draw', FOUR_BAR, '-o', 'picture.docx'], "picture.docx: ends in '.docx'"),
@@ -368,7 +365,7 @@ def test_solving_takes_neither_ros_nor_matplotlib(tmp_path: Path) -> None:
 
 
 def test_a_full_turn_of_a_parallelogram_is_solved_by_continuity(linkage: Run) -> None:
-    answer = linkage('solve', shipped('parallelogram'), '--steps', '8', '--format', 'json')
+    answer = linkage('solve', shipped('parallelogram'), '--steps', '8', '--json')
     for state in json.loads(answer.stdout)['states']:
         difference = state['follower_joint'] - state['crank_joint']
         assert abs(remainder(difference, tau)) < 1e-14 * pi
