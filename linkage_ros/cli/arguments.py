@@ -271,7 +271,8 @@ class DisplayUnits(NamedTuple):
         return self.format_angle(value) if turning else self.format_length(value)
 
 
-DEGREES, RADIANS = DisplayUnits('°'), DisplayUnits('rad')
+DEGREES: DisplayUnits = DisplayUnits('°')
+RADIANS: DisplayUnits = DisplayUnits('rad')
 
 
 def add_radians(parser: argparse.ArgumentParser, what: str = 'show angles') -> None:

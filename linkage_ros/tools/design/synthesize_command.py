@@ -132,7 +132,10 @@ def _solution_json(answer: DesignAnswer, needs: Needs, units: DisplayUnits) -> d
     return {
         'title': units.convert_text(answer.title),
         'links': [*_link_rows(answer.design.four_bar)],
-        'facts': {name: units.convert_text(value) for name, value in answer.facts},
+        'facts': [
+            {'name': units.convert_text(name), 'value': units.convert_text(value)}
+            for name, value in answer.facts
+        ],
         'positions': [*_position_rows(answer)],
         'kind': found.kind.name,
         'crank_turns': found.turns,
@@ -152,7 +155,7 @@ def _solution_tables(
     """Yield the tables of a solution."""
     yield table_of_rows(units.convert_text(title), 'links', _LINK, solution['links'])
     if answer.facts:
-        yield facts_table('', [tuple(map(units.convert_text, fact)) for fact in answer.facts])
+        yield facts_table('', [(fact['name'], fact['value']) for fact in solution['facts']])
     columns = _position_columns(answer, units)
     title = 'Proof: each position, analysed again'
     yield table_of_rows(title, 'positions', columns, solution['positions'])

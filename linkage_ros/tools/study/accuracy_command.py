@@ -35,6 +35,7 @@ from linkage_ros.cli import (
     scene_of,
     show_progress,
     show_result,
+    Table,
 )
 from linkage_ros.description import atomic_write, load_scene, Scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
@@ -160,8 +161,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             'write': dict(answer.changes),
             'answer': answer.text,
         }
-    lines = [*([answer.text] if answer is not None else []), *lead_lines(budget)]
-    parts = [*lines, budget_table(budget), *closing_lines(budget)]
+    parts: list[Table | str] = [answer.text] if answer is not None else []
+    parts += [*lead_lines(budget), budget_table(budget), *closing_lines(budget)]
     show_result(Result(account, parts), arguments)
     return 0 if answer is None or answer.is_met else 1
 
