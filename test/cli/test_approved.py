@@ -41,6 +41,10 @@ MASKS = (
 """What differs from machine to machine, and what is written in its place."""
 
 
+PROGRESS = re.compile(r': (\d+ of \d+|ended after [\d.]+ s)$')
+"""A line that a command prints only if it takes long."""
+
+
 def _blocks(text: str) -> Iterator[tuple[str, str]]:
     """Yield each typed line of a session with what follows it."""
     for block in re.split(r'^\$ ', text, flags=re.MULTILINE)[1:]:
@@ -64,7 +68,9 @@ def _play_session(text: str, folder: Path) -> str:
         else:
             answer = commands.linkage(folder, *words, TZ='UTC')
             printed, code, errors = answer.stdout, answer.returncode, answer.stderr
-        printed += ''.join(f'! {line}\n' for line in errors.splitlines())
+        printed += ''.join(
+            f'! {line}\n' for line in errors.splitlines() if not PROGRESS.search(line)
+        )
         printed += f'= {code}\n' * (code != 0)
         for name, place in (PLACES | {'FOLDER': str(folder)}).items():
             printed = printed.replace(place, f'${name}')

@@ -161,9 +161,9 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             'write': dict(answer.changes),
             'answer': answer.text,
         }
-    parts: list[Table | str] = [answer.text] if answer is not None else []
-    parts += [*lead_lines(budget), budget_table(budget), *closing_lines(budget)]
-    show_result(Result(account, parts), arguments)
+    shown: list[Table | str] = [answer.text] if answer is not None else []
+    shown += [*lead_lines(budget), budget_table(budget), *closing_lines(budget)]
+    show_result(Result(account, shown), arguments)
     return 0 if answer is None or answer.is_met else 1
 
 
