@@ -115,7 +115,7 @@ def _file_tables(result: Result, units: DisplayUnits) -> list[FileTable]:
     tables.sort(key=lambda table: not table.key)
     return [
         FileTable(
-            table.key or table.title or 'facts',
+            table.key or 'facts',
             [column.file_head(units) for column in table.declared],
             [
                 [

@@ -29,7 +29,11 @@ from ..support import commands
 
 ROOT = Path(__file__).parents[2]
 SESSIONS = sorted((Path(__file__).parent / 'approved').glob('*.txt'))
-PLACES = {'RECORDED': str(ROOT / 'test' / 'bag' / 'recorded'), 'ROOT': str(ROOT)}
+PLACES = {
+    'RECORDED': str(ROOT / 'test' / 'bag' / 'recorded'),
+    'TEST': str(ROOT / 'test'),
+    'ROOT': str(ROOT),
+}
 """Folders, by what stands for them in a session."""
 
 MASKS = (
