@@ -589,8 +589,9 @@ def _assemblies_table(
     return Table(
         f'Other assemblies of group {group["group"]} at the inputs of the pose: '
         f'{len(rows)} found from {group["starts"]} starts',
-        ('pose', "on the pose's branch") if rows else ('',),
+        (Column('pose', 'pose'), Column("on the pose's branch", 'turns')) if rows else ('',),
         rows or [('none',)],
+        'other_assemblies' if rows else '',
     )
 
 

@@ -429,7 +429,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o',
         '--output',
         type=Path,
-        metavar='FOLDER|OUTPUT',
+        metavar='FOLDER',
         help='new bag, with --scene or --set; or the result, OUTPUT.csv, .xlsx, .parquet, .json '
         'or .txt',
     )

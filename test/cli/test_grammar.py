@@ -218,7 +218,7 @@ def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path)
 @pytest.mark.parametrize(
     'typed',
     [
-        ['solve', 'four_bar', '-o', 'x.xlsx'],
+        ['solve', 'four_bar', '-o', 'x.xls'],
         ['draw', 'four_bar', '-o', 'x.gif'],
         ['synthesize', '--draw', 'x.gif'],
         ['mjcf', 'four_bar', '-o', 'x.urdf'],
