@@ -25,6 +25,14 @@ from ..support.commands import environment
 from ..support.scenes import closure_of
 
 
+def test_an_argument_of_ros_without_its_value_is_refused(linkage: Run, tmp_path: Path) -> None:
+    (tmp_path / 'x.yaml').write_text('linkage: four_bar\n')
+    answer = linkage('run', 'x.yaml', '--ros-args', '-p')
+    assert (answer.returncode, answer.stdout) == (2, '')
+    assert '-p' in answer.stderr
+    assert 'Traceback' not in answer.stderr
+
+
 def test_help_names_every_command(linkage: Run) -> None:
     answer = linkage('--help')
     assert answer.returncode == 0
