@@ -217,7 +217,6 @@ def in_order(messages):
 PAIRS = st.lists(st.tuples(st.sampled_from(['/a', '/b']), st.integers(1, 12)), min_size=1)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     messages=PAIRS,
     chunk_size=st.sampled_from([1, 64, 200, 10_000]),
@@ -234,7 +233,7 @@ def test_messages_come_by_their_times(tmp_path_factory, messages, chunk_size, co
     assert (order.begin, order.end) == (expected[0].log_time, expected[-1].log_time)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(messages=PAIRS, since=st.integers(0, 13))
 def test_a_file_without_an_index_is_put_in_order_within_a_window(
     tmp_path_factory, messages, since
