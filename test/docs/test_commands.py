@@ -22,7 +22,6 @@ from linkage_ros.processes import private_domain
 import pytest
 
 from .blocks import Block, blocks, COMMANDS, commands, missing, PAGES, ROOT
-from ..support.commands import on_path
 
 BLOCKS = {page.relative_to(ROOT).as_posix(): list(blocks(page)) for page in PAGES}
 ALL = [block for page in BLOCKS.values() for block in page if block.language in COMMANDS]
@@ -57,21 +56,15 @@ NEEDS = {'docs/how_to/compile.md': 'cc'}
 
 def environment(folder: Path) -> dict[str, str]:
     clean = {key: value for key, value in os.environ.items() if key != 'PYTHONPATH'}
-    programs = folder.parent / 'programs'
-    programs.mkdir(exist_ok=True)
-    return (
-        clean
-        | on_path(programs)
-        | {
-            'PATH': os.pathsep.join([str(programs), str(HERE), clean['PATH']]),
-            'HOME': str(folder.parent),
-            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'ROS_DOMAIN_ID': str(private_domain()),
-            'ROS_LOG_DIR': str(folder.parent / 'log'),
-            'RCUTILS_COLORIZED_OUTPUT': '0',
-            'MPLBACKEND': 'agg',
-        }
-    )
+    return clean | {
+        'PATH': f'{HERE}{os.pathsep}{clean["PATH"]}',
+        'HOME': str(folder.parent),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'ROS_DOMAIN_ID': str(private_domain()),
+        'ROS_LOG_DIR': str(folder.parent / 'log'),
+        'RCUTILS_COLORIZED_OUTPUT': '0',
+        'MPLBACKEND': 'agg',
+    }
 
 
 def run(

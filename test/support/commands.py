@@ -12,8 +12,7 @@
 Most of the time of a command goes into imports. One server process for each worker of the tests
 imports what commands need, and forks a child for each command. The child has its own
 arguments, folder, environment and output, and ends as any process does. A test of imports, of
-signals or of limits needs a Python of its own, by `subprocess`. Of a shell, the program
-`linkage_client.py` is the client.
+signals or of limits needs a Python of its own, by `subprocess`.
 """
 
 from __future__ import annotations
@@ -26,13 +25,12 @@ import json
 import os
 from pathlib import Path
 from pkgutil import walk_packages
-from select import select
 import signal
 import socket
 import struct
 import subprocess
 import sys
-from tempfile import mkdtemp, TemporaryFile
+from tempfile import TemporaryFile
 import time
 
 import linkage_ros
@@ -54,7 +52,7 @@ LIBRARIES = (
 THREADED = ('pyarrow', 'rclpy')
 
 # With threads of OpenBLAS, a forked child whose scipy is loaded later does not end.
-NO_THREADS = {'OPENBLAS_NUM_THREADS': '1'}
+_NO_THREADS = {'OPENBLAS_NUM_THREADS': '1'}
 
 _NUMBER = struct.Struct('i')
 
@@ -76,11 +74,11 @@ def linkage(
     request = {
         'arguments': arguments,
         'folder': str(folder),
-        'path': [str(folder)],
-        'environment': environment(folder) | NO_THREADS | variables,
+        'environment': environment(folder) | _NO_THREADS | variables,
     }
+    server = _server()
+    pid = 0
     with (
-        socket.socket(socket.AF_UNIX) as server,
         TemporaryFile('w+') as asked,
         Path(os.devnull).open() as given,
         TemporaryFile('w+') as out,
@@ -88,53 +86,41 @@ def linkage(
     ):
         json.dump(request, asked)
         asked.seek(0)
-        server.connect(address())
-        socket.send_fds(server, [b'.'], [file.fileno() for file in (given, out, err, asked)])
-        (pid,) = _NUMBER.unpack(server.recv(_NUMBER.size))
         try:
+            files = [file.fileno() for file in (given, out, err, asked)]
+            socket.send_fds(server, [b'.'], files)
+            (pid,) = _NUMBER.unpack(server.recv(_NUMBER.size))
             server.settimeout(timeout)
             (code,) = _NUMBER.unpack(server.recv(_NUMBER.size))
         except BaseException as error:
-            os.kill(pid, signal.SIGKILL)
+            # The answer to this request must not be taken for that to the next one.
+            _server.cache_clear()
+            if pid:
+                os.kill(pid, signal.SIGKILL)
             if isinstance(error, TimeoutError):
                 raise subprocess.TimeoutExpired(arguments, timeout) from None
             raise
+        server.settimeout(None)
         out.seek(0)
         err.seek(0)
         return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
 
 
-def on_path(folder: Path) -> dict[str, str]:
-    """Write a ``linkage`` into a folder, and return the environment of a shell that finds it."""
-    client = Path(__file__).with_name('linkage_client.py')
-    program = folder / 'linkage'
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -IS {client} "$@"\n')
-    program.chmod(0o755)
-    return {'LINKAGE_SERVER': address(), **NO_THREADS}
-
-
 @cache
-def address() -> str:
-    """Start the server, and return where it listens; it ends with this process."""
+def _server() -> socket.socket:
+    """Start the server; it ends when this end of its socket is closed."""
     ours, theirs = socket.socketpair()
-    found = str(Path(mkdtemp(), 'server'))
-    with theirs, socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(found)
-        listener.listen()
-        numbers = listener.fileno(), theirs.fileno()
+    with theirs:
+        number = theirs.fileno()
         subprocess.Popen(
-            [sys.executable, __file__, *map(str, numbers)],
-            pass_fds=numbers,
-            env=os.environ | NO_THREADS,
+            [sys.executable, __file__, str(number)],
+            pass_fds=[number],
+            env=os.environ | _NO_THREADS,
         )
-    _held.append(ours)
-    return found
+    return ours
 
 
-_held: list[socket.socket] = []
-
-
-def _serve(listener: socket.socket, alive: socket.socket) -> None:
+def _serve(control: socket.socket) -> None:
     """Fork a child for each request; return in a child, ready to run the command."""
     path = sys.path[1:]  # without the folder of this file
     sys.path[:] = path
@@ -150,35 +136,19 @@ def _serve(listener: socket.socket, alive: socket.socket) -> None:
         del sys.modules[name]
     assert len([*Path('/proc/self/task').iterdir()]) == 1, 'a library has started a thread'
     gc.freeze()
-    running: dict[int, tuple[int, socket.socket]] = {}
-    while alive not in (ready := select([listener, alive, *running], (), ())[0]):
-        for ended in {*ready} & {*running}:
-            pid, client = running.pop(ended)
-            _, status = os.waitpid(pid, 0)
-            os.close(ended)
-            with client, suppress(OSError):
-                client.send(_NUMBER.pack(os.waitstatus_to_exitcode(status)))
-        if listener not in ready:
-            continue
-        client, _ = listener.accept()
-        files = socket.recv_fds(client, 1, 4)[1]
+    while files := socket.recv_fds(control, 1, 4)[1]:
         if pid := os.fork():
             for file in files:
                 os.close(file)
-            running[os.pidfd_open(pid)] = pid, client
-            client.send(_NUMBER.pack(pid))
+            control.send(_NUMBER.pack(pid))
+            _, status = os.waitpid(pid, 0)
+            control.send(_NUMBER.pack(os.waitstatus_to_exitcode(status)))
             continue
-        for each in (listener, alive, client, *(other for _, other in running.values())):
-            each.close()
-        for other in running:
-            os.close(other)
+        control.close()
         *streams, asked = files
         for index, file in enumerate(streams):
             os.dup2(file, index)
             os.close(file)
-        # Those of the server believe that they can seek as its files can.
-        sys.stdin, sys.stdout = os.fdopen(0), os.fdopen(1, 'w')
-        sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace')
         with os.fdopen(asked) as stream:
             request = json.load(stream)
         os.chdir(request['folder'])
@@ -187,11 +157,11 @@ def _serve(listener: socket.socket, alive: socket.socket) -> None:
         time.tzset()
         sys.argv[1:] = request['arguments']
         given = filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep))
-        sys.path[:] = [*request['path'], *given, *path]
+        sys.path[:] = [request['folder'], *given, *path]
         return
     sys.exit()
 
 
 if __name__ == '__main__':
-    _serve(*(socket.socket(fileno=int(number)) for number in sys.argv[1:]))
+    _serve(socket.socket(fileno=int(sys.argv[1])))
     sys.exit(main())
