@@ -128,6 +128,7 @@ def half_angle(request, monkeypatch):
     monkeypatch.setattr(numpy_blocks, '_BY_TANGENT', by_tangent)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.slow
 @pytest.mark.usefixtures('half_angle')
 @pytest.mark.parametrize('family', FOUR_BARS)
@@ -202,12 +203,13 @@ def check_against_scalar(
     return {STATUSES[code] for code in found[0]}
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, length, length, cranks, side)
 def test_any_lengths_are_solved_as_by_the_scalar_dyad(a, b, c, d, phi, sign):
     check_against_scalar((a, b, c, d), sign, phi, 1.0, 0.3)
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', [*SHAPES, *CHANGE_POINTS])
 @pytest.mark.parametrize('sign', [1, -1])
 def test_every_shape_is_solved_as_by_the_scalar_dyad_over_four_turns(name, sign):
