@@ -6,7 +6,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The campaign's reference agrees with others that share nothing with it."""
+"""
+The campaign's reference agrees with others that share nothing with it.
+
+`test/study/test_enclosure.py` compares every family with the balls of the constraints.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,6 @@ from math import pi
 from typing import Any
 
 from campaigns.accuracy.adversarial import ADVERSARIAL, four_bar, inverted_slider_crank
-from campaigns.accuracy.mechanism import GROUND, Turn
 from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.reference import (
     condition_numbers,
@@ -27,7 +30,6 @@ from campaigns.accuracy.run import make
 from mpmath import mp, mpf
 import pytest
 
-from .newton import DIGITS, Newton
 from ..kinematics import reference as elsewhere
 from ..kinematics.samples import (
     FOUR_BARS,
@@ -126,53 +128,3 @@ def test_condition_numbers_in_doubles_are_right_where_differences_can_tell(famil
             assert condition_numbers(reference, *arguments)[0] == pytest.approx(
                 exact, rel=1e-3, abs=1e-15
             )
-
-
-@pytest.mark.parametrize('family', [name for name in ALL if name != 'subnormal input'])
-def test_every_family_is_as_by_newton_s_method_from_the_file_s_terms(family: str) -> None:
-    for index in range(2):
-        mechanism, phi, alpha = make(0, family, index)
-        reference, newton = Reference(mechanism), Newton(mechanism)
-        truth = reference.solve(phi[-1], alpha[-1])
-        if truth.outcome is not Outcome.CLOSED:
-            continue
-        with mp.workdps(DIGITS):
-            # Near enough for Newton to stay in the assembly, far enough to have work to do.
-            start = rounded_pose(truth, mpf(10) ** -30)
-            h = mpf(10) ** -45
-            angle = elsewhere.turned(mpf(phi[-1]))
-            times = [-h, mpf(0), h]
-            joints = [
-                newton.joints(newton.solve(angle + t + mpf(alpha[-1]) * t * t / 2, start))
-                for t in times
-            ]
-            for j, joint in enumerate(mechanism.joints.values()):
-                before, now, after = (values[j] for values in joints)
-                scale = 1 if isinstance(joint, Turn) else max(abs(now), mpf(10) ** -30)
-                off = coefficient(truth, j, 0) - now
-                off = elsewhere.turned(off) if isinstance(joint, Turn) else off
-                assert abs(off) < 1e-35 * scale
-                velocity, acceleration = (coefficient(truth, j, k) for k in (1, 2))
-                size = abs(velocity) + abs(acceleration) + scale
-                assert abs(velocity - (after - before) / (2 * h)) < 1e-15 * size
-                assert abs(acceleration - (after - 2 * now + before) / h**2) < 1e-6 * size
-
-
-def rounded_pose(truth: Truth, error: mpf) -> dict[str, tuple[mpf, ...]]:
-    """Return angle and place of all links, and all slides, with an error."""
-    motion = truth.motion
-    unit = mpf(2) ** motion.constants.exponent
-    pose: dict[str, tuple[mpf, ...]] = {}
-    for link in motion.mechanism.links:
-        if link != GROUND:
-            direction = motion.unit[link][0]
-            x, y = (as_mpf(part) * unit for part in _parts(motion.origin[link][0]))
-            angle = mp.atan2(*(as_mpf(part) for part in reversed(_parts(direction))))
-            pose[link] = (angle + error, x + error * unit, y - error * unit)
-    for name in motion.mechanism.sliders:
-        pose[name] = (as_mpf(_parts(motion.slide[name][0])[0]) * unit,)
-    return pose
-
-
-def _parts(ball: Any) -> tuple[Any, Any]:
-    return (ball.real, ball.imag)
