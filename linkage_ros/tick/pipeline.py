@@ -30,9 +30,14 @@ from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
 from linkage_ros.stages.effects import (
     Continuous,
+    DriveEffect,
     first_values,
-    FORCE_EFFECTS,
+    ForceEffect,
+    LinkageEffect,
+    MechanismEffect,
     MechanismState,
+    MessageEffect,
+    SensorEffect,
     SensorReading,
     SensorStage,
     wrap_all,
@@ -56,18 +61,6 @@ if TYPE_CHECKING:
     from linkage_ros.solvers import SolverChoice
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
-
-_SUPPRESSING = {'rate_limit', 'dropout', 'delay', 'jitter'}
-"""Effects that may suppress the message of a tick."""
-
-_RUNNING_IN_GAPS = {'backlash'}
-"""Effects that keep running while a loop is open."""
-
-_KINEMATIC = ('velocity', 'acceleration')
-"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
-
-_FORCES_ONLY = {'pin_forces'}
-"""Effects whose messages contain joint forces only."""
 
 
 class LinkageState(NamedTuple):
@@ -164,18 +157,22 @@ class LinkagePipeline:
     ) -> None:
         scene_linkage = self.scene_linkage
         wanted = choose_effects(scene_linkage)
-        self.effect_names = tuple(effect.name for effect in wanted.effects)
-        """Names of the computed effects, in physical order."""
+        self.effects = wanted.effects
+        """The computed effects, by name, in physical order."""
+        mechanism = wanted.of_kind(MechanismEffect)
+        self._computed_fields = frozenset(each.gives for each in mechanism.values()) - {''}
+        self._published_fields = self._computed_fields - frozenset(
+            each.gives for name, each in mechanism.items() if name not in wanted.named
+        )
         seed = f'{scene.seed}/{scene_linkage.name}'
         self.closure = closure or _make_closure(scene_linkage, wanted, seed)
-        friction = wanted.parameters.get('friction')
         self.context = Context(
             closure=self.closure,
             rate=scene.rate,
-            needs_rate='velocity' in self.effect_names,
+            needs_rate='rates' in self._computed_fields,
             seed=seed,
             loads=scene_linkage.loads,
-            friction=friction.friction if friction is not None else None,
+            friction=next((f.friction for f in wanted.of_kind(ForceEffect).values()), None),
             prefix=scene_linkage.prefix,
             dependent=scene.dependent_joints,
             effects=frozenset(scene_linkage.effects),
@@ -202,7 +199,9 @@ class LinkagePipeline:
             raise DefinitionError(
                 'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
             )
-        self._drive_stages = [*wanted.build('drive_stage', self.context).values()]
+        self._drive_stages = [
+            effect.drive_stage(self.context) for effect in wanted.of_kind(DriveEffect).values()
+        ]
 
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
@@ -221,24 +220,26 @@ class LinkagePipeline:
         self._mechanism_faults = (
             injection.build_functions('mechanism', self.context) if injection is not None else []
         )
-        self._mechanism_stages = [*wanted.build('stage', self.context).values()]
+        mechanism = wanted.of_kind(MechanismEffect).values()
+        self._mechanism_stages = [effect.stage(self.context) for effect in mechanism]
 
     def _build_sensors(
         self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
     ) -> None:
         """Build what makes the published reading of the ideal one."""
-        sensors = wanted.build('sensor', self.context)
-        if {'encoder', 'rate_limit'} <= set(sensors):
-            sensors['rate_limit'].read_by(sensors['encoder'])
+        sensors: dict[str, Any] = {}
+        for name, effect in wanted.of_kind(SensorEffect).items():
+            sensors[name] = effect.sensor(self.context)
+            if effect.reads in sensors:
+                sensors[name].read_by(sensors[effect.reads])
         joints = self.scene_linkage.joint_names
         broken = injection.build_functions('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
         self._running = angles if behind or not wrapped else None
-        self._observed_effects = wanted.named
-        if behind and 'velocity' in self.effect_names and 'velocity' not in wanted.named:
+        if behind and 'rates' in self._computed_fields - self._published_fields:
             # Only used between readings; not published.
-            self._observed_effects |= {'velocity'}
+            self._published_fields |= {'rates'}
             behind.append(_remove_rates)
         if wrapped:
             behind.append(wrap_all(self.closure.turning))
@@ -251,18 +252,18 @@ class LinkagePipeline:
     def _build_outputs(self, wanted: WantedEffects) -> None:
         """Build the messages beside the joint states: of the effects, and of the drive."""
         scene_linkage = self.scene_linkage
-        writers = wanted.build('writer', self.context, wanted.named)
         self.extras = [
             _make_output(
-                effect.name,
+                name,
                 effect.topic,
                 effect.message,
-                writers[effect.name],
+                effect.writer(self.context),
                 scene_linkage.name,
                 of_reading=effect.of_reading,
+                of_forces=effect.of_forces,
             )
-            for effect in wanted.effects
-            if effect.name in writers
+            for name, effect in wanted.of_kind(MessageEffect).items()
+            if name in wanted.named
         ]
         """The topics beside the joint states."""
         drive, parameters = scene_linkage.drive
@@ -279,30 +280,34 @@ class LinkagePipeline:
 
     def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
         """Generate the tick up to the reading; None where a part has no generated form."""
-        moved = {effect.name for effect in wanted.effects if effect.stage is not None}
+        mechanism = wanted.of_kind(MechanismEffect).values()
+        derivatives = [each.derivative for each in mechanism if each.derivative]
         if not self.closure.by_steps or self._mechanism_faults or self._has_timed_loads:
             return None
-        if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
+        if not all(each.is_compiled for each in mechanism):
             return None
-        if self.wrenches and not moved.isdisjoint(FORCE_EFFECTS):
+        if self.wrenches and any(each.needs_forces for each in mechanism):
             return None  # A compiled tick computes from the crank alone.
         outputs = None
-        if 'acceleration' in moved:
-            of = [wanted.parameters[name] for name in self.effect_names if name in moved]
-            of += [self._observed_effects, self.context.loads, self.context.friction]
+        if 2 in derivatives:
+            of = [*mechanism, self._published_fields, self._writes_forces]
+            of += [self.context.loads, self.context.friction]
             outputs = _OutputSelection(of, self._symbolic_outputs)
-        compiled = self.closure.compile_linkage(len(moved.intersection(_KINEMATIC)), outputs)
+        compiled = self.closure.compile_linkage(len(derivatives), outputs)
         # Where the forces have no solution, a compiled path has fewer values.
         if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
             return None
         return compile_tick(self.drive, self._drive_stages, compiled, self._running)
 
     @property
+    def _writes_forces(self) -> bool:
+        """Return whether a message contains the forces in the joints."""
+        return any(extra.writer.of_forces for extra in self.extras)
+
+    @property
     def whole_tick(self) -> CompiledTick | None:
         """Return the generated tick up to the reading; None if a stage is not generated."""
-        of_seen = all(
-            extra.writer.of_reading or extra.effect in _FORCES_ONLY for extra in self.extras
-        )
+        of_seen = all(extra.writer.of_reading or extra.writer.of_forces for extra in self.extras)
         return self._compiled_tick if self._apply_later_sensors is None and of_seen else None
 
     @cached_property
@@ -352,9 +357,7 @@ class LinkagePipeline:
         _velocity, _acceleration, *stages = self._mechanism_stages
         for stage in stages:
             moved = stage(moved)
-        reactions = (
-            [] if _FORCES_ONLY.isdisjoint(self._observed_effects) else [*chain(*moved.reactions)]
-        )
+        reactions = [*chain(*moved.reactions)] if self._writes_forces else []
         return [*self._observe(0, moved)[1:], reactions]
 
     def _mechanism_motion(
@@ -370,7 +373,7 @@ class LinkagePipeline:
         """Return the ideal reading of a motion, with the values that the scene asks for."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
-        if 'effort' in self._observed_effects and motion.efforts:
+        if 'efforts' in self._published_fields and motion.efforts:
             # Efforts of the inputs, which are published first; 0 for the other joints.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
@@ -378,9 +381,9 @@ class LinkagePipeline:
             tuple(map(add, position.joints, motion.deflection))
             if motion.deflection
             else position.joints,
-            velocity.joints if velocity and 'velocity' in self._observed_effects else (),
+            velocity.joints if velocity and 'rates' in self._published_fields else (),
             acceleration.joints
-            if acceleration and 'acceleration' in self._observed_effects
+            if acceleration and 'accelerations' in self._published_fields
             else (),
             efforts,
         )
@@ -430,9 +433,7 @@ class LinkagePipeline:
         if writer.due is not None and not writer.due(now):
             return b''
         reading = state.reading
-        forces = (
-            state if extra.effect in _FORCES_ONLY and isinstance(state, CompiledState) else None
-        )
+        forces = state if writer.of_forces and isinstance(state, CompiledState) else None
         if writer.of_reading or forces is not None:
             return b'' if reading is None else writer.write(now, forces, reading)
         _, position, motion, _ = self.complete_state(state)
@@ -471,12 +472,10 @@ class LinkagePipeline:
 
 
 def _make_output(
-    name: str, topic: str, message: str, writer: Any, linkage_name: str, *, of_reading: bool
+    name: str, topic: str, message: str, writer: Any, linkage_name: str, **made_of: bool
 ) -> AuxiliaryOutput:
     within = f'~/{linkage_name}/{topic[2:]}' if linkage_name else topic
-    return AuxiliaryOutput(
-        name, within, message, WriterStage.from_writer(writer, of_reading=of_reading)
-    )
+    return AuxiliaryOutput(name, within, message, WriterStage.from_writer(writer, **made_of))
 
 
 def _remove_rates(_now: int, reading: SensorReading) -> SensorReading:
@@ -501,10 +500,8 @@ def _suppress_beyond_limits(
 def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
     """Return the closure of a linkage as its effects alter it, by the solver that it names."""
     linkage = scene_linkage.linkage
-    for effect in wanted.effects:
-        if effect.alter is not None:
-            random = Context.generator(seed, effect.name)
-            linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
+    for name, effect in wanted.of_kind(LinkageEffect).items():
+        linkage = effect.alter(linkage, Context.generator(seed, name))
     if scene_linkage.accuracy is not None:
         from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
 
@@ -567,7 +564,7 @@ class Pipeline:
                 f'has the topics {" and ".join(topics)}',
                 'write the same kind of drive for all',
             )
-        _refuse_stamps(scene)
+        _refuse_beside(scene)
         self.topic = topics[0] if topics else ''
         """The topic of the drives; '' for none."""
         self.wrenches: tuple[WrenchTopic, ...] = ()
@@ -583,13 +580,17 @@ class Pipeline:
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._has_state = any(
             linkage.scene_linkage.drive[0] != 'topic'
-            or not _RUNNING_IN_GAPS.isdisjoint(linkage.effect_names)
+            or any(effect.runs_in_gaps for effect in linkage.effects.values())
             for linkage in self.linkages
         )
         self.suppresses_ticks = (
             self._has_state
             or injection is not None
-            or any(not _SUPPRESSING.isdisjoint(linkage.effect_names) for linkage in self.linkages)
+            or any(
+                effect.suppresses_ticks
+                for linkage in self.linkages
+                for effect in linkage.effects.values()
+            )
         )
         """Whether ticks without a message may matter to a replay."""
         self._router = SampleRouter(
@@ -735,16 +736,13 @@ class Pipeline:
         return max(linkage.drive.max_age for linkage in self.linkages)
 
 
-def _refuse_stamps(scene: Scene) -> None:
-    """Refuse measurement stamps that cannot share one message of several linkages."""
-    delays = [scene_linkage.effects.get('delay') for scene_linkage in scene.linkages]
-    for scene_linkage, delay in zip(scene.linkages, delays, strict=True):
-        if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
-            raise scene_linkage.content.error(
-                'effects.delay.stamp',
-                'measured gives a linkage its own stamp, and all linkages share one message',
-                'give all linkages the same delay, or write arrival',
-            )
+def _refuse_beside(scene: Scene) -> None:
+    """Refuse effects that do not fit to those of the other linkages."""
+    for scene_linkage in scene.linkages:
+        for name, effect in scene_linkage.effects.items():
+            beside = [other.effects.get(name) for other in scene.linkages]
+            if (error := effect.refusal_beside(beside)) is not None:
+                raise scene_linkage.content.locate_error(error)
 
 
 def _join_readings(
