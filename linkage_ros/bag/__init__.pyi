@@ -68,7 +68,6 @@ from linkage_ros.bag.recover import (
 )
 from linkage_ros.bag.run_events import (
     BEGUN as BEGUN,
-    CHOSEN as CHOSEN,
     Event as Event,
     FaultEvent as FaultEvent,
     MID_RUN as MID_RUN,

@@ -22,9 +22,6 @@ from linkage_ros.errors import BagError
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
 """Key for the beginning of the bag, and its values."""
 
-CHOSEN = 'solver'
-"""Key for the chosen solvers, if the scene asks for an accuracy."""
-
 USER_EFFECTS = 'effects'
 """Key for the modules of user-defined effects."""
 
@@ -117,8 +114,6 @@ class RunMetadata(NamedTuple):
     wrenches: tuple[str, ...] = ()  # Names of the topics with wrenches, in the order of the scene
     begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
     versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
-    # Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
-    solvers: Mapping[str, Any] = {}
     user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
     # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
     seed: int = 0
@@ -151,14 +146,13 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
     }
     missing = {'scene', 'joint_states_topic'} - set(texts)
     wrong = (account.keys() & {*_TEXTS, BEGUN}) - set(texts)
-    solvers = account.get(CHOSEN, {})
     modules = account.get(USER_EFFECTS)
     if not isinstance(modules, dict):
         modules = {}
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras) and _are_names(wrenches)
     seed = account.get(SEED, 0)
-    if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
+    if missing or wrong or not named or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
     # Only displayed; the name of a file may contain any character.
     if not texts['scene'].isprintable():
@@ -169,7 +163,6 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
         wrenches=tuple(wrenches),
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
-        solvers=solvers,
         user_effects={name: str(module) for name, module in modules.items()},
         seed=seed,
     )

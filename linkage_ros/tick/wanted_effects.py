@@ -61,7 +61,6 @@ def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
         effects.setdefault(name, effect_class(name)())
     computes_forces = drive == 'torque' or any(each.needs_forces for each in effects.values())
     _refuse_idle(scene_linkage, computes_forces)
-    _refuse_solver(scene_linkage, computes_forces)
     ordered = {name: effects[name] for name in in_order(effects)}
     return WantedEffects(named, ordered, computes_forces, moves_by_rates)
 
@@ -92,14 +91,4 @@ def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
             idle[0],
             'acts on nothing here: no effect and no drive asks for forces',
             f'leave it out, drive by torque, or name one of {list_names(force_effects())}',
-        )
-
-
-def _refuse_solver(scene_linkage: SceneLinkage, forced: bool) -> None:
-    """Refuse a solver without dyad poses where the forces start from these."""
-    if forced and scene_linkage.solver is not None and scene_linkage.solver[0] != 'closed_form':
-        raise DefinitionError(
-            'solver',
-            f'{scene_linkage.solver[0]} computes no forces, and an effect or the drive needs them',
-            f'write closed_form, or leave {list_names(force_effects())} and torque out',
         )

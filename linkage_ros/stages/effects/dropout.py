@@ -80,8 +80,9 @@ class DropoutEffect(JointDropout, SensorEffect):
         """Build the sensor; raise `DefinitionError` if the bursts are too short for the losses."""
         if self.joints is None:
             return Dropout(self, context.random('dropout'))
-        # local import: only for joints
-        from linkage_ros.stages.effects.own_sensors import own_sensors
+        from linkage_ros.stages.effects.own_sensors import (
+            own_sensors,  # local import: only for joints
+        )
 
         return own_sensors('dropout', self, context)
 

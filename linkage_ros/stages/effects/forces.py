@@ -72,7 +72,7 @@ class EffortEffect(MechanismEffect):
             velocity, acceleration = motion.velocity, motion.acceleration
             if velocity is None or acceleration is None:
                 return motion
-            efforts = efforts_of(motion.position, velocity, acceleration, motion.seconds)
+            efforts = efforts_of(motion.position, velocity, acceleration, motion.given)
             # Near a toggle efforts grow with the accelerations, and faster.
             if not all_finite(efforts):
                 return motion
@@ -102,7 +102,7 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
             velocity, acceleration = motion.velocity, motion.acceleration
             if velocity is None or acceleration is None:
                 return motion
-            reactions = solve(motion.position, velocity, acceleration, motion.seconds)
+            reactions = solve(motion.position, velocity, acceleration, motion.given)
             return motion if reactions is None else motion._replace(reactions=reactions)
 
         return pin_forces

@@ -82,8 +82,9 @@ class RateLimitEffect(JointRateLimit, SensorEffect):
         """Build the sensor."""
         if self.joints is None:
             return RateLimit(self)
-        # local import: only for joints
-        from linkage_ros.stages.effects.own_sensors import own_sensors
+        from linkage_ros.stages.effects.own_sensors import (
+            own_sensors,  # local import: only for joints
+        )
 
         return own_sensors('rate_limit', self, context)
 

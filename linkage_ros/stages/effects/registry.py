@@ -5,7 +5,7 @@
 # writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
-"""
+
 """Effects by name: the package's own, and user-defined modules by their dotted names."""
 
 from __future__ import annotations
