@@ -108,7 +108,7 @@ def compile_tick(
         # Within its play, the motor moves alone and carries only itself.
         lines += _fall_back_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
     if efforts and exerts:
-        # As `linkage_ros.stages.effects.effort` for an input at rest.
+        # As `linkage_ros.stages.effects.forces` for an input at rest.
         effort = efforts[0]
         lines.append("bearing = getattr(crank, 'bearing', ())")
         lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
