@@ -90,7 +90,7 @@ sys.setprofile(None)
 print(json.dumps({
     'modules': modules, 'after': sorted(sys.modules), 'files': sorted(seen),
     'messages': [tick.message.hex() for tick in ticks if tick.message],
-    'stages': [*pipeline.linkages[0].effects],
+    'stages': [*pipeline.linkages[0].wanted.effects],
     'topics': [extra.topic for extra in pipeline.extras],
 }))
 """

@@ -127,7 +127,7 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
     name, parameters = linkage.scene_linkage.drive
     yield Stage(name, 'drive', parameters, ())
     given = linkage.scene_linkage.effects
-    for name, effect in linkage.effects.items():
+    for name, effect in linkage.wanted.effects.items():
         needed_by = () if name in given else effects_requiring(name, given)
         yield Stage(name, effect.place, effect, needed_by)
 

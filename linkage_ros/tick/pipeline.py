@@ -6,495 +6,25 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""
-Compute the tick of a scene, top to bottom: crank, closure, mechanism, sensors, message.
-
-Only the stages that the scene names are built; a tick never reads the scene.
-"""
+"""The pipeline of a scene: messages in, ticks out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from importlib import import_module
-from itertools import chain
-from operator import add
-from typing import Any, NamedTuple, TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from linkage_ros.description import Scene, SceneLinkage
-from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics import all_finite, Closure, Position, Status
-from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
-from linkage_ros.stages.effects import (
-    Continuous,
-    DriveEffect,
-    first_values,
-    ForceEffect,
-    LinkageEffect,
-    MechanismEffect,
-    MechanismState,
-    MessageEffect,
-    SensorEffect,
-    SensorReading,
-    SensorStage,
-    wrap_all,
-    WriterStage,
-)
-from linkage_ros.tick.compiled_tick import (
-    compile_contribution,
-    compile_linkage_state,
-    compile_scene_tick,
-    compile_tick,
-    CompiledState,
-    CompiledTick,
-    StateTuple,
-)
+from linkage_ros.description import Scene
+from linkage_ros.errors import quote
+from linkage_ros.kinematics import Closure
+from linkage_ros.messages import Rejection
+from linkage_ros.tick.compiled_tick import compile_tick
+from linkage_ros.tick.interpreted_tick import InterpretedTick, Tick
+from linkage_ros.tick.linkage_pipeline import LinkagePipeline
 from linkage_ros.tick.sample_router import SampleRouter
-from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import AppliedForces, HeldWrench
-    from linkage_ros.kinematics.compiling import TracedMotion as CompiledMotion
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
-
-
-class LinkageState(NamedTuple):
-    """The state of one linkage at a tick, step by step."""
-
-    crank: CrankState | None  # State of the crank; None without a crank state
-    position: Position | None  # Solution of the loops; None without a crank state
-    motion: MechanismState | None  # Motion of the mechanism; None where the loops do not close
-    # Published values; None where nothing is published. A delay stage may publish a reading
-    # although the linkage has no pose.
-    reading: SensorReading | None
-
-
-class Tick(NamedTuple):
-    """
-    The result of a tick.
-
-    Attributes
-    ----------
-    message
-        The serialized JointState; empty where nothing is published.
-    extras
-        One serialized message for each auxiliary topic, b'' where that topic has none; an empty
-        tuple where no auxiliary topic has a message.
-    states
-        State of each linkage, as far as the message needed it.
-    linkages
-        The linkage pipelines.
-
-    """
-
-    message: bytes
-    extras: tuple[bytes, ...]
-    states: Sequence[LinkageState | CompiledState | StateTuple]
-    linkages: Sequence[LinkagePipeline]
-
-    @property
-    def full_states(self) -> tuple[LinkageState, ...]:
-        """State of each linkage in full; computes here what the message did not need."""
-        return tuple(
-            linkage.complete_state(state)
-            for linkage, state in zip(self.linkages, self.states, strict=True)
-        )
-
-
-class AuxiliaryOutput(NamedTuple):
-    """A message published beside the joint states."""
-
-    effect: str  # The effect that asks for it
-    # Name and type (package/msg/Type) of the topic.
-    topic: str
-    message: str
-    writer: WriterStage  # Serializes the message
-
-
-@dataclass(frozen=True)
-class _OutputSelection:
-    """Picks the values that the scene publishes from the motion of a compiled linkage."""
-
-    # Two objects with equal keys pick the same values.
-    key: list[Any]
-    select_values: Callable[..., Sequence[Sequence[float]]] = field(compare=False)
-
-    def __call__(self, motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
-        """Return the values, in groups."""
-        return self.select_values(motion, *given)
-
-
-class LinkagePipeline:
-    """
-    The pipeline of one linkage. To reset it, build it again.
-
-    A given closure is reused: it has no state. Raise `FileError` if parts of the scene do not fit
-    together, or if the linkage does not close.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        scene_linkage: SceneLinkage,
-        closure: Closure | None,
-        injection: Injection | None,
-    ) -> None:
-        self.scene_linkage = scene_linkage
-        try:
-            self._build_stages(scene, closure, injection)
-        except DefinitionError as error:
-            of_linkage = error.where.startswith('masses')
-            content = scene_linkage.linkage_content if of_linkage else scene_linkage.content
-            raise content.locate_error(error) from None
-
-    def _build_stages(
-        self, scene: Scene, closure: Closure | None, injection: Injection | None
-    ) -> None:
-        scene_linkage = self.scene_linkage
-        wanted = choose_effects(scene_linkage)
-        self.effects = wanted.effects
-        """The computed effects, by name, in physical order."""
-        mechanism = wanted.of_kind(MechanismEffect)
-        self._computed_fields = frozenset(each.gives for each in mechanism.values()) - {''}
-        self._published_fields = self._computed_fields - frozenset(
-            each.gives for name, each in mechanism.items() if name not in wanted.named
-        )
-        seed = f'{scene.seed}/{scene_linkage.name}'
-        self.closure = closure or _make_closure(scene_linkage, wanted, seed)
-        self.context = Context(
-            closure=self.closure,
-            rate=scene.rate,
-            needs_rate='rates' in self._computed_fields,
-            seed=seed,
-            loads=scene_linkage.loads,
-            friction=next((f.friction for f in wanted.of_kind(ForceEffect).values()), None),
-            prefix=scene_linkage.prefix,
-            dependent=scene.dependent_joints,
-            effects=frozenset(scene_linkage.effects),
-            moves_by_rates=wanted.moves_by_rates,
-        )
-        self._build_drive(wanted, injection)
-        self._build_mechanism(wanted, injection)
-        self._build_sensors(wanted, injection, wrapped=scene.wrapped)
-        self._build_outputs(wanted)
-        self._compiled_tick = self._compile_tick(wanted)
-
-    def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
-        """Build what gives the crank state: the drive, its messages and the effects on it."""
-        drive, parameters = self.scene_linkage.drive
-        module = import_module(DRIVES[drive])
-        self.topic: str = getattr(module, 'TOPIC', '')
-        """Topic of the drive; '' for none."""
-        self.drive: Drive = module.build(parameters, self.context)
-        self._parse_sample = module.reader(parameters, self.context) if self.topic else None
-        self._message_faults = (
-            injection.build_functions('message') if injection is not None else []
-        )
-        if self._message_faults and not self.topic:
-            raise DefinitionError(
-                'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
-            )
-        self._drive_stages = [
-            effect.drive_stage(self.context) for effect in wanted.of_kind(DriveEffect).values()
-        ]
-
-    def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
-        """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
-        loads = self.scene_linkage.loads if wanted.computes_forces else None
-        self._applied: AppliedForces | None = None
-        """Loads that change with the time or by messages; None without any."""
-        self.wrenches: dict[str, HeldWrench] = {}
-        """The wrenches that messages give, by the name of the link."""
-        if loads is not None and (loads.applied.changes_with_time or loads.applied.wrenches):
-            self._applied = self.context.mechanics.applied
-            assert self._applied is not None
-            self.wrenches = self._applied.wrenches
-        self._solve_loops = self.closure.position
-        if self.scene_linkage.silent_beyond_limits and self.closure.bounds:
-            self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
-        self._mechanism_faults = (
-            injection.build_functions('mechanism', self.context) if injection is not None else []
-        )
-        mechanism = wanted.of_kind(MechanismEffect).values()
-        self._mechanism_stages = [effect.stage(self.context) for effect in mechanism]
-
-    def _build_sensors(
-        self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
-    ) -> None:
-        """Build what makes the published reading of the ideal one."""
-        sensors: dict[str, Any] = {}
-        for name, effect in wanted.of_kind(SensorEffect).items():
-            sensors[name] = effect.sensor(self.context)
-            if effect.reads in sensors:
-                sensors[name].read_by(sensors[effect.reads])
-        joints = self.scene_linkage.joint_names
-        broken = injection.build_functions('sensor', joints) if injection is not None else []
-        angles = Continuous(self.closure.turning, first_values(self.closure))
-        behind = [*sensors.values(), *broken]
-        self._running = angles if behind or not wrapped else None
-        if behind and 'rates' in self._computed_fields - self._published_fields:
-            # Only used between readings; not published.
-            self._published_fields |= {'rates'}
-            behind.append(_remove_rates)
-        if wrapped:
-            behind.append(wrap_all(self.closure.turning))
-        running = [] if self._running is None else [self._running]
-        self._sensor_stages = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
-        self._apply_later_sensors = (
-            partial(self._apply_sensors, first=len(running)) if behind else None
-        )
-
-    def _build_outputs(self, wanted: WantedEffects) -> None:
-        """Build the messages beside the joint states: of the effects, and of the drive."""
-        scene_linkage = self.scene_linkage
-        self.extras = [
-            _make_output(
-                name,
-                effect.topic,
-                effect.message,
-                effect.writer(self.context),
-                scene_linkage.name,
-                of_reading=effect.of_reading,
-                of_forces=effect.of_forces,
-            )
-            for name, effect in wanted.of_kind(MessageEffect).items()
-            if name in wanted.named
-        ]
-        """The topics beside the joint states."""
-        drive, parameters = scene_linkage.drive
-        module = import_module(DRIVES[drive])
-        if (of_drive := getattr(module, 'writer', None)) is not None:
-            written = of_drive(parameters, self.context, self.drive)
-            if written is not None:
-                topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
-                self.extras.append(
-                    _make_output(
-                        drive, topic, message, written, scene_linkage.name, of_reading=True
-                    )
-                )
-
-    def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
-        """Generate the tick up to the reading; None where a part has no generated form."""
-        mechanism = wanted.of_kind(MechanismEffect).values()
-        derivatives = [each.derivative for each in mechanism if each.derivative]
-        if self._mechanism_faults:
-            return None
-        if not all(each.is_compiled for each in mechanism):
-            return None
-        forced = any(each.needs_forces for each in mechanism)
-        outputs, applied = None, self._applied if forced else None
-        if 2 in derivatives:
-            of = [*mechanism, self._published_fields, self._writes_forces]
-            of += [self.context.loads, self.context.friction]
-            outputs = _OutputSelection(of, self._symbolic_outputs)
-        compiled = self.closure.compile_linkage(
-            len(derivatives), outputs, applied.given_count if applied else 0
-        )
-        # Where the forces have no solution, a compiled path has fewer values.
-        if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
-            return None
-        return compile_tick(self.drive, self._drive_stages, compiled, self._running, applied)
-
-    @property
-    def _writes_forces(self) -> bool:
-        """Return whether a message contains the forces in the joints."""
-        return any(extra.writer.of_forces for extra in self.extras)
-
-    @property
-    def whole_tick(self) -> CompiledTick | None:
-        """Return the generated tick up to the reading; None if a stage is not generated."""
-        of_seen = all(extra.writer.of_reading or extra.writer.of_forces for extra in self.extras)
-        return self._compiled_tick if self._apply_later_sensors is None and of_seen else None
-
-    @cached_property
-    def compute_state(self) -> Callable[[int], LinkageState | CompiledState]:
-        """Return a function from the time, in [ns], to the state of the linkage."""
-        if self._compiled_tick is None:
-            return self._interpret_state
-        return compile_linkage_state(
-            self._compiled_tick, self._apply_later_sensors, self.interpret_from_crank
-        )
-
-    def _interpret_state(self, now: int) -> LinkageState:
-        """Return the state of the linkage at a time, in [ns], step by step."""
-        crank = self.drive.state(now)
-        if crank is not None:
-            for stage in self._drive_stages:
-                crank = stage(crank)
-        return self.interpret_from_crank(now, crank)
-
-    def interpret_from_crank(self, now: int, crank: CrankState | None) -> LinkageState:
-        """Return the state of the linkage, given the crank state."""
-        if crank is None:
-            return LinkageState(None, None, None, self._apply_sensors_in_gap(now))
-        position = self._solve_loops(*crank.angles)
-        for fault in self._mechanism_faults:
-            position = fault(position)
-        if not position.joints:
-            return LinkageState(crank, position, None, self._apply_sensors_in_gap(now))
-        # The time of the loads begins here: a bag does not know of ticks before the first pose.
-        given = self._applied.given_at(now) if self._applied is not None else ()
-        motion = self._mechanism_motion(crank, position, given)
-        return LinkageState(
-            crank, position, motion, self._apply_sensors(now, self._observe(now, motion))
-        )
-
-    def _symbolic_outputs(
-        self, motion: CompiledMotion, *given: float
-    ) -> Sequence[Sequence[float]]:
-        """Return the ideal reading of a symbolic motion, and the joint forces."""
-        acceleration = motion.acceleration
-        if acceleration is None or not all_finite(acceleration.joints):
-            return []
-        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), given)
-        _velocity, _acceleration, *stages = self._mechanism_stages
-        for stage in stages:
-            moved = stage(moved)
-        reactions = [*chain(*moved.reactions)] if self._writes_forces else []
-        return [*self._observe(0, moved)[1:], reactions]
-
-    def _mechanism_motion(
-        self, crank: CrankState, position: Position, given: tuple[float, ...]
-    ) -> MechanismState:
-        """Return the motion of the mechanism in a pose."""
-        motion = MechanismState(crank, position, None, None, (), (), (), given)
-        for stage in self._mechanism_stages:
-            motion = stage(motion)
-        return motion
-
-    def _observe(self, now: int, motion: MechanismState) -> SensorReading:
-        """Return the ideal reading of a motion, with the values that the scene asks for."""
-        position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
-        efforts: tuple[float, ...] = ()
-        if 'efforts' in self._published_fields and motion.efforts:
-            # Efforts of the inputs, which are published first; 0 for the other joints.
-            efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
-        return SensorReading(
-            now,
-            tuple(map(add, position.joints, motion.deflection))
-            if motion.deflection
-            else position.joints,
-            velocity.joints if velocity and 'rates' in self._published_fields else (),
-            acceleration.joints
-            if acceleration and 'accelerations' in self._published_fields
-            else (),
-            efforts,
-        )
-
-    def _apply_sensors(
-        self, now: int, ideal: SensorReading, first: int = 0
-    ) -> SensorReading | None:
-        """Apply the sensor stages, from index `first` on, to an ideal reading."""
-        reading: SensorReading | None = ideal
-        gap = False
-        for sensor in self._sensor_stages[first:]:
-            if reading is not None:
-                reading = sensor.read(now, reading)
-                gap = sensor.gap is not None
-            elif sensor.silence is not None:
-                reading = sensor.silence(now, gap)
-        return reading
-
-    def _apply_sensors_in_gap(self, now: int) -> SensorReading | None:
-        """Return the sensor reading where the linkage has no pose."""
-        reading: SensorReading | None = None
-        for sensor in self._sensor_stages:
-            if reading is not None:
-                reading = sensor.read(now, reading)
-            elif sensor.gap is not None:
-                reading = sensor.gap(now)
-        return reading
-
-    def complete_state(self, state: LinkageState | CompiledState | StateTuple) -> LinkageState:
-        """Return the full state of a linkage; the generated tick leaves a part out."""
-        if isinstance(state, LinkageState):
-            return state
-        crank_numbers, numbers, _, given = state
-        crank = _crank_state(crank_numbers)
-        position = self._solve_loops(*crank.angles)
-        reading = None if numbers is None else SensorReading(*numbers)
-        return LinkageState(
-            crank, position, self._mechanism_motion(crank, position, given), reading
-        )
-
-    def write_extras(self, now: int, state: LinkageState | CompiledState) -> list[bytes]:
-        """Return the auxiliary messages at a time, in [ns]; b'' for none."""
-        return [self._write_extra(extra, now, state) for extra in self.extras]
-
-    def _write_extra(
-        self, extra: AuxiliaryOutput, now: int, state: LinkageState | CompiledState
-    ) -> bytes:
-        writer = extra.writer
-        if writer.due is not None and not writer.due(now):
-            return b''
-        reading = state.reading
-        forces = state if writer.of_forces and isinstance(state, CompiledState) else None
-        if writer.of_reading or forces is not None:
-            return b'' if reading is None else writer.write(now, forces, reading)
-        _, position, motion, _ = self.complete_state(state)
-        if motion is not None:
-            return b'' if reading is None else writer.write(now, motion, reading)
-        if position is None or writer.no_pose is None:
-            return b''
-        return writer.no_pose(now, position)
-
-    @property
-    def gap_begins(self) -> bool:
-        """Return whether a gap in the readings began at the last tick, if that had no pose."""
-        return any(sensor.gap_begins for sensor in self._sensor_stages)
-
-    def is_stale(self, now: int) -> bool:
-        """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
-        return now - self.drive.stamp > self.drive.max_age > 0
-
-    def offer(self, message: bytes, now: int) -> Rejection | None:
-        """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
-        if self._parse_sample is None:
-            return Rejection.MISSING
-        for spoil in self._message_faults:
-            message = spoil(message)
-        sample = self._parse_sample(message)
-        if isinstance(sample, Rejection):
-            return sample
-        rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
-        return rejection
-
-
-def _make_output(
-    name: str, topic: str, message: str, writer: Any, linkage_name: str, **made_of: bool
-) -> AuxiliaryOutput:
-    within = f'~/{linkage_name}/{topic[2:]}' if linkage_name else topic
-    return AuxiliaryOutput(name, within, message, WriterStage.from_writer(writer, **made_of))
-
-
-def _remove_rates(_now: int, reading: SensorReading) -> SensorReading:
-    """Remove the rates, which were only used between readings."""
-    return reading._replace(rates=())
-
-
-def _suppress_beyond_limits(
-    close: Callable[..., Position], closure: Closure
-) -> Callable[..., Position]:
-    """Wrap a closure function so that a pose beyond the joint limits publishes no joints."""
-
-    def close_within(*inputs: float) -> Position:
-        position = close(*inputs)
-        if position.joints and closure.bounds.first_exceeded(inputs, position.joints) is not None:
-            return replace(position, status=Status.LIMITED, joints=())
-        return position
-
-    return close_within
-
-
-def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
-    """Return the closure of a linkage as its effects alter it."""
-    linkage = scene_linkage.linkage
-    for name, effect in wanted.of_kind(LinkageEffect).items():
-        linkage = effect.alter(linkage, Context.generator(seed, name))
-    return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
 
 
 class Pipeline:
@@ -562,7 +92,7 @@ class Pipeline:
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._has_state = any(
             linkage.scene_linkage.drive[0] != 'topic'
-            or any(effect.runs_in_gaps for effect in linkage.effects.values())
+            or any(effect.runs_in_gaps for effect in linkage.wanted.effects.values())
             for linkage in self.linkages
         )
         self.suppresses_ticks = (
@@ -571,7 +101,7 @@ class Pipeline:
             or any(
                 effect.suppresses_ticks
                 for linkage in self.linkages
-                for effect in linkage.effects.values()
+                for effect in linkage.wanted.effects.values()
             )
         )
         """Whether ticks without a message may matter to a replay."""
@@ -582,8 +112,8 @@ class Pipeline:
         """Of several linkages, those whose inputs the last message named."""
         self._offer_count = 0
         self._newest_offers: dict[LinkagePipeline, int] = {}
-        self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
-        self.tick = self._build_tick()
+        interpreted = InterpretedTick(self.linkages)
+        self.tick = compile_tick(interpreted) or interpreted.run
         """Computes the tick at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
@@ -624,83 +154,12 @@ class Pipeline:
         self._newest_offers.clear()
         return len(fresh), len(stale)
 
-    def _make_tick(self, now: int, states: Sequence[LinkageState | CompiledState]) -> Tick:
-        """Return the result of a tick; joints without a reading are left out."""
-        extras: tuple[bytes, ...] = ()
-        if self.extras:
-            pairs = zip(self.linkages, states, strict=True)
-            extras = tuple(
-                [extra for linkage, state in pairs for extra in linkage.write_extras(now, state)]
-            )
-        readings = [state.reading for state in states if state.reading is not None]
-        if not readings:
-            return Tick(b'', extras if any(extras) else (), states, self.linkages)
-        present = tuple([state.reading is not None for state in states])
-        writer = self._writers.get(present) or self._make_writer(present)
-        stamp = max([reading.stamp for reading in readings])
-        return Tick(writer.write(stamp, *_join_readings(readings)), extras, states, self.linkages)
-
-    def _build_tick(self) -> Callable[[int], Tick]:
-        """Return the tick as a function of the time, in [ns]; generated text if possible."""
-        compiled = [tick for linkage in self.linkages if (tick := linkage.whole_tick) is not None]
-        several = len(self.linkages) > 1
-        if len(compiled) < len(self.linkages) or (several and self.extras):
-            computes = [linkage.compute_state for linkage in self.linkages]
-            return lambda now: self._make_tick(now, [compute(now) for compute in computes])
-        if several:
-            return self._combine_ticks(compiled)
-        (linkage,), (compiled_tick,) = self.linkages, compiled
-        return compile_scene_tick(
-            compiled_tick,
-            self._make_writer((True,)),
-            [extra.writer for extra in self.extras],
-            Tick,
-            self.linkages,
-            lambda now, crank: self._make_tick(now, [linkage.interpret_from_crank(now, crank)]),
-        )
-
-    def _combine_ticks(self, compiled_ticks: Sequence[CompiledTick]) -> Callable[[int], Tick]:
-        """Return the tick of several linkages that all have generated ticks."""
-        linkages = self.linkages
-        contributions = [
-            compile_contribution(compiled, linkage.interpret_from_crank)
-            for compiled, linkage in zip(compiled_ticks, linkages, strict=True)
-        ]
-        write = self._make_writer((True,) * len(linkages)).write
-        count = sum(len(compiled.joints) for compiled in compiled_ticks)
-
-        def tick(now: int) -> Tick:
-            positions: list[float] = []
-            rates: list[float] = []
-            efforts: list[float] = []
-            states = [add(now, positions, rates, efforts) for add in contributions]
-            if len(positions) < count:
-                return self._make_tick(now, [_name_fields(state) for state in states])
-            message = write(
-                now, positions, _if_complete(rates, count), _if_complete(efforts, count)
-            )
-            return Tick(message, (), states, linkages)
-
-        return tick
-
     def changes_state(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes the state of the pipeline."""
         return any(
-            not isinstance(state, LinkageState)
-            or linkage.gap_begins
-            or (state.position is not None and (bool(state.position.joints) or self._has_state))
+            state.has_pose or linkage.gap_begins or (self._has_state and state.crank is not None)
             for linkage, state in zip(self.linkages, tick.states, strict=True)
         )
-
-    def _make_writer(self, present: tuple[bool, ...]) -> JointStateWriter:
-        joints = [
-            joint
-            for linkage, there in zip(self.linkages, present, strict=True)
-            if there
-            for joint in linkage.scene_linkage.joint_names
-        ]
-        self._writers[present] = writer = JointStateWriter(joints)
-        return writer
 
     @property
     def closures(self) -> list[Closure]:
@@ -725,36 +184,3 @@ def _refuse_beside(scene: Scene) -> None:
             beside = [other.effects.get(name) for other in scene.linkages]
             if (error := effect.refusal_beside(beside)) is not None:
                 raise scene_linkage.content.locate_error(error)
-
-
-def _join_readings(
-    readings: Sequence[SensorReading],
-) -> tuple[list[float], list[float], list[float]]:
-    """
-    Return positions, rates and efforts of all readings.
-
-    The arrays of a JointState have equal length or are empty. Where one reading has no rates (at
-    a singularity, or without the effect), no rates are published. The same holds for efforts.
-    """
-    positions = [value for reading in readings for value in reading.joints]
-    rates = [value for reading in readings for value in reading.rates]
-    efforts = [value for reading in readings for value in reading.efforts]
-    n = len(positions)
-    return positions, _if_complete(rates, n), _if_complete(efforts, n)
-
-
-def _if_complete(values: list[float], count: int) -> list[float]:
-    """Return the values if there is one for each joint, else an empty list."""
-    return values if len(values) == count else []
-
-
-def _name_fields(state: LinkageState | StateTuple) -> LinkageState | CompiledState:
-    """Return the state of a linkage as a named tuple."""
-    if isinstance(state, LinkageState):
-        return state
-    crank, reading, *more = state
-    return CompiledState(_crank_state(crank), SensorReading(*reading), *more)
-
-
-def _crank_state(crank: tuple[Any, ...]) -> CrankState:
-    return crank if isinstance(crank, CrankState) else CrankState(*crank)

@@ -147,7 +147,7 @@ def scene_file(folder, effects):
 def joints(file, second=0):
     pipeline = Pipeline(load_scene(file))
     for now in range(second + 1):
-        (look,) = pipeline.tick(now * SECOND).full_states
+        (look,) = pipeline.tick(now * SECOND).states
     return look.reading.joints
 
 
@@ -186,7 +186,7 @@ def test_the_order_in_the_file_does_not_matter(tmp_path, package):
     mine = package(add=ADD, double=DOUBLE)
     lines = [f'{mine}.add: {{}}', f'{mine}.double: {{}}', 'velocity: {}']
     stages = [
-        tuple(Pipeline(load_scene(scene_file(tmp_path, order))).linkages[0].effects)
+        tuple(Pipeline(load_scene(scene_file(tmp_path, order))).linkages[0].wanted.effects)
         for order in (lines, lines[::-1])
     ]
     assert stages == [('velocity', f'{mine}.add', f'{mine}.double')] * 2
@@ -210,8 +210,13 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
     rigid = joints(scene_file(tmp_path, ['velocity: {}']))
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
     (linkage,) = pipeline.linkages
-    assert tuple(linkage.effects) == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
-    (look,) = pipeline.tick(0).full_states
+    assert tuple(linkage.wanted.effects) == (
+        'velocity',
+        'acceleration',
+        'pin_forces',
+        f'{mine}.soft',
+    )
+    (look,) = pipeline.tick(0).states
     assert look.reading.rates == ()
     assert pipeline.extras == []
     force = look.motion.reactions[0].fx

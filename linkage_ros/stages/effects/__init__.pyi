@@ -87,7 +87,6 @@ from linkage_ros.stages.effects.registry import (
     needed_effects as needed_effects,
 )
 from linkage_ros.stages.effects.stage import (
-    DriveStage as DriveStage,
     MechanismState as MechanismState,
     restamp as restamp,
     Sensor as Sensor,
