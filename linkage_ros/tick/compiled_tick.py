@@ -195,16 +195,16 @@ class _OutputSelection:
 def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     """Compile the tick of a linkage up to the reading; None where a part has no such form."""
     wanted = linkage.wanted
-    mechanism = wanted.of_kind(MechanismEffect).values()
-    derivatives = [each.derivative for each in mechanism if each.derivative]
+    acting = wanted.of_kind(MechanismEffect).values()
+    derivatives = [each.derivative for each in acting if each.derivative]
     if linkage.mechanism_faults:
         return None
-    if not all(each.is_compiled for each in mechanism):
+    if not all(each.is_compiled for each in acting):
         return None
-    loads = linkage.changing_loads if any(each.needs_forces for each in mechanism) else None
+    loads = linkage.changing_loads if any(each.needs_forces for each in acting) else None
     outputs = None
     if 2 in derivatives:
-        of = [*mechanism, linkage.published_fields, linkage.writes_forces]
+        of = [*acting, linkage.published_fields, linkage.writes_forces]
         of += [linkage.context.loads, linkage.context.friction]
         outputs = _OutputSelection(of, linkage)
     compiled = linkage.closure.compile_linkage(
