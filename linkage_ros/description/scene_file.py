@@ -24,6 +24,7 @@ from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
 from linkage_ros.description.scene_grammar import (
     DRIVE,
     drive_name,
+    effect_types,
     EFFECTS_BY_NAME,
     OF_A_LINKAGE,
     SCENE,
@@ -36,7 +37,7 @@ from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 
 if TYPE_CHECKING:
-    pass
+    from linkage_ros.stages.effects import Effect
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of a scene's files in a bag; further linkage files are numbered."""
@@ -320,16 +321,17 @@ def _read_scene_linkage(
     drive = drive_name(section_with('drive').section('drive', required=False))
     effects = section_with('effects').section('effects', required=False)
     published = OF_A_LINKAGE.read_key(section_with('publish_input'), 'publish_input', {})
+    not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
+    types = effect_types(effects, not_imported)
     if published is None:
-        published = drive != 'topic' or 'effort' in effects
+        published = drive != 'topic' or any(each.without_inputs for each in types.values())
     if closure is None:
         closure = read_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
-    _refuse_effects(effects, drive, published)
+    _refuse_effects(effects, types, drive, published)
     kinds = {bool(given.slider) for given in linkage.inputs}
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
-    not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     parts = {**parts_of(linkage), 'left_out': not_imported}
     prefix = OF_A_LINKAGE.read_key(section_with('prefix'), 'prefix', parts)
     return SceneLinkage(
@@ -347,20 +349,15 @@ def _read_scene_linkage(
     )
 
 
-def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
+def _refuse_effects(
+    effects: Section, types: Mapping[str, type[Effect]], drive: str, published: bool
+) -> None:
     """Refuse effects that do not fit to the drive, or to what is published."""
-    if 'effort' in effects and not published:
-        raise effects.error(
-            'effort',
-            'is the effort of the input joint, which is not published',
-            'set publish_input: true, or name pin_forces',
-        )
-    if drive == 'torque' and 'backlash' in effects:
-        raise effects.error(
-            'backlash',
-            'is play without masses, and torque moves masses',
-            'write drive.torque.play: {width: …, inertia: …} instead',
-        )
+    for name, effect in types.items():
+        if effect.without_inputs and not published:
+            raise effects.error(name, *effect.without_inputs)
+        if drive in effect.refused_drives:
+            raise effects.error(name, *effect.refused_drives[drive])
 
 
 def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:

@@ -60,7 +60,7 @@ from linkage_ros.description.units import ANGLES
 from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS, in_order, module_of
+from linkage_ros.stages.effects import effect_class, EFFECTS, in_order
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 """Bounds of the tick rate, in [Hz]; the higher was measured as what one core sustains."""
@@ -76,10 +76,6 @@ _NAMED_LINKAGE = TextOf(
     'path of the linkage file, relative to the folder of this file; or the name of a linkage that '
     'comes with the package'
 )
-_NO_PLAY_UNDER_TORQUE: Schema = {
-    'if': {'required': ['drive'], 'properties': {'drive': {'required': ['torque']}}},
-    'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
-}
 
 
 class _Prefix(TextOf):
@@ -112,14 +108,7 @@ class _Effects(Kind):
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
         effects = content.section(key, required=False)
-        for effect in parts['left_out']:
-            effects.section(effect)
-        known = [name for name in effects if name in EFFECTS or '.' in name]
-        try:
-            named = in_order([name for name in known if name not in parts['left_out']])
-            types = {name: module_of(name).PARAMETERS for name in named}
-        except DefinitionError as error:
-            raise effects.locate_error(error) from None
+        types = effect_types(effects, parts['left_out'])
         values = {
             name: read_parameters(effects.section(name), of, parts) for name, of in types.items()
         }
@@ -135,6 +124,18 @@ class _Effects(Kind):
             'additionalProperties': True,
         }
         return {**mapping_schema(self.meaning, effects), 'patternProperties': {_DOTTED: own}}
+
+
+def effect_types(effects: Section, left_out: Sequence[str]) -> dict[str, Any]:
+    """Return the classes of the named effects, in physical order."""
+    for name in left_out:
+        effects.section(name)
+    known = [name for name in effects if name in EFFECTS or '.' in name]
+    try:
+        named = in_order([name for name in known if name not in left_out])
+        return {name: effect_class(name) for name in named}
+    except DefinitionError as error:
+        raise effects.locate_error(error) from None
 
 
 class _SpringEnd(TextOf):
@@ -266,7 +267,7 @@ class _FaultKind(Kind):
     """A fault of one kind, and when it is injected; only scenes with faults import them."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        from linkage_ros.stages.faults import Fault, FAULTS  # local import: few scenes have any
+        from linkage_ros.stages.faults import FaultEntry, FAULTS  # local import: for few scenes
 
         name = content.ros_name(key)
         content = content.section(key)
@@ -284,7 +285,7 @@ class _FaultKind(Kind):
             )
         seconds = _WHEN.read_key(content, 'seconds', parts) if at else 0.0
         content.finish(tuple(_WHEN.entries))
-        return Fault(kinds[0], parameters, at, seconds)
+        return FaultEntry(kinds[0], parameters, at, seconds)
 
     def json_schema(self) -> Schema:
         from linkage_ros.stages.faults import FAULTS  # local import: as above
@@ -479,7 +480,22 @@ def parameter_type(module: str) -> Any:
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
     """Return the parameter types of all drives or effects in a registry."""
+    if registry is EFFECTS:
+        return {name: effect_class(name) for name in registry}
     return {name: parameter_type(module) for name, module in registry.items()}
+
+
+def _refused_pairs() -> Schema:
+    """Return the schema that refuses an effect beside a drive that excludes it."""
+    drives: dict[str, dict[str, bool]] = {}
+    for name in EFFECTS:
+        for drive in effect_class(name).refused_drives:
+            drives.setdefault(drive, {})[name] = False
+    ((drive, refused),) = drives.items()
+    return {
+        'if': {'required': ['drive'], 'properties': {'drive': {'required': [drive]}}},
+        'then': {'properties': {'effects': {'properties': refused}}},
+    }
 
 
 def scene_schema() -> Schema:
@@ -492,7 +508,7 @@ def scene_schema() -> Schema:
         {'name': name.json_schema(), 'linkage': linkage, **own},
         required=('name', 'linkage'),
     )
-    several = one_or_more('Several linkages instead of one.', one | _NO_PLAY_UNDER_TORQUE)
+    several = one_or_more('Several linkages instead of one.', one | _refused_pairs())
     keys = parameters_schema(SCENE)['properties'] | own
     return {
         '$schema': DIALECT,
@@ -500,7 +516,7 @@ def scene_schema() -> Schema:
         **mapping_schema(SCENE.meaning, {'linkage': linkage, 'linkages': several, **keys}),
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
-        'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
+        'else': {'required': ['linkage'], **_refused_pairs()},
         '$defs': parameters_schema(OF_A_LINKAGE)['properties'],
     }
 
