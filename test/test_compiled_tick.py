@@ -62,7 +62,8 @@ def ticks(work):
         now = BEGIN + index * MS
         if work.topic and index % 3 == 0 and not 200 < index < 230:
             angles = [0.04 * index + 0.3 * i for i in range(len(names))]
-            assert work.offer(write(now, angles, [40.0] * len(names)), now) is None
+            message = write(now, angles, [40.0] * len(names), [0.01 * index] * len(names))
+            assert work.offer(message, now) is None
         for topic in work.wrenches if index % 7 == 5 else ():
             assert topic.offer_wrench(wrench_stamped(index, 3 - index, 0.1 * index), now) is None
         yield work.tick(now)
@@ -184,6 +185,18 @@ def test_both_bear_the_same_loads_that_change(effects, loads):
     plain = [not tick.states[0].is_compiled for tick in ticks(work)]
     # Beside the first one: a crank that is silent, and angles that pass half a turn.
     assert sum(plain) < 60
+
+
+@pytest.mark.parametrize('drive', ['carried', 'torque'])
+def test_both_have_the_same_friction_by_the_forces_in_joints(drive):
+    linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
+    driven = {**DRIVES, 'torque': 'drive: {torque: {start: 1.0, rate: 30}}'}[drive]
+    friction = (
+        '{joints: {A: {coefficient: 0.1, radius: 0.01}, O4: {coefficient: 0.2, radius: 0.02}}}'
+    )
+    effects = f'{{effort: {{}}, pin_forces: {{}}, friction: {friction}}}'
+    loads = 'loads: {gravity: [0, -9.81], efforts: {rocker_joint: {over_time: [[0, 0], [1, 2]]}}}'
+    check(linkage, f'{driven}\npublish_input: true\n{loads}\neffects: {effects}', looked=20)
 
 
 def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():
