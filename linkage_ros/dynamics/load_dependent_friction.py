@@ -74,12 +74,11 @@ class FrictionSolver:
         """Compile the solutions for a number of right sides, or the forces in the joints alone."""
 
         def solve(*numbers: Any) -> list[Any]:
-            elimination = Elimination(self._rows_of(numbers[: self._varying]), ())
-            sides = numbers[self._varying :]
+            varying = self._varying
+            elimination = Elimination(self._rows_of(numbers[:varying]), ())
             if any(divisor == 0.0 for divisor in elimination.divisors):
                 return []
-            begins = range(0, len(sides), self._size)
-            found = [elimination.solve(sides[begin : begin + self._size]) for begin in begins]
+            found = [elimination.solve(side) for side in _pieces(numbers[varying:], self._size)]
             return self._joint_forces(found) if forces_only else [*chain(*found)]
 
         return _compile(solve, self._varying + number * self._size)
@@ -98,7 +97,7 @@ class FrictionSolver:
         return self._solve(numbers, forces_only=True)
 
     def _joint_forces(self, solutions: Sequence[Sequence[Any]]) -> list[Any]:
-        forces = []
+        forces: list[Any] = []
         for first, pin, _ in self._unknowns:
             for one in solutions:
                 forces += (one[first], one[first + 1] if pin else 0.0)
@@ -113,9 +112,7 @@ class FrictionSolver:
         flat = self._solve(numbers, forces_only=False)
         if flat is None:
             return None
-        free, *units = (
-            list(flat[begin : begin + self._size]) for begin in range(0, len(flat), self._size)
-        )
+        free, *units = _pieces(flat, self._size)
         nothing = [0.0] * len(free)
         forces = self._joint_forces([free, nothing, *units])
         found = self.solve_frictions(forces, [0.0] * self._count, 0.0)
@@ -173,12 +170,13 @@ class FrictionSolver:
     def _begin_forces(self, *numbers: Any) -> list[Any]:
         """Return what is small beside each friction, and each force without and by frictions."""
         count = self._count
-        *numbers, pull, mobility = numbers
-        width = 2 * (count + 2)
-        levers = numbers[width * count :]
-        sizes, forces = [], []
-        for i, (_, _, factor) in enumerate(self._unknowns):
-            x, y, by_x, by_y, *units = numbers[width * i : width * (i + 1)]
+        begin = 2 * count * (count + 2)
+        *levers, pull, mobility = numbers[begin:]
+        sizes: list[Any] = []
+        forces: list[Any] = []
+        pieces = _pieces(numbers[:begin], 2 * (count + 2))
+        for (_, _, factor), piece in zip(self._unknowns, pieces, strict=True):
+            x, y, by_x, by_y, *units = piece
             size = abs(make_vector(x, y)) + abs(make_vector(pull * by_x, pull * by_y))
             sizes.append(_STAYS * factor * size)
             forces += (x + pull * by_x, y + pull * by_y)
@@ -206,9 +204,10 @@ class FrictionSolver:
     ) -> tuple[list[Any], list[list[Any]]]:
         """Return what is missing of each friction, and how it falls with each of them."""
         count = self._count
-        width, missing, slopes = 2 * (count + 1), [], []
-        for i, (_, _, factor) in enumerate(self._unknowns):
-            x, y, *units = forces[width * i : width * (i + 1)]
+        missing, slopes = [], []
+        for i, piece in enumerate(_pieces(forces, 2 * (count + 1))):
+            _, _, factor = self._unknowns[i]
+            x, y, *units = piece
             for k, friction in enumerate(found):
                 x, y = x + friction * units[2 * k], y + friction * units[2 * k + 1]
             size = abs(make_vector(x, y))
@@ -217,6 +216,11 @@ class FrictionSolver:
             falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
             slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
         return missing, slopes
+
+
+def _pieces(numbers: Sequence[Any], size: int) -> list[list[Any]]:
+    """Return numbers in pieces of one size."""
+    return [list(piece) for piece in zip(*[iter(numbers)] * size, strict=True)]
 
 
 def _compile(function: Callable[..., Sequence[Any]], count: int) -> Callable[..., Any]:
