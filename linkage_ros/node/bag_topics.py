@@ -26,10 +26,11 @@ _MOST_DEPTH = 2**31 - 1  # as DDS counts it
 
 def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
     """Describe a topic for a bag, as `describe_topic` does, with the QoS of a publisher."""
-    return describe_topic(name, message_class, _recorded_qos(qos))
+    return describe_topic(name, message_class, recorded_qos(qos))
 
 
-def _recorded_qos(profile: QoSProfile) -> QosProfile:
+def recorded_qos(profile: QoSProfile) -> QosProfile:
+    """Return a profile of rclpy as a bag holds it."""
     return QosProfile(
         history=profile.history.name.lower(),
         depth=profile.depth,
