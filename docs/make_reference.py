@@ -104,7 +104,7 @@ def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
 
 
 def parameters(kind: str) -> str:
-    """Return all drives, effects, faults or solvers with their parameters."""
+    """Return all drives, effects or faults with their parameters."""
     return '\n'.join(part for name in REGISTRIES[kind] for part in _one(kind, name))
 
 
@@ -119,7 +119,7 @@ def _one(kind: str, name: str) -> Iterator[str]:
     yield table(parameters_.columns, rows)
 
 
-_ELSEWHERE = ('drive', 'effects', 'solver')
+_ELSEWHERE = ('drive', 'effects')
 """Keys whose keys are in the reference of parameters."""
 
 _NAMED = 'NAME'
@@ -215,7 +215,6 @@ MADE: Mapping[str, Callable[[], str]] = {
     'drives': lambda: parameters('drive'),
     'effects': lambda: parameters('effect'),
     'faults': lambda: parameters('fault'),
-    'solvers': lambda: parameters('solver'),
     'scene keys': scene_keys,
     'linkage keys': linkage_keys,
 }

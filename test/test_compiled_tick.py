@@ -18,6 +18,7 @@ from linkage_ros.messages import JointStateWriter
 from linkage_ros.tick import LinkageState, Pipeline
 import pytest
 
+from .support.messages import wrench_stamped
 from .support.scenes import pipeline_of
 
 ROOT = Path(__file__).parents[1]
@@ -52,6 +53,8 @@ def ticks(work):
         if work.topic and index % 3 == 0 and not 200 < index < 230:
             angles = [0.04 * index + 0.3 * i for i in range(len(names))]
             assert work.offer(write(now, angles, [40.0] * len(names)), now) is None
+        for topic in work.wrenches if index % 7 == 5 else ():
+            assert topic.offer_wrench(wrench_stamped(index, 3 - index, 0.1 * index), now) is None
         yield work.tick(now)
 
 
@@ -108,6 +111,9 @@ def check(linkage, scene, looked=1):
             continue
         for look, beside in zip(one.full_states, other.full_states, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
+            if look.motion is not None:
+                assert look.motion.efforts == beside.motion.efforts
+                assert look.motion.given == beside.motion.given
         assert all(isinstance(seen, LinkageState) for seen in other.states)
 
 
@@ -153,6 +159,25 @@ loads:
   forces: {coupler.P: {direction: [1, -1], frame: link, constant: 2}}
 """
     check(linkage, f'{DRIVES["carried"]}\n{loads}effects: {effects}')
+
+
+CHANGING = {
+    'over time': 'forces: {coupler.P: {direction: [1, -1], over_time: [[0, 0], [0.1, 9]]}}',
+    'wrenches': 'wrenches: {coupler: {frame: link, point: P, max_age: 0.02}, rocker: {}}',
+    'both': 'efforts: {rocker_joint: {over_time: [[0.05, 1], [0.2, -3]]}}, wrenches: {crank: {}}',
+}
+
+
+@pytest.mark.parametrize('loads', CHANGING)
+@pytest.mark.parametrize('effects', FORCES)
+def test_both_bear_the_same_loads_that_change(effects, loads):
+    linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
+    scene = f'{DRIVES["carried"]}\npublish_input: true\nloads: {{{CHANGING[loads]}}}\n'
+    check(linkage, f'{scene}effects: {effects}')
+    work = pipeline(linkage, f'{scene}effects: {effects}')
+    plain = [isinstance(tick.states[0], LinkageState) for tick in ticks(work)]
+    # Beside the first one: a crank that is silent, and angles that pass half a turn.
+    assert sum(plain) < 60
 
 
 def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():

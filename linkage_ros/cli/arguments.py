@@ -112,7 +112,7 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar='KEY=VALUE',
         help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3, or '
-        'of one of its linkages, as --set linkages.left.accuracy=1e-6; VALUE is YAML; quote a '
+        'of one of its linkages, as --set linkages.left.prefix=left_; VALUE is YAML; quote a '
         'part with a dot that the scene does not have yet, as '
         '--set \'loads.forces."coupler.P"={direction: [1, 0], constant: 5}\'; may be repeated',
     )

@@ -46,7 +46,6 @@ from linkage_ros.description import (
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS, effects_requiring, module_of
 from linkage_ros.stages.faults import FAULTS
@@ -69,7 +68,6 @@ REGISTRIES: Mapping[str, Mapping[str, Any]] = {
     'drive': DRIVES,
     'effect': EFFECTS,
     'fault': FAULTS,
-    'solver': SOLVERS,
 }
 """Everything that a scene can name, by kind."""
 
@@ -83,7 +81,7 @@ EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
     """Yield the tables of a scene that has been built."""
-    yield TerminalTable(title, ('', ''), [*_scene_facts(scene), *_solver_facts(pipeline.linkages)])
+    yield TerminalTable(title, ('', ''), list(_scene_facts(scene)))
     for lines in _group_alike(pipeline.linkages):
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
@@ -113,24 +111,6 @@ def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
         f'{record.directory}/{record.name or f"{scene.name}, and the time"}' if record else 'no'
     )
     yield 'recorded', recorded
-
-
-def _solver_facts(linkages: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
-    """Yield the solvers that close the loops, if the scene names any."""
-    for line in linkages:
-        name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
-        if line.solver_choice is not None:
-            yield (
-                'solver',
-                (
-                    f'{name}for an accuracy of {line.scene_linkage.accuracy:g}: '
-                    f'{line.solver_choice.why}'
-                ),
-            )
-        elif line.scene_linkage.solver is not None:
-            solver, parameters = line.scene_linkage.solver
-            text = _parameters_text(parameters)
-            yield 'solver', f'{name}{solver}{text and ", "}{text}'
 
 
 def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
@@ -231,9 +211,6 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
 
     account = scene_json(scene)
     for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
-        solver = line.scene_linkage.solver
-        linkage['solver'] = None if solver is None else _named_parameters(*solver)
-        linkage['accuracy'] = line.scene_linkage.accuracy
         linkage['stages'] = [
             {
                 **_named_parameters(stage.name, stage.parameters),
@@ -291,11 +268,11 @@ def _shorten_list(names: list[str]) -> str:
     return f'{", ".join(names[:_MOST_NAMES])}, … ({len(names)})'
 
 
-# Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds.
+# Drives, effects and faults as tables: parameters, units, defaults and bounds.
 
 
 def parameters_of(what: str, name: str) -> Any:
-    """Return the parameter type of a drive, effect, fault or solver."""
+    """Return the parameter type of a drive, effect or fault."""
     if what == 'fault':
         return FAULTS[name]
     module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
@@ -303,7 +280,7 @@ def parameters_of(what: str, name: str) -> Any:
 
 
 def table_of(what: str, name: str) -> TerminalTable:
-    """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
+    """Return the table of a drive, effect or fault; ``what`` is a key of `REGISTRIES`."""
     parameters = parameters_of(what, name)
     title = f'{what} {name}: {first_docstring_line(parameters)}'
     rows = list(parameter_rows(parameters))
@@ -322,7 +299,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--list',
         nargs='*',
         metavar='NAME',
-        help='drives, effects, faults and solvers: their parameters, units, defaults and bounds; '
+        help='drives, effects and faults: their parameters, units, defaults and bounds; '
         'all of them, or those named',
     )
     one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
@@ -375,7 +352,7 @@ def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
             words = [word for _, word in known]
             raise LinkageError(
                 f'--list {name}',
-                'there is no such drive, effect, fault or solver',
+                'there is no such drive, effect or fault',
                 did_you_mean(name, words, f'known: {list_names(words)}'),
             )
         yield from found

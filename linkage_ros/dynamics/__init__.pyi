@@ -6,6 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
 from linkage_ros.dynamics.integrators import (
     gauss_legendre as gauss_legendre,
     GAUSS_MATRIX as GAUSS_MATRIX,

@@ -19,7 +19,7 @@ the rate of its link.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import hypot, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
@@ -118,7 +118,7 @@ class LoadedPoint(NamedTuple):
 class _Lawful(NamedTuple):
     applied_to: JointCoordinate | LoadedPoint
     depends_on: JointCoordinate
-    force: Callable[..., tuple[float]]
+    law: Law
 
 
 class AppliedForces:
@@ -132,7 +132,7 @@ class AppliedForces:
     def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
-        self.seconds = 0.0  # The time since the first tick, for `acting_loads` without one
+        self.begin = -1  # Time of the first pose, in [ns]; negative before it
         _check_loads(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
         # The loaded points: link, and place in its frame, in [m].
@@ -151,7 +151,7 @@ class AppliedForces:
 
         def add_law(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
             laws.append(law)
-            self._lawful.append(_Lawful(at, of, self._joined_law(law)))
+            self._lawful.append(_Lawful(at, of, law))
 
         self._stops: dict[str, tuple[JointCoordinate, Contact]] = {}
         for name, stop in applied.stops.items():
@@ -307,47 +307,53 @@ class AppliedForces:
             energy += 0.5 * spring.stiffness * _spring_stretch(joint, spring, position) ** 2
         return energy
 
-    def _joined_law(self, law: Law) -> Callable[..., tuple[float]]:
-        """Return a law as one function of value, rate and perhaps time, which may be `call`."""
+    @property
+    def given_count(self) -> int:
+        """Return how many numbers `given_at` has; 0 if no load is given from outside."""
+        timed = self.wrenches or self._given.changes_with_time
+        return 1 + len(self._components) if timed else 0
 
-        def force(value: float, rate: float, time: float | None = None) -> tuple[float]:
-            now = self.seconds if time is None else time
-            return (law.force(law.segment(value, rate, now), value, rate, now),)
+    def given_at(self, now: int) -> tuple[float, ...]:
+        """Return what gives the loads at a time, in [ns]; the first call begins their time."""
+        if self.begin < 0:
+            self.begin = now
+        for held in self.wrenches.values():
+            held.expire(now)
+        return self.given_after((now - self.begin) * 1e-9)
 
-        return force
+    def given_after(self, seconds: float) -> tuple[float, ...]:
+        """Return a time since the first pose, in [s], and the numbers of the wrenches now."""
+        return (seconds, *chain.from_iterable(held.wrench for held in self.wrenches.values()))
 
     def acting_loads(
-        self, position: Position, velocity: Velocity, time: float | None
+        self, position: Position, velocity: Velocity, given: Sequence[float]
     ) -> Iterator[tuple[JointCoordinate | LoadedPoint, float]]:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
 
-        ``time`` is the time since the first tick, in [s]; None for ``seconds``, when a compiled
-        program runs.
+        ``given`` is as in `given_after`; empty for the begin, and the wrenches now.
         """
-        now = () if time is None else (time,)
+        seconds, *numbers = given or self.given_after(0.0)
         for joint, spring in self._springs:
             rate = joint.lever(velocity, position, ())
             stretch = _spring_stretch(joint, spring, position)
             yield joint, -spring.stiffness * stretch - spring.damping * rate
         yield from self._constant
-        for at, of, force in self._lawful:
+        for at, of, law in self._lawful:
             rate = of.lever(velocity, position, ())
-            yield at, call(force, of.value(position), rate, *now)[0]
-        for at, component in self._components:
-            # A compiled program asks for the wrench each time that it runs.
-            yield at, call(component.current_load, position.state.coordinates[1])[0]
+            yield at, call(_law_force, law, of.value(position), rate, seconds)[0]
+        yield from zip([at for at, _ in self._components], numbers, strict=True)
 
     def virtual_work(
         self,
         position: Position,
         velocity: Velocity,
         virtual: Velocity,
-        time: float,
+        given: Sequence[float],
     ) -> float:
         """Return the work of the loads over a virtual velocity; arguments as in `acting_loads`."""
         moved, work = self._point_velocities(position, virtual), 0.0
-        for at, force in self.acting_loads(position, velocity, time):
+        for at, force in self.acting_loads(position, velocity, given):
             work += force * at.lever(virtual, position, moved)
         return work
 
@@ -356,6 +362,11 @@ class AppliedForces:
         if not self._tracker.indices:
             return []
         return self._tracker.velocities(position, velocity, self._tracker.places(position))
+
+
+def _law_force(law: Law, value: float, rate: float, seconds: float) -> tuple[float]:
+    """Return the force by a law, for `call`."""
+    return (law.force(law.segment(value, rate, seconds), value, rate, seconds),)
 
 
 def _fastest_eigenvalue(stiffness: float, damping: float) -> float:

@@ -308,14 +308,14 @@ class Mechanics:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        seconds: float = 0.0,
+        given: Sequence[float] = (),
     ) -> tuple[float, ...]:
         """
         Return the effort of each drive for a motion, against inertia, loads and friction.
 
         Each is a moment in [N·m], or a force in [N] if the input slides, positive if it drives the
         input forward; Coulomb friction is 0 in a joint at rest. The position is closed and not a
-        toggle. ``seconds`` is the time since the first tick, for loads that change with it.
+        toggle. ``given`` is as in `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
         follower, count = self._follower, len(self._units)
         places = follower.places(position)
@@ -346,7 +346,7 @@ class Mechanics:
             for drag, rubbing in zip(drags, self.friction_joints, strict=True):
                 effort += drag * rubbing.slip_rate(w)
             if self.applied is not None:
-                effort -= self.applied.virtual_work(position, velocity, virtual, seconds)
+                effort -= self.applied.virtual_work(position, velocity, virtual, given)
             if self.friction.holds:
                 held = sum(
                     (rubbing.friction.coulomb + rubbing.friction.breakaway_excess)

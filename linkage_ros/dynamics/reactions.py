@@ -310,15 +310,15 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        seconds: float = 0.0,
+        given: Sequence[float] = (),
     ) -> tuple[Reaction, ...] | None:
         """
         Return the reaction in each joint, in the order of `names`.
 
-        Return None at a toggle and where the linkage does not close. ``seconds`` is the time since
-        the first tick, for loads that change with it.
+        Return None at a toggle and where the linkage does not close. ``given`` is as in
+        `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
-        balance = self._solve_balance(position, velocity, acceleration, seconds)
+        balance = self._solve_balance(position, velocity, acceleration, given)
         if balance is None:
             return None
         forces, resistances = balance
@@ -340,7 +340,7 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        seconds: float = 0.0,
+        given: Sequence[float] = (),
     ) -> tuple[float, ...]:
         """
         Return the effort of each drive; empty where there are no forces.
@@ -348,7 +348,7 @@ class Reactions:
         It is as in `Mechanics.drive_efforts`, plus the friction that grows with the forces in the
         joints. The parameters are as in `solve`.
         """
-        balance = self._solve_balance(position, velocity, acceleration, seconds)
+        balance = self._solve_balance(position, velocity, acceleration, given)
         if balance is None:
             return ()
         forces, _ = balance
@@ -375,14 +375,13 @@ class Reactions:
         `linkage_ros.dynamics.load_dependent_friction.solve_frictions`.
         """
         closure, applied = self._mechanics.closure, self._mechanics.applied
-        if applied is not None:
-            applied.seconds = seconds
-        found: Sequence[Sequence[float]] | None = self._compiled_motion.fast(value, rate)
+        given = () if applied is None else applied.given_after(seconds)
+        found: Sequence[Sequence[float]] | None = self._compiled_motion.fast(value, rate, *given)
         if found is None:
             position = closure.position(value)
             if position.status not in _SOLVED:
                 return None
-            found = self._force_coefficients(position, closure.velocity(position, rate))
+            found = self._force_coefficients(position, closure.velocity(position, rate), given)
         if not found:
             return None
         forces, levers = found
@@ -390,21 +389,25 @@ class Reactions:
 
     @cached_property
     def _compiled_motion(self) -> Compiled:
-        def list_outputs(motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        def list_outputs(motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
             assert motion.velocity is not None
-            return self._force_coefficients(motion.position, motion.velocity)
+            return self._force_coefficients(motion.position, motion.velocity, given)
 
-        return Compiled(self._mechanics.closure, 1, list_outputs, within_limits=False)
+        applied = self._mechanics.applied
+        count = 0 if applied is None else len(applied.given_after(0.0))
+        return Compiled(
+            self._mechanics.closure, 1, list_outputs, within_limits=False, given_count=count
+        )
 
     def _force_coefficients(
-        self, position: Position, velocity: Velocity
+        self, position: Position, velocity: Velocity, given: Sequence[float]
     ) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces that cause friction, and the levers of joints."""
         closure, size = self._mechanics.closure, self._matrix.size
         x, places = position.state.coordinates, self._follower.places(position)
         still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
-        sides, _ = self._right_sides(position, velocity, still, places, None)
-        more, _ = self._right_sides(position, velocity, pulled, places, None)
+        sides, _ = self._right_sides(position, velocity, still, places, given)
+        more, _ = self._right_sides(position, velocity, pulled, places, given)
         by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
         columns = [*sides[:size], *by_pull, *sides[size:]]
         forces = call(self._forces_in, self._matrix.matrix_at(x, places), *columns)
@@ -475,13 +478,13 @@ class Reactions:
         position: Position,
         velocity: Velocity,
         acceleration: Acceleration,
-        seconds: float = 0.0,
+        given: Sequence[float] = (),
     ) -> tuple[list[float], list[float]] | None:
         """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
             return None
         x, places = position.state.coordinates, self._follower.places(position)
-        sides, resistances = self._right_sides(position, velocity, acceleration, places, seconds)
+        sides, resistances = self._right_sides(position, velocity, acceleration, places, given)
         forces = call(self._solve_system, self._matrix.matrix_at(x, places), *sides)
         if not has_result(forces):
             return None
@@ -498,7 +501,7 @@ class Reactions:
         velocity: Velocity,
         acceleration: Acceleration,
         places: list[complex],
-        seconds: float | None,
+        given: Sequence[float],
     ) -> tuple[list[float], list[float]]:
         """
         Return the right sides of the system, and the friction in each joint.
@@ -525,7 +528,7 @@ class Reactions:
                         lever = places[point] - places[self._bodies[row // 3][2]]
                         self._apply_force(sides, row, lever, pulled)
         if self._mechanics.applied is not None:
-            for at, load in self._mechanics.applied.acting_loads(position, velocity, seconds):
+            for at, load in self._mechanics.applied.acting_loads(position, velocity, given):
                 self._apply_load(sides, at, load, position, places)
         resistances = [0.0] * len(self.joints)
         for rubbing in self._mechanics.friction_joints:

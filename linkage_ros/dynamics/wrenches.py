@@ -65,7 +65,3 @@ class Component:
     def force(self, _segment: int, _value: float, _rate: float, _time: float) -> float:
         """Return the force or the torque that acts now, in [N] or [N·m]."""
         return self.held_wrench.wrench[self.number]
-
-    def current_load(self, _value: float) -> tuple[float]:
-        """Return the load alone, which `call` may evaluate at a value of the input."""
-        return (self.held_wrench.wrench[self.number],)

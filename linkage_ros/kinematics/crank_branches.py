@@ -32,9 +32,9 @@ from linkage_ros.errors import DefinitionError, did_you_mean, list_names
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import golden_section, last_inside
+from linkage_ros.kinematics.ranges import golden_section, last_inside, sample_inputs
 from linkage_ros.kinematics.results import InputRange, LoopClosure
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""

@@ -15,8 +15,9 @@ from math import remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.ranges import sample_inputs
 from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.sweep_analysis import InputSweep, sample_inputs
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _SAME_PATH = 0.01
 """Largest distance of paths that are drawn as one, relative to their length."""

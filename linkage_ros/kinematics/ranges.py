@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from math import acos, asin, ceil, floor, inf, lcm, pi, remainder, sqrt, tau
+from math import acos, asin, ceil, cos, floor, inf, lcm, pi, remainder, sqrt, tau
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.diagonals import CrankDiagonal
@@ -233,20 +233,38 @@ def slide_bound(closure: LoopClosure) -> float:
     return sum(link_lengths(closure.structure.links))
 
 
+def sample_inputs(interval: InputRange, count: int = _SAMPLES) -> list[float]:
+    """
+    Return values from one end of a range to the other.
+
+    Near the limits of a range joints move as the square root of the input: there samples are
+    denser.
+    """
+    low, high = interval.lowest, interval.highest
+    if interval.is_whole:
+        return even_samples(low, high, count)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    inner = [middle - half * cos(pi * i / count) for i in range(1, count)]
+    return [low, *(min(max(value, low), high) for value in inner), high]
+
+
+def even_samples(low: float, high: float, count: int = _SAMPLES) -> list[float]:
+    """Return values from one end of an interval to the other, at equal distances."""
+    return [low + (high - low) * i / count for i in range(count)] + [high]
+
+
 def find_intervals(
     closes: Callable[[float], bool],
-    low: float,
-    high: float,
-    samples: int = _SAMPLES,
+    values: Sequence[float],
     margin: Callable[[float], float] | None = None,
 ) -> Iterator[tuple[float, float]]:
     """
-    Yield the parts of an interval in which a condition holds, such as that loops close.
+    Yield the parts of an interval, sampled at ``values``, in which loops close or the like.
 
     ``margin`` is the margin by which it holds at a value, negative if it does not. Its valleys and
     summits between samples are tested too; without it, parts narrower than a sample are missed.
     """
-    values = [low + (high - low) * i / samples for i in range(samples)] + [high]
+    low, high = values[0], values[-1]
     known: dict[float, bool] = {}
     if margin is not None:
         margins = [margin(value) for value in values]
@@ -271,12 +289,14 @@ def _turning_points(
     margin: Callable[[float], float], values: Sequence[float], margins: Sequence[float]
 ) -> Iterator[float]:
     """Yield the values between samples at which a margin may cross zero and return."""
-    for i in range(1, len(values) - 1):
-        before, here, after = margins[i - 1], margins[i], margins[i + 1]
-        if 0.0 < here <= min(before, after) and here < inf:
-            yield golden_section(margin, values[i - 1], values[i + 1])[1]
-        elif 0.0 > here >= max(before, after):
-            yield golden_section(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
+    last = len(values) - 1
+    for i, here in enumerate(margins):
+        # At an end it may cross zero before the first sample inside.
+        before, after = max(i - 1, 0), min(i + 1, last)
+        if 0.0 < here <= min(margins[before], margins[after]) and here < inf:
+            yield golden_section(margin, values[before], values[after])[1]
+        elif 0.0 > here >= max(margins[before], margins[after]):
+            yield golden_section(lambda x: -margin(x), values[before], values[after])[1]
 
 
 def _closing_margin(closure: LoopClosure, value: float) -> float:
@@ -303,7 +323,7 @@ def _search_intervals(
 
     parts: list[tuple[float, float]] = []
     for begin, end in find_intervals(
-        has_pose, low, high, samples, partial(_closing_margin, closure)
+        has_pose, even_samples(low, high, samples), partial(_closing_margin, closure)
     ):
         if parts and begin - parts[-1][1] < _POINT * (high - low):
             # Between them two pins meet, or two lines are parallel: the range does not end.
@@ -476,7 +496,8 @@ def _within_limits(
     low, high = interval.lowest, interval.highest
     if interval.is_whole:
         high = low + tau * turns_to_repeat(closure, closure.position)
-    parts = list(find_intervals(is_within, low, high, margin=limit_margin))
+    values = sample_inputs(interval._replace(highest=high))
+    parts = list(find_intervals(is_within, values, limit_margin))
     if parts == [(low, high)]:
         yield interval
         return

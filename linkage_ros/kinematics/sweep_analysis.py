@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise, product
-from math import cos, inf, isfinite, nan, pi, remainder, tau
+from math import inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
@@ -21,10 +21,12 @@ from linkage_ros.kinematics.limits import Bound, without_mirrored
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.ranges import (
     describe_ranges,
+    even_samples,
     find_intervals,
     golden_section,
     is_iterated,
     joints_repeat,
+    sample_inputs,
     slide_bound,
     through_the_end,
     turns_to_repeat,
@@ -254,8 +256,10 @@ class InputSweep:
                 # Angles count with their turns.
                 low = limits.low if limits.low > -inf else limits.high - tau
                 high = limits.high if limits.high < inf else limits.low + tau
-            return list(find_intervals(self.is_closed, low, high)) if low < high else []
-        found = list(find_intervals(self.is_closed, -far, far))
+            return (
+                list(find_intervals(self.is_closed, even_samples(low, high))) if low < high else []
+            )
+        found = list(find_intervals(self.is_closed, even_samples(-far, far)))
         return through_the_end(found, -far, far) if self.turning else found
 
     def _name_ends(self, low: float, high: float) -> InputRange:
@@ -336,21 +340,6 @@ def grid_positions(
             ways.append([tau * i / count for i in range(count)])
     for inputs in product(*ways):
         yield inputs, closure.position(*inputs)
-
-
-def sample_inputs(interval: InputRange, count: int = _SAMPLES) -> list[float]:
-    """
-    Return values from one end of a range to the other.
-
-    Near the limits of a range joints move as the square root of the input: there samples are
-    denser.
-    """
-    low, high = interval.lowest, interval.highest
-    if interval.is_whole:
-        return [low + (high - low) * i / count for i in range(count + 1)]
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    inner = [middle - half * cos(pi * i / count) for i in range(1, count)]
-    return [low, *(min(max(value, low), high) for value in inner), high]
 
 
 def find_extremes(

@@ -87,7 +87,7 @@ class RunRecording:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _new_folder(runs, record.name, scene.name)
             names = [(key, topic.name) for key, topic in described]
-            files = scene_files(scene, names, begun, loop.pipeline.linkages, folder)
+            files = scene_files(scene, names, begun, folder)
             opening = [
                 (index, description)
                 for index, (key, _) in enumerate(described)

@@ -116,7 +116,7 @@ def simulate_run(
         for topic in table
     ]
     names = [(row.key, topic.name) for row, topic in zip(table, topics, strict=True)]
-    files = scene_files(scene, names, WITH_THE_RUN, first.linkages, folder)
+    files = scene_files(scene, names, WITH_THE_RUN, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heed_signals():
         writer = BagWriter(folder, topics, to_attachments(files))

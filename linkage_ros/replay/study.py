@@ -221,7 +221,7 @@ def _reading_of(state: LinkageState | CompiledState | StateTuple) -> SensorReadi
     """Return the reading of a linkage at a tick; None without one."""
     if isinstance(state, LinkageState | CompiledState):
         return state.reading
-    _, numbers, _ = state
+    _, numbers, *_ = state
     return None if numbers is None else SensorReading(*numbers)
 
 

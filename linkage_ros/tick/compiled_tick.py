@@ -29,6 +29,7 @@ from linkage_ros.stages.drives import CrankState
 from linkage_ros.stages.effects import SensorReading
 
 if TYPE_CHECKING:
+    from linkage_ros.dynamics import AppliedForces
     from linkage_ros.kinematics.compiling import Compiled
     from linkage_ros.messages import JointStateWriter
     from linkage_ros.stages.drives import Drive
@@ -47,9 +48,10 @@ class CompiledState(NamedTuple):
     reading: SensorReading | None  # None where nothing is published
     # As in `Reaction`, in pins and sliders; empty where no message holds them.
     reactions: tuple[tuple[float, float, float], ...]
+    given: tuple[float, ...]  # As in `MechanismState`
 
 
-StateTuple: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+StateTuple: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 """The same as plain tuples."""
 
 
@@ -61,6 +63,7 @@ class CompiledTick(NamedTuple):
     lines: list[str]
     bound: dict[str, Any]
     crank: str  # The crank state, as an expression
+    given: str  # What gives the loads that change, likewise
     # Values of the reading, as expressions; empty where the scene does not ask for them.
     joints: list[str]
     rates: list[str]
@@ -74,12 +77,14 @@ def compile_tick(
     drive_stages: Sequence[DriveStage],
     compiled_linkage: Compiled,
     angles: Continuous | None,
+    applied: AppliedForces | None,
 ) -> CompiledTick:
     """
     Write the usual tick of a linkage.
 
     The compiled linkage closes for at least one input; it returns the values of a `CompiledTick`,
-    as far as the scene asks for them. ``angles`` unwraps the published angles; None if not needed.
+    as far as the scene asks for them. ``angles`` unwraps the published angles; ``applied``
+    gives the loads that change. None if not needed.
     """
     crank = drive.compile_state(compiled_linkage.driven, 'return interpret(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
@@ -91,6 +96,10 @@ def compile_tick(
         lines.append(f'crank = {_CRANK_FIELDS}, = stage{index}({state})')
         state = 'crank'
     leave = f'return interpret(now, {state})'
+    if applied is not None:
+        bound['applied'] = applied
+        lines += _fall_back_unless('applied.begin >= 0', leave)
+        lines.append('given = applied.given_at(now)')
     mechanism, groups = _mechanism_lines(compiled_linkage, leave)
     lines += mechanism.lines
     bound |= mechanism.bound
@@ -107,18 +116,22 @@ def compile_tick(
         bound['running'] = angles
         lines += _unwrap_lines(angles.places, joints, leave)
     crank_text = 'crank' if exerts else f'({_CRANK_FIELDS})'
-    return CompiledTick(lines, bound, crank_text, joints, rates, accelerations, efforts, reactions)
+    given = '()' if applied is None else 'given'
+    groups = joints, rates, accelerations, efforts, reactions
+    return CompiledTick(lines, bound, crank_text, given, *groups)
 
 
 def _mechanism_lines(compiled_linkage: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
     """Write the motion of a compiled linkage; also return the names of its values, in groups."""
     path, *more_paths = compiled_linkage.paths
     inputs = [one.name for one in path.inputs]
-    given = iter(inputs)
+    names = iter(inputs)
     lines = [
-        f'{", ".join(islice(given, compiled_linkage.driven))}, = {field}'
+        f'{", ".join(islice(names, compiled_linkage.driven))}, = {field}'
         for field in CrankState._fields[: 1 + compiled_linkage.derivatives]
     ]
+    if beside := [*names]:
+        lines.append(f'{", ".join(beside)}, = given')
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
         for letter, group in zip('xyzef', path.outputs, strict=False)
@@ -172,7 +185,7 @@ def compile_linkage_state(
     if apply_sensors is not None:
         lines.append('reading = apply_sensors(now, reading)')
     crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
-    lines.append(f'return new(CompiledState, ({crank}, reading, {_reactions_text(compiled)}))')
+    lines.append(f'return new(CompiledState, {_state_text(compiled, crank)})')
     return _define_function(
         compiled, lines, {'apply_sensors': apply_sensors, 'interpret': interpret}
     )
@@ -190,7 +203,7 @@ def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> 
     lines = [
         f'_, own_positions, own_rates, _, own_efforts = reading = {_reading_text(compiled)}',
         *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
-        f'return ({compiled.crank}, reading, {_reactions_text(compiled)})',
+        f'return {_state_text(compiled, compiled.crank)}',
     ]
     return _define_function(
         compiled, lines, {'interpret': interpret}, ['now', *(f'all_{name}' for name in groups)]
@@ -218,7 +231,7 @@ def compile_scene_tick(
     lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')
-    state = f'({compiled.crank}, reading, {_reactions_text(compiled)})'
+    state = _state_text(compiled, compiled.crank)
     messages = _tuple_text(
         [
             f'write{index}(now, {"None" if extra.of_reading else "state"}, reading)'
@@ -257,11 +270,10 @@ def _reading_text(compiled: CompiledTick) -> str:
     return f'(now, {", ".join(map(_tuple_text, groups))})'
 
 
-def _reactions_text(compiled: CompiledTick) -> str:
+def _state_text(compiled: CompiledTick, crank: str) -> str:
     numbers = iter(compiled.reactions)
-    return _tuple_text(
-        [_tuple_text(three) for three in zip(numbers, numbers, numbers, strict=True)]
-    )
+    reactions = [_tuple_text(three) for three in zip(numbers, numbers, numbers, strict=True)]
+    return f'({crank}, reading, {_tuple_text(reactions)}, {compiled.given})'
 
 
 def _tuple_text(parts: Sequence[str]) -> str:

@@ -26,7 +26,6 @@ from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import all_finite, Closure, Position, Status
 from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
 from linkage_ros.stages.effects import (
     Continuous,
@@ -51,9 +50,8 @@ from linkage_ros.tick.sample_router import SampleRouter
 from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import HeldWrench
+    from linkage_ros.dynamics import AppliedForces, HeldWrench
     from linkage_ros.kinematics.compiling import TracedMotion as CompiledMotion
-    from linkage_ros.solvers import SolverChoice
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
 
@@ -129,11 +127,11 @@ class _OutputSelection:
 
     # Two objects with equal keys pick the same values.
     key: list[Any]
-    select_values: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
+    select_values: Callable[..., Sequence[Sequence[float]]] = field(compare=False)
 
-    def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+    def __call__(self, motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
         """Return the values, in groups."""
-        return self.select_values(motion)
+        return self.select_values(motion, *given)
 
 
 class LinkagePipeline:
@@ -207,14 +205,14 @@ class LinkagePipeline:
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
         loads = self.scene_linkage.loads if wanted.computes_forces else None
-        self._has_timed_loads = loads is not None and loads.applied.changes_with_time
-        self._first_time = -1
+        self._applied: AppliedForces | None = None
+        """Loads that change with the time or by messages; None without any."""
         self.wrenches: dict[str, HeldWrench] = {}
         """The wrenches that messages give, by the name of the link."""
-        if loads is not None and loads.applied.wrenches:
-            applied = self.context.mechanics.applied
-            assert applied is not None
-            self.wrenches = applied.wrenches
+        if loads is not None and (loads.applied.changes_with_time or loads.applied.wrenches):
+            self._applied = self.context.mechanics.applied
+            assert self._applied is not None
+            self.wrenches = self._applied.wrenches
         self._solve_loops = self.closure.position
         if self.scene_linkage.silent_beyond_limits and self.closure.bounds:
             self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
@@ -280,22 +278,22 @@ class LinkagePipeline:
     def _compile_tick(self, wanted: WantedEffects) -> CompiledTick | None:
         """Generate the tick up to the reading; None where a part has no generated form."""
         moved = {effect.name for effect in wanted.effects if effect.stage is not None}
-        if not self.closure.by_steps or self._mechanism_faults or self._has_timed_loads:
+        if self._mechanism_faults:
             return None
         if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
             return None
-        if self.wrenches and not moved.isdisjoint(FORCE_EFFECTS):
-            return None  # A compiled tick computes from the crank alone.
-        outputs = None
+        outputs, applied = None, None if moved.isdisjoint(FORCE_EFFECTS) else self._applied
         if 'acceleration' in moved:
             of = [wanted.parameters[name] for name in self.effect_names if name in moved]
             of += [self._observed_effects, self.context.loads, self.context.friction]
             outputs = _OutputSelection(of, self._symbolic_outputs)
-        compiled = self.closure.compile_linkage(len(moved.intersection(_KINEMATIC)), outputs)
+        compiled = self.closure.compile_linkage(
+            len(moved.intersection(_KINEMATIC)), outputs, applied.given_count if applied else 0
+        )
         # Where the forces have no solution, a compiled path has fewer values.
         if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
             return None
-        return compile_tick(self.drive, self._drive_stages, compiled, self._running)
+        return compile_tick(self.drive, self._drive_stages, compiled, self._running, applied)
 
     @property
     def whole_tick(self) -> CompiledTick | None:
@@ -331,24 +329,21 @@ class LinkagePipeline:
             position = fault(position)
         if not position.joints:
             return LinkageState(crank, position, None, self._apply_sensors_in_gap(now))
-        if self._has_timed_loads and self._first_time < 0:
-            # A bag does not know of ticks before the first pose.
-            self._first_time = now
-        for held in self.wrenches.values():
-            held.expire(now)
-        motion = self._mechanism_motion(
-            crank, position, (now - self._first_time) * 1e-9 if self._has_timed_loads else 0.0
-        )
+        # The time of the loads begins here: a bag does not know of ticks before the first pose.
+        given = self._applied.given_at(now) if self._applied is not None else ()
+        motion = self._mechanism_motion(crank, position, given)
         return LinkageState(
             crank, position, motion, self._apply_sensors(now, self._observe(now, motion))
         )
 
-    def _symbolic_outputs(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+    def _symbolic_outputs(
+        self, motion: CompiledMotion, *given: float
+    ) -> Sequence[Sequence[float]]:
         """Return the ideal reading of a symbolic motion, and the joint forces."""
         acceleration = motion.acceleration
         if acceleration is None or not all_finite(acceleration.joints):
             return []
-        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), ())
+        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), given)
         _velocity, _acceleration, *stages = self._mechanism_stages
         for stage in stages:
             moved = stage(moved)
@@ -358,10 +353,10 @@ class LinkagePipeline:
         return [*self._observe(0, moved)[1:], reactions]
 
     def _mechanism_motion(
-        self, crank: CrankState, position: Position, seconds: float = 0.0
+        self, crank: CrankState, position: Position, given: tuple[float, ...]
     ) -> MechanismState:
         """Return the motion of the mechanism in a pose."""
-        motion = MechanismState(crank, position, None, None, (), (), (), seconds)
+        motion = MechanismState(crank, position, None, None, (), (), (), given)
         for stage in self._mechanism_stages:
             motion = stage(motion)
         return motion
@@ -413,11 +408,13 @@ class LinkagePipeline:
         """Return the full state of a linkage; the generated tick leaves a part out."""
         if isinstance(state, LinkageState):
             return state
-        crank_numbers, numbers, _ = state
+        crank_numbers, numbers, _, given = state
         crank = _crank_state(crank_numbers)
         position = self._solve_loops(*crank.angles)
         reading = None if numbers is None else SensorReading(*numbers)
-        return LinkageState(crank, position, self._mechanism_motion(crank, position), reading)
+        return LinkageState(
+            crank, position, self._mechanism_motion(crank, position, given), reading
+        )
 
     def write_extras(self, now: int, state: LinkageState | CompiledState) -> list[bytes]:
         """Return the auxiliary messages at a time, in [ns]; b'' for none."""
@@ -446,12 +443,6 @@ class LinkagePipeline:
     def gap_begins(self) -> bool:
         """Return whether a gap in the readings began at the last tick, if that had no pose."""
         return any(sensor.gap_begins for sensor in self._sensor_stages)
-
-    @property
-    def solver_choice(self) -> SolverChoice | None:
-        """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
-        choice: SolverChoice | None = getattr(self.closure, 'choice', None)
-        return choice
 
     def is_stale(self, now: int) -> bool:
         """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
@@ -499,22 +490,12 @@ def _suppress_beyond_limits(
 
 
 def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
-    """Return the closure of a linkage as its effects alter it, by the solver that it names."""
+    """Return the closure of a linkage as its effects alter it."""
     linkage = scene_linkage.linkage
     for effect in wanted.effects:
         if effect.alter is not None:
             random = Context.generator(seed, effect.name)
             linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
-    if scene_linkage.accuracy is not None:
-        from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
-
-        if wanted.computes_forces:
-            return choose.only_closed_form(linkage, 'forces start from it')
-        return choose.choose_solver(linkage, scene_linkage.accuracy)
-    if scene_linkage.solver is not None:
-        name, solving = scene_linkage.solver
-        closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
-        return closure
     return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
 
 
@@ -772,8 +753,8 @@ def _name_fields(state: LinkageState | StateTuple) -> LinkageState | CompiledSta
     """Return the state of a linkage as a named tuple."""
     if isinstance(state, LinkageState):
         return state
-    crank, reading, reactions = state
-    return CompiledState(_crank_state(crank), SensorReading(*reading), reactions)
+    crank, reading, *more = state
+    return CompiledState(_crank_state(crank), SensorReading(*reading), *more)
 
 
 def _crank_state(crank: tuple[Any, ...]) -> CrankState:

@@ -436,7 +436,7 @@ class TickLoop:
         counts.ticks += 1
         for index, one in enumerate(tick.states):
             if not isinstance(one, LinkageState):
-                _, reading, _ = one
+                _, reading, *_ = one
                 counts.suppressed += reading is None
                 continue
             position = one.position

@@ -308,25 +308,25 @@ def test_keys_of_one_of_several_linkages_are_set_by_its_name(tmp_path: Path) -> 
     scene = scene_file(tmp_path, TWO)
     settings = [
         'linkages.left.drive.sine.amplitude=0.3',
-        'linkages.right.accuracy=1e-6',
+        'linkages.right.prefix=r_',
         'linkages.right.effects={velocity: {}}',
     ]
     loaded = load_scene(scene, settings)
     left, right = loaded.linkages
     assert (left.drive[1].amplitude, right.drive[1].amplitude) == (0.3, 0.4)
-    assert (left.accuracy, right.accuracy) == (None, 1e-6)
+    assert (left.prefix, right.prefix) == ('left_', 'r_')
     assert (list(left.effects), list(right.effects)) == ([], ['velocity'])
     scene.write_bytes(loaded.files[SCENE_FILE])
     assert load_scene(scene).linkages == loaded.linkages
 
 
 OF_SEVERAL = {
-    'linkages.lft.accuracy=1e-6': "there is no linkage 'lft'; did you mean 'left'?",
-    'linkages.1.accuracy=1e-6': "there is no linkage '1'; there are: left, right",
+    'linkages.lft.prefix=l_': "there is no linkage 'lft'; did you mean 'left'?",
+    'linkages.1.prefix=l_': "there is no linkage '1'; there are: left, right",
     'linkages.left=3': "linkages is [{'name': 'left', 'linkage': 'l.yaml'",
     'linkages.left.linkage.a=3': "linkage is 'l.yaml'; name a key in a mapping",
     'linkages.left.rate=5': 'linkages[1].rate: unknown key; ',
-    'linkages.right.accuracy=5': 'linkages[2].accuracy: 5 is out of bounds',
+    'linkages.right.prefix=5': 'linkages[2].prefix: 5 is not',
     'linkages=3': 'linkages: 3 is not a mapping',
 }
 

@@ -184,7 +184,7 @@ WRONG = [
     (
         'linkages:\n- {name: a, linkage: l.yaml}\n- {name: b, linkage: l.yaml, rate: 5}\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ['s.yaml:3: linkages[2].rate: unknown key; known: accuracy, beyond_limits, drive, ef'],
+        ['s.yaml:3: linkages[2].rate: unknown key; known: beyond_limits, drive, ef'],
     ),
     (
         'linkage: l.yaml\nfaults: {a-b: {freeze: {}, silence: {}}}\n',
@@ -202,12 +202,7 @@ WRONG = [
     (
         'linkage: l.yaml\nsolver: table\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ["s.yaml:2: solver: 'table' does not fit; write closed_form (or with its parameters: {n"],
-    ),
-    (
-        'linkage: l.yaml\nsolver: closed_form\naccuracy: 1e-6\n',
-        'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ['s.yaml:3: accuracy: cannot be combined with solver; write one of the two'],
+        ['s.yaml:2: solver: unknown key; known: angles, beyond_limits, drive, effects, '],
     ),
     ('linkage: nowhere.yaml\n', '', ["s.yaml:1: linkage: 'nowhere.yaml' is not a file; name one"]),
     ('rate: [\n', '', ['s.yaml:2: is not valid YAML']),
@@ -274,9 +269,9 @@ def test_the_list_tells_unit_default_bounds_and_meaning(capsys):
     [
         (
             'encodr',
-            "--list encodr: there is no such drive, effect, fault or solver; did you mean '",
+            "--list encodr: there is no such drive, effect or fault; did you mean '",
         ),
-        ('xyz', '--list xyz: there is no such drive, effect, fault or solver; known: topic, '),
+        ('xyz', '--list xyz: there is no such drive, effect or fault; known: topic, '),
     ],
 )
 def test_a_name_that_is_none(name, said):

@@ -219,7 +219,7 @@ def test_the_work_of_a_load_is_force_times_way(name):
         more = [
             a - b
             for a, b in zip(
-                loaded.drive_efforts(*given, time), bare.drive_efforts(*given), strict=True
+                loaded.drive_efforts(*given, (time,)), bare.drive_efforts(*given), strict=True
             )
         ]
         found = dict(zip(names, [*position.inputs, *position.joints], strict=True))

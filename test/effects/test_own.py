@@ -385,7 +385,5 @@ def test_the_node_writes_it_into_its_bag(tmp_path, package):
     run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
-    files = run_recording._make_attachments(
-        scene, [], 'with the run', Pipeline(scene).linkages, tmp_path
-    )
+    files = run_recording._make_attachments(scene, [], 'with the run', tmp_path)
     assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

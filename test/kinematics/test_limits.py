@@ -15,7 +15,6 @@ import random
 from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, CODES, InputSweep, Limits, Status
-from linkage_ros.solvers import NewtonClosure, TableClosure
 import numpy as np
 import pytest
 
@@ -120,27 +119,6 @@ def test_without_limits_nothing_is_asked():
     assert 'position' in vars(closed(CRANK_ROCKER, ', input: {limits: [0, 1]}'))
 
 
-@pytest.mark.parametrize('make', [
-    lambda linkage: NewtonClosure(linkage, 1e-9), lambda linkage: TableClosure(linkage, 1e-6),
-])  # fmt: skip
-def test_every_solver_knows_of_them(make):
-    linkage = closed(CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}').linkage
-    values = (0.4, 0.5, 1.0, 1.5, 1.6)
-    expected = [LIMITED, CLOSED, CLOSED, CLOSED, LIMITED]
-    solver = make(linkage)
-    assert [solver.position(value).status for value in values] == expected
-    assert solver.solve(np.array(values), derivatives=0).status.tolist() == [
-        CODES[status] for status in expected
-    ]
-
-
-def test_a_table_covers_the_range_within_the_limits():
-    """So there is one where the linkage toggles, if the machine does not come there."""
-    closure = closed(DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}')
-    table = TableClosure(closure.linkage, 1e-6)
-    assert table.position(0.3).joints == pytest.approx(closure.position(0.3).joints, abs=1e-6)
-
-
 # Linkage, limits; the ranges, and what ends them.
 RANGES = {
     'all of it': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', [(0.5, 1.5)], 'crank_joint'),
@@ -197,6 +175,33 @@ def test_a_narrow_gap_between_samples_is_found():
     (one,) = closure.input_ranges
     assert tau - (one.highest - one.lowest) == pytest.approx(1e-3, rel=0.05)
     assert not one.is_whole
+
+
+@pytest.mark.parametrize('near', [1e-2, 1e-4, 1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize('width', [1e-3, 1e-2, 0.1])
+def test_a_narrow_window_of_a_joint_is_found_up_to_the_toggle(near, width):
+    """Next to a toggle joints move as the square root: a window is crossed in a short range."""
+    draw = random.Random(f'{near} {width}')
+    missed = []
+    for _ in range(8):
+        sides = dict(zip('abcd', (draw.uniform(0.2, 1.0) for _ in range(4)), strict=True))
+        try:
+            free = closure_of(f'four_bar: {sides}'.replace("'", ''))
+        except FileError:
+            continue
+        one = free.input_ranges[0]
+        if one.is_whole:
+            continue
+        inside = near * (one.highest - one.lowest)
+        value = draw.choice((one.lowest + inside, one.highest - inside))
+        name, joint = next(iter(free.linkage.joints.items()))
+        angle = free.position(value).joints[0]
+        limits = Limits(angle - width, angle + width)
+        joints = {**free.linkage.joints, name: replace(joint, limits=limits)}
+        ranges = Closure(replace(free.linkage, joints=joints)).input_ranges
+        if not any(part.lowest < value < part.highest for part in ranges):
+            missed.append((sides, value, limits))
+    assert not missed
 
 
 @settings(max_examples=30, deadline=None)

@@ -68,6 +68,7 @@ class Compiled:
 
     ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. If
     ``within_limits``, a state with a joint beyond its limits has the status limited.
+    ``given_count`` numbers beside the motion are given to ``wanted``.
     """
 
     def __init__(
@@ -76,11 +77,13 @@ class Compiled:
         derivatives: int = 0,
         wanted: OutputSelection = published_joints,
         within_limits: bool = True,
+        given_count: int = 0,
     ) -> None:
         self._closure = closure
         self._within_limits = within_limits
         self.driven = len(closure.linkage.inputs)  # Number of inputs
         self.derivatives = derivatives
+        self._given_count = given_count
         self.wanted = wanted
         # The paths of the steps where the linkage is closed; several if the steps take different
         # forms in different regions.
@@ -92,13 +95,13 @@ class Compiled:
         if not self.paths and (self.driven > 1 or closure.input_ranges):
             # This starts an additional search, which takes longer.
             self._add_path(usual_inputs(closure))
-        # Takes the inputs, their rates and their accelerations, in this order; returns the values,
-        # or None if the interpreted steps must answer.
+        # Takes the inputs, their rates, their accelerations and the given numbers, in this order;
+        # returns the values, or None if the interpreted steps must answer.
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _add_path(self, inputs: tuple[float, ...]) -> None:
         """Add the path that the steps take at a state, if it is closed and the path is new."""
-        more = (1.25,) * self.driven * self.derivatives
+        more = (1.25,) * (self.driven * self.derivatives + self._given_count)
         if len(self.paths) == _MOST_PATHS or any(
             function(*inputs, *more) is not None for function in self._functions
         ):
@@ -107,7 +110,12 @@ class Compiled:
         if close(*inputs).status is Status.CLOSED:
             try:
                 path = trace_path(
-                    self._closure, inputs, self.derivatives, self.wanted, self._within_limits
+                    self._closure,
+                    inputs,
+                    self.derivatives,
+                    self.wanted,
+                    self._within_limits,
+                    self._given_count,
                 )
             except UndecidedError:
                 return
@@ -138,10 +146,11 @@ class Compiled:
 
     def run_interpreted(self, *numbers: float) -> CompiledAnswer:
         """Return the result of the interpreted steps."""
-        given = list(zip(*[iter(numbers)] * self.driven, strict=True))
+        count = self.driven * (1 + self.derivatives)
+        given = list(zip(*[iter(numbers[:count])] * self.driven, strict=True))
         motion = motion_at(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
-        values = tuple(tuple(group) for group in self.wanted(motion))
+        values = tuple(tuple(group) for group in self.wanted(motion, *numbers[count:]))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
         return CompiledAnswer(status, gap, (*values, *((),) * (groups - len(values))))
 

@@ -35,14 +35,15 @@ class TracedMotion(NamedTuple):
     acceleration: Acceleration | None
 
 
-OutputSelection = Callable[[TracedMotion], Sequence[Sequence[float]]]
-"""Selects the numbers of a motion that a program returns, in groups."""
+OutputSelection = Callable[..., Sequence[Sequence[float]]]
+"""Selects the numbers of a motion, and of numbers given beside it, that a program returns."""
 
 
 class Path(NamedTuple):
     """The operations of the steps while their decisions are the same."""
 
-    # The values of the driven joints, then their rates and accelerations, if requested.
+    # The values of the driven joints, then their rates and accelerations, if requested; then
+    # numbers given beside the motion.
     inputs: tuple[Operation, ...]
     # The decisions in order. If one of them differs, the path is not valid.
     decisions: tuple[Decision, ...]
@@ -61,6 +62,7 @@ def trace_path(
     derivatives: int,
     wanted: OutputSelection = published_joints,
     within_limits: bool = True,
+    given_count: int = 0,
 ) -> Path:
     """
     Return the path that the steps take at one state.
@@ -68,19 +70,21 @@ def trace_path(
     ``at`` has values of the inputs, in [rad] or [m], at which the linkage is closed; else
     ValueError is raised. ``derivatives``: 0 for positions, 1 for velocities too, 2 for
     accelerations too. If ``within_limits``, the path ends where a joint is beyond its limits.
+    ``given_count`` numbers beside the motion are given to ``wanted``.
     """
     tape = Tape()
     given = [
         [tape.add_input(f'{letter}{i}', value) for i, value in enumerate(values)]
         for letter, values in zip('qwa', (at, [1.25] * len(at), [0.75] * len(at)), strict=True)
     ][: 1 + derivatives]
+    beside = [tape.add_input(f'g{i}', 0.5 + i) for i in range(given_count)]
     tape.reset_decisions()
     motion = motion_at(closure, given, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
     # The selection may make decisions, too.
-    outputs = tuple(tuple(number_of(n) for n in group) for group in wanted(motion))
-    inputs = tuple(symbol.operation for group in given for symbol in group)
+    outputs = tuple(tuple(number_of(n) for n in group) for group in wanted(motion, *beside))
+    inputs = tuple(symbol.operation for group in (*given, beside) for symbol in group)
     return Path(inputs, tuple(tape.decisions), outputs, tape)
 
 

@@ -54,7 +54,7 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
         velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
-        efforts = efforts_of(motion.position, velocity, acceleration, motion.seconds)
+        efforts = efforts_of(motion.position, velocity, acceleration, motion.given)
         # Near a toggle efforts grow with the accelerations, and faster.
         if not all_finite(efforts):
             return motion

@@ -45,7 +45,7 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
         velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
-        reactions = solve(motion.position, velocity, acceleration, motion.seconds)
+        reactions = solve(motion.position, velocity, acceleration, motion.given)
         return motion if reactions is None else motion._replace(reactions=reactions)
 
     return pin_forces

@@ -130,8 +130,9 @@ class MechanismState(NamedTuple):
         In pins and sliders; empty as the efforts are.
     deflection
         Displacement of the published joints under load, in [rad] or [m]; empty for none.
-    seconds
-        Time since the first pose, in [s]; 0 if no load changes with it.
+    given
+        What gives the loads that change: the time since the first pose, in [s], and the numbers
+        of the wrenches; empty without such loads.
 
     """
 
@@ -142,7 +143,7 @@ class MechanismState(NamedTuple):
     efforts: tuple[float, ...]
     reactions: tuple[Reaction, ...]
     deflection: tuple[float, ...]
-    seconds: float = 0.0
+    given: tuple[float, ...] = ()
 
 
 class SensorReading(NamedTuple):

@@ -86,10 +86,7 @@ def _linkage_motion(
     scene: Scene, linkage: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> LinkageMotion:
     scene_linkage, context = linkage.scene_linkage, linkage.context
-    closure = linkage.closure
-    if type(closure) is not Closure:
-        closure = Closure(closure.linkage)
-    motion = LinkageMotion(scene_linkage, closure, context, linkage.closure, None)
+    motion = LinkageMotion(scene_linkage, linkage.closure, context, None)
     drive, parameters = scene_linkage.drive
     if drive == 'torque':
         return _commanded_motion(motion, like, bag, horizon)
@@ -108,7 +105,7 @@ def _linkage_motion(
             'choose a motion of its crank: --like sine, or --like BAG with its samples',
         )
     return motion._replace(
-        path=_sine_path(closure),
+        path=_sine_path(motion.closure),
         sample_rate=scene.rate or USUAL_RATE,
         note=f'the crank moves by a sine of {_FREQUENCY:g} Hz',
     )

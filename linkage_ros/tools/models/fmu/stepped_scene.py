@@ -342,12 +342,6 @@ def _refuse_scene(scene: Scene) -> None:
                 'come on topics, for which an FMU has no inputs',
                 'leave them out',
             )
-        if scene_linkage.accuracy is not None:
-            raise scene_linkage.content.error(
-                'accuracy',
-                'lets every machine choose its own solver',
-                'name a solver instead',
-            )
         for effect in scene_linkage.effects:
             if '.' in effect:
                 raise scene_linkage.content.error(
