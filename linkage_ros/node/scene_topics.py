@@ -18,7 +18,7 @@ from linkage_ros.bag import QosProfile, Topic, WRENCH_TOPICS
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import text_message
-from linkage_ros.node.bag_topics import offered_qos, recorded_qos
+from linkage_ros.node.qos import offered_qos, recorded_qos
 from linkage_ros.replay import (
     announced_text,
     change_text,

@@ -18,9 +18,12 @@ from linkage_ros.bag import QosProfile, WRENCH_TOPICS
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.tick.pipeline import Pipeline
 
-JOINT_STATES, DIAGNOSTICS = 'joint_states_topic', 'diagnostics_topic'
-CRANK, FAULTS = 'crank_topic', 'faults_topic'
-WITHHELD, RESETS = 'withheld_topic', 'resets_topic'
+JOINT_STATES = 'joint_states_topic'
+DIAGNOSTICS = 'diagnostics_topic'
+CRANK = 'crank_topic'
+FAULTS = 'faults_topic'
+WITHHELD = 'withheld_topic'
+RESETS = 'resets_topic'
 DESCRIPTION = 'description_topic'
 EXTRA = 'extra_topics'
 """Keys of the topics in the run's metadata. `EXTRA` and `WRENCH_TOPICS` may have several."""
@@ -101,12 +104,17 @@ def find_handles(topics: Iterable[RunTopic]) -> RecordedTopics:
     handles: dict[str, list[int]] = defaultdict(list)
     for handle, topic in enumerate(topics):
         handles[topic.key].append(handle)
-    joint_states, diagnostics, resets = (
-        handles[key][0] for key in (JOINT_STATES, DIAGNOSTICS, RESETS)
+    optional = {key: next(iter(handles[key]), None) for key in (CRANK, FAULTS, WITHHELD)}
+    return RecordedTopics(
+        handles[JOINT_STATES][0],
+        handles[DIAGNOSTICS][0],
+        handles[RESETS][0],
+        optional[CRANK],
+        optional[FAULTS],
+        optional[WITHHELD],
+        tuple(handles[WRENCH_TOPICS]),
+        tuple(handles[EXTRA]),
     )
-    optional = (next(iter(handles[key]), None) for key in (CRANK, FAULTS, WITHHELD))
-    several = (tuple(handles[key]) for key in (WRENCH_TOPICS, EXTRA))
-    return RecordedTopics(joint_states, diagnostics, resets, *optional, *several)
 
 
 def name_topics(topics: Iterable[tuple[str, str]]) -> dict[str, Any]:

@@ -21,17 +21,16 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.bag import BagWriter, read_bag, Storage, UNFINISHED_DATA
+from linkage_ros.bag import BagWriter, QosProfile, read_bag, Storage, UNFINISHED_DATA
 from linkage_ros.cli.main import main
 from linkage_ros.description import load_scene
 from linkage_ros.messages import text_message
-from linkage_ros.node import bag_topic, RunRecording
+from linkage_ros.node import RunRecording
 from linkage_ros.replay import change_text, describe_topic, message_type
 from linkage_ros.tick import list_run_topics, Pipeline, TickLoop
 from linkage_ros.tools.study import turn_crank
 import numpy as np
 import pytest
-from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 from .agreement import assert_agreement, of_kind, read
@@ -199,7 +198,7 @@ def anything(kind: str, random: Random) -> Any:
 def test_messages_of_all_types_with_anything_in_them(tmp_path):
     random = Random(7)
     topics = [
-        bag_topic(f'/topic_{index}', message_type(kind, 'test'), QoSProfile(depth=index + 1))
+        describe_topic(f'/topic_{index}', message_type(kind, 'test'), QosProfile(depth=index + 1))
         for index, kind in enumerate(KINDS)
     ]
     writer = BagWriter(tmp_path / 'bag', topics, {'ä b.bin': ('', bytes(range(256)))})
