@@ -28,13 +28,13 @@ DESCRIPTION = 'description_topic'
 EXTRA = 'extra_topics'
 """Keys of the topics in the run's metadata. `EXTRA` and `WRENCH_TOPICS` may have several."""
 
-SENSOR_QOS = QosProfile(depth=100, reliability='best_effort')
+SENSOR_QOS: QosProfile = QosProfile(depth=100, reliability='best_effort')
 """Sensor data QoS with a deeper queue: even at a slow tick every sample gets into the bag."""
 
-LATCHED_QOS = QosProfile(depth=1, durability='transient_local')
+LATCHED_QOS: QosProfile = QosProfile(depth=1, durability='transient_local')
 """As robot_state_publisher and RViz expect of a robot model, whenever they start."""
 
-FAULTS_QOS = QosProfile(depth=100, durability='transient_local')
+FAULTS_QOS: QosProfile = QosProfile(depth=100, durability='transient_local')
 """A late subscriber has to know which faults are on."""
 
 _MODEL = 'robot_description'
