@@ -82,6 +82,7 @@ def off_branch(closure: Closure, walked: Walked, joint: int = 0, count: int = 15
     return found
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_walk_keeps_the_constraints(kind):
     for made, _, *both in family(kind):
@@ -92,6 +93,7 @@ def test_the_walk_keeps_the_constraints(kind):
                 )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     wrong = {}
@@ -103,6 +105,7 @@ def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     assert not wrong
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_ranges_end_where_the_curve_turns_back(kind):
     for index, (made, linkage, down, up) in enumerate(family(kind)):

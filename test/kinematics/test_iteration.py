@@ -64,6 +64,7 @@ def iterated(linkage: Linkage) -> Structure:
     return replace(found, groups=(*crank, Iterated(rest)))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', CLOSED_FORM)
 def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
     linkage = shipped(name)
@@ -250,6 +251,7 @@ def misfit(closure: Closure, position: Position) -> float:
     return worst
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
 @pytest.mark.parametrize('name', FOUR_BARS)
 def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
