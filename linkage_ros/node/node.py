@@ -24,13 +24,11 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.bag import Topic
 from linkage_ros.description import load_scene, Scene, scene_notes
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.node import pacing
-from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import (
     chatter_count,
     CLOCK_PATIENCE,
@@ -185,13 +183,11 @@ class LinkageNode(LifecycleNode):
                 )
             scene = load_scene(file, [each for each in self.get_parameter('set').value if each])
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
-            self._scene_topics.connect(pipeline)
+            self._scene_topics.connect(scene, pipeline)
             for closure in pipeline.closures:
                 # Computed here, so that the first tick does not wait: the branch of an iterated
                 # linkage is followed at this point.
                 _ = closure.singular_inputs
-            if scene.robot_description:
-                self._scene_topics.publish_description(scene, pipeline)
             self._scene_topics.publish_scene(scene, pipeline, self._joint_states.topic_name)
         except LinkageError as error:
             self._scene_topics.disconnect()
@@ -312,21 +308,12 @@ class LinkageNode(LifecycleNode):
         assert self.loop is not None
         directory = self.get_parameter('runs_directory').value
         return self.recording.start(
-            self.scene, self.loop, directory, self._bag_topics, self._scene_topics.description
+            self.scene,
+            self.loop,
+            directory,
+            partial(self._scene_topics.describe_topics, self._joint_states, self._diagnostics),
+            self._scene_topics.description,
         )
-
-    def _bag_topics(self) -> list[tuple[str, Topic]]:
-        """Describe the recorded topics, in the order of their handles."""
-        assert self.loop is not None
-        handles, states = self.loop.topics, self._joint_states
-        joint_states = bag_topic(states.topic_name, JointState, states.qos_profile)
-        diagnostics = bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)
-        topics = {
-            handles.joint_states: ('joint_states_topic', joint_states),
-            handles.diagnostics: ('diagnostics_topic', diagnostics),
-            **self._scene_topics.describe_topics(handles),
-        }
-        return [topics[handle] for handle in sorted(topics)]
 
     # Services.
 
@@ -361,12 +348,10 @@ class LinkageNode(LifecycleNode):
     ) -> Trigger.Response:
         if self.loop is None or not self.loop.is_running:
             return _fill_response(response, False, 'not active: nothing to record')
-        if self.recording.has_ended(self.loop):
+        if self.recording.has_ended:
             self.recording.stop(self.loop)
         if self.loop.recorder is not None:
-            return _fill_response(
-                response, False, f'already {self.recording.describe_state(self.loop)}'
-            )
+            return _fill_response(response, False, f'already {self.recording.state_text}')
         line = self._start_recording()
         return _fill_response(response, self.loop.recorder is not None, line)
 
@@ -489,6 +474,7 @@ class LinkageNode(LifecycleNode):
             window_start=self._last_counts,
             window_end=now,
             recording_failure=self.recording.failure,
+            recorder=self.recording.recorder,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
             system=self._real_time.in_force | self._middleware,
