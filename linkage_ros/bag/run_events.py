@@ -115,8 +115,7 @@ class RunMetadata(NamedTuple):
     begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
     versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
     user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
-    # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
-    seed: int = 0
+    seed: int = 0  # Seed of all random numbers
 
 
 class RunFiles(Protocol):
@@ -205,7 +204,6 @@ def recorded_events(
     wrenches = {topic: index for index, topic in enumerate(run.wrenches)}
     others |= set(wrenches)
     open_tick: tuple[int, int, list[bytes]] | None = None  # may get further messages
-    withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
         output = outputs.get(topic)
         if shared and output == 0 and not is_own(data):
@@ -222,8 +220,6 @@ def recorded_events(
             log, time, made = open_tick
             yield TickEvent(log, time, tuple(made))
             open_tick = None
-        # In older bags, two linkages that suppress one tick record it twice.
-        again, withheld = withheld == (log_time, publish_time), None
         if taken:
             yield SampleEvent(log_time, publish_time, data)
         if output is not None:
@@ -236,9 +232,7 @@ def recorded_events(
         elif topic == run.resets_topic:
             yield ResetEvent(log_time, publish_time, data)
         elif topic == run.withheld_topic:
-            withheld = log_time, publish_time
-            if not again:
-                yield TickEvent(log_time, publish_time, (b'',) * len(outputs))
+            yield TickEvent(log_time, publish_time, (b'',) * len(outputs))
     if open_tick is not None:
         log, time, made = open_tick
         yield TickEvent(log, time, tuple(made))

@@ -129,9 +129,8 @@ def _current_state(
     tick = loop.counts.last_tick
     age = 'no crank'
     values: list[tuple[str, float, float | None]] = []
-    for linkage, (crank, position, _, reading) in zip(
-        loop.pipeline.linkages, tick.full_states if tick else (), strict=False
-    ):
+    for linkage, state in zip(loop.pipeline.linkages, tick.states if tick else (), strict=False):
+        crank, position, reading = state.crank, state.position, state.reading
         if crank is None or position is None:
             continue
         if not position.joints:

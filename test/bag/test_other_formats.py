@@ -23,7 +23,6 @@ from ..support.commands import linkage
 COMMANDS = {
     'info': [],
     'replay': [],
-    'play': [],
     'plot': ['-o', 'new.png'],
     'report': ['-o', 'new.html'],
     'export': ['-o', 'new.csv'],

@@ -43,7 +43,6 @@ def test_changed_files_cause_no_findings() -> None:
 def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
     without = {
         'demo',
-        'play',
         'echo',
         'plot',
         'info',

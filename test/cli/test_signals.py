@@ -263,7 +263,6 @@ MESSAGES = 30_000  # in a chunk
 COMMANDS = {
     'info': ([], 'linkage info: stopped\n'),
     'replay': ([], 'linkage replay: stopped\n'),
-    'play': ([], 'linkage play: stopped\n'),
     'plot': ([], 'linkage plot: stopped\n'),
     'report': (['-o', 'x.html'], 'linkage report: stopped\n'),
     'export': (['-o', 'x.csv'], 'linkage export: stopped; nothing was written\n'),

@@ -95,7 +95,6 @@ READS = {
     # Of a bag the folder, and what lies in it.
     'info: metadata': ['info', 'bag'],
     'recover: metadata': ['recover', 'bag'],
-    'play: metadata': ['play', 'bag'],
     'info: file': ['info', 'bag_of_one'],
 }
 
@@ -140,7 +139,7 @@ COMMAND = 'from linkage_ros.cli.main import main'
 NODE = 'from linkage_ros.node.linkage_node import main'
 
 NEED_BAGS = (
-    ['run', 'x.yaml'], ['demo'], ['play', 'bag'], ['plot', 'bag'], ['info', 'bag'],
+    ['run', 'x.yaml'], ['demo'], ['plot', 'bag'], ['info', 'bag'],
     ['report', 'bag'], ['export', 'bag', '-o', 'x.csv'], ['recover', 'bag'], ['replay', 'bag'],
     ['scene', 'bag.yaml'], ['accuracy', 'x.yaml', '--only', 'recording'],
 )  # fmt: skip

@@ -254,7 +254,7 @@ def test_accelerations_are_those_of_the_pipeline(bench):
     scene = load_scene('four_bar', ['effects.acceleration={}'])
     pipeline = Pipeline(scene)
     outputs = bench(scene).start()
-    (look,) = pipeline.tick(SECOND).full_states
+    (look,) = pipeline.tick(SECOND).states
     shown = [value for name, value in outputs.items() if name.endswith('.acceleration')]
     assert tuple(shown) == look.reading.accelerations
     assert any(shown)

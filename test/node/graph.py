@@ -197,14 +197,17 @@ class NodeProcess:
         assert result.successful, result.reason
         self._change_state(Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
 
-    def clean_up(self) -> None:
-        """Leave a node that tests share unconfigured, for the next one; one that fails ends."""
-        if self.graph is not None and self.process.poll() is None:
-            try:
+    def clean_up(self) -> int:
+        """Leave a node that tests share unconfigured for the next one, or end it; return 0."""
+        try:
+            if self.graph is not None and self.process.poll() is None:
                 self._change_state(Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP)
-            except AssertionError:
-                self.kill()
+            code = self.process.poll() or 0
+        except AssertionError:
+            self.graph = None
+            code = self.end()
         self.graph = None
+        return code
 
     def _change_state(self, *transitions: int) -> None:
         assert self.graph is not None
@@ -216,8 +219,7 @@ class NodeProcess:
     def end(self, number: int = signal.SIGINT) -> int:
         """Send a signal, and return the exit code; one that tests share is only cleaned up."""
         if self.graph is not None and number == signal.SIGINT:
-            self.clean_up()
-            return self.process.poll() or 0
+            return self.clean_up()
         self.process.send_signal(number)
         try:
             return self.process.wait(PATIENCE)

@@ -303,7 +303,7 @@ class SteppedScene:
 
     def _run_tick(self) -> None:
         tick = self._pipeline.tick(self._tick_time())
-        for outputs, look in zip(self.outputs, tick.full_states, strict=True):
+        for outputs, look in zip(self.outputs, tick.states, strict=True):
             outputs.set_state(look)
         for motor in self.motors:
             motor.set_messages(tick.extras)
