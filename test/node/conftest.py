@@ -75,8 +75,19 @@ def kept():
     """Hold the process that the tests of a module share, which is set up again for each."""
     nodes = []
     yield nodes
-    for node in nodes:
-        node.kill()
+    kill_all(nodes)
+
+
+def kill_all(nodes):
+    while nodes:
+        nodes.pop().kill()
+
+
+@pytest.fixture(autouse=True)
+def no_twin(request, kept):
+    """End the shared process where a test may start a node in another way."""
+    if 'start' not in request.fixturenames:
+        kill_all(kept)
 
 
 @pytest.fixture
@@ -100,6 +111,8 @@ def start(request, graph, folder, kept):
             kept[0].wait_for_log(ready)
             shared[:] = kept
             return kept[0]
+        if not shared:
+            kill_all(kept)
         node = start_process(scene, *arguments, **popen)
         nodes.append(node)
         if ready:
@@ -115,7 +128,6 @@ def start(request, graph, folder, kept):
         )
 
     yield start
+    kill_all(nodes)
     for node in shared:
         node.clean_up()
-    for node in nodes:
-        node.kill()
