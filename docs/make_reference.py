@@ -25,14 +25,22 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.cli import COMMANDS, EXIT_CODES, module_of, parser_of, REGISTRIES, table_of
+from linkage_ros.cli import (
+    COMMANDS,
+    EXIT_CODES,
+    module_of,
+    parser_of,
+    REGISTRIES,
+    Table,
+    table_of,
+)
 from linkage_ros.description import linkage_schema, scene_schema
 from linkage_ros.tools.view.pages import table_lines
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table; the cells are Markdown."""
-    return '\n'.join(table_lines(heads, rows)) + '\n'
+    return '\n'.join(table_lines(Table('', heads, [*rows]))) + '\n'
 
 
 def plain(text: str) -> str:

@@ -18,7 +18,6 @@ import argparse
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
-import json
 from os.path import isfile
 from pathlib import Path
 import sys
@@ -26,7 +25,8 @@ from threading import Event
 from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
-from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.cli.result import add_result, Result, show_result, tables_json
+from linkage_ros.cli.table import Column, facts_table, Table
 from linkage_ros.description import (
     as_text,
     declared_fields,
@@ -71,7 +71,22 @@ REGISTRIES: Mapping[str, Mapping[str, Any]] = {
 }
 """Everything that a scene can name, by kind."""
 
-_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
+_STAGE = (
+    Column('>', 'number'),
+    Column('stage', 'name'),
+    'where',
+    Column('what it does', 'meaning'),
+    Column('in this scene', 'parameters'),
+    Column('', 'needed_by'),
+)
+_FAULT = ('name', 'kind', Column('in this scene', 'parameters'), 'injected')
+_TOPIC = (
+    Column('', 'what'),
+    Column('topic', 'name'),
+    Column('message', 'type'),
+    Column('', 'note'),
+)
+_PARAMETER = [Column(name, name) for name in ('parameter', 'unit', 'default', 'values', 'meaning')]
 
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 """Functions that make the JSON Schema of each kind of file."""
@@ -79,22 +94,18 @@ SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 
-def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
+def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     """Yield the tables of a scene that has been built."""
-    yield TerminalTable(title, ('', ''), list(_scene_facts(scene)))
+    yield facts_table(title, _scene_facts(scene))
     for lines in _group_alike(pipeline.linkages):
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
         )
-        heads = ('>', 'stage', 'where', 'what it does', 'in this scene', '')
-        yield TerminalTable(
-            f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
-        )
+        title = f'Stages of {names}' if names else 'Stages'
+        yield Table(title, _STAGE, list(_stage_rows(lines[0])), 'stages')
     if scene.faults:
-        yield TerminalTable(
-            'Faults', ('name', 'kind', 'in this scene', 'injected'), list(_fault_rows(scene))
-        )
-    yield TerminalTable('Topics', ('', 'topic', 'message', ''), list(_topic_rows(scene, pipeline)))
+        yield Table('Faults', _FAULT, list(_fault_rows(scene)), 'faults')
+    yield Table('Topics', _TOPIC, list(_topic_rows(scene, pipeline)), 'topics')
 
 
 def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
@@ -279,15 +290,13 @@ def parameters_of(what: str, name: str) -> Any:
     return module.PARAMETERS
 
 
-def table_of(what: str, name: str) -> TerminalTable:
+def table_of(what: str, name: str) -> Table:
     """Return the table of a drive, effect or fault; ``what`` is a key of `REGISTRIES`."""
     parameters = parameters_of(what, name)
     title = f'{what} {name}: {first_docstring_line(parameters)}'
     rows = list(parameter_rows(parameters))
     return (
-        TerminalTable(title, _HEADS, rows)
-        if rows
-        else TerminalTable(title, ('',), [('no parameters',)])
+        Table(title, _PARAMETER, rows, name) if rows else Table(title, ('',), [('no parameters',)])
     )
 
 
@@ -303,23 +312,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'all of them, or those named',
     )
     one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
-    parser.add_argument(
-        '--json', action='store_true', help='the description of the file as JSON, in SI units'
-    )
+    add_result(parser)
     add_set(parser)
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check a scene, list, or print a schema."""
-    if arguments.json and arguments.file is None:
-        raise LinkageError('--json', 'describes one file', 'name a scene or a linkage file')
     if arguments.schema:
         check_no_settings(arguments.set)
         print(as_text(SCHEMAS[arguments.schema]()), end='')
         return 0
     if arguments.file is None:
         check_no_settings(arguments.set)
-        print_tables(*(table_of(what, name) for what, name in _items_to_list(arguments.list)))
+        tables = [table_of(what, name) for what, name in _items_to_list(arguments.list)]
+        account = tables_json(table for table in tables if table.key)
+        show_result(Result(account, tables), arguments)
         return 0
     wrong = _find_violations(named_file(arguments.file, 'scenes', 'linkages'))
     for error in wrong:
@@ -330,11 +337,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     for note in scene_notes(scene):
         print(f'linkage scene: note: {note}', file=sys.stderr)
     pipeline = Pipeline(scene)
-    if arguments.json:
-        account = {'file': arguments.file, **built_scene_json(scene, pipeline)}
-        print(json.dumps(account, indent=1, allow_nan=False))
-    else:
-        print_tables(*scene_tables(scene, pipeline, arguments.file))
+    account = {'file': arguments.file}
+    if arguments.json or arguments.output is not None:
+        account |= built_scene_json(scene, pipeline)
+    show_result(Result(account, [*scene_tables(scene, pipeline, arguments.file)]), arguments)
     return 0
 
 

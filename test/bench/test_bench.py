@@ -39,7 +39,7 @@ def test_ratios_are_taken_turn_by_turn():
 
 def test_table_is_the_same_as_text_and_as_markdown():
     table = Table('t', ('', 'µs'), [('a', '1.0')])
-    assert table_text(table.for_terminal()) == 't\n    µs\na  1.0'
+    assert table_text(table.aligned()) == 't\n    µs\na  1.0'
     assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
 
 

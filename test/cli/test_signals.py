@@ -224,7 +224,7 @@ def test_a_command_ends_whose_output_nobody_reads(folder) -> None:
     process = start(
         folder,
         'import sys; from linkage_ros.cli.main import main; sys.exit(main())',
-        *('solve', 'four.yaml', '--steps', '5000', '--format', 'csv'),
+        *('solve', 'four.yaml', '--steps', '5000', '--csv'),
     )
     try:
         wait_until_it_sleeps(process)
