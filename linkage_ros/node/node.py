@@ -39,7 +39,12 @@ from linkage_ros.node.diagnostics import (
     Warnings,
 )
 from linkage_ros.node.pacing import ClockGuard
-from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearness_limits
+from linkage_ros.node.parameters import (
+    declare_parameters,
+    LINKAGE_NODE,
+    nearness_limits,
+    SET_BEFORE_CONFIGURATION,
+)
 from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
@@ -263,6 +268,7 @@ class LinkageNode(LifecycleNode):
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
         self.end_run()
+        self.scene = None
         self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
 
@@ -381,6 +387,12 @@ class LinkageNode(LifecycleNode):
         simulated = self.get_parameter('use_sim_time').value
         running = self.loop is not None and self.loop.is_running
         for parameter in parameters:
+            if parameter.name in SET_BEFORE_CONFIGURATION and self.scene is not None:
+                return SetParametersResult(
+                    successful=False,
+                    reason=f'{parameter.name} cannot change while the node is configured; '
+                    'deactivate it and clean it up first',
+                )
             if parameter.name == 'use_sim_time' and parameter.value != simulated and running:
                 return SetParametersResult(
                     successful=False,

@@ -33,6 +33,8 @@ from std_srvs.srv import Trigger
 from .graph import crank, NS, wait_for
 from ..support.commands import linkage
 
+REAL_STARTS = True
+
 OK, ERROR = b'\0', b'\2'
 INCOMPLETE = 1
 NODE = '/linkage_node'
