@@ -25,7 +25,7 @@ from linkage_ros.cli import Table
 from linkage_ros.description import LINKAGE_FILE, load_scene, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import list_names
 from linkage_ros.resources import shipped_path
-from linkage_ros.stages.effects import NEEDS, PUBLISHED_WITH
+from linkage_ros.stages.effects import effect_class, EFFECTS, ForceEffect, needed_effects
 from linkage_ros.tools.study import (
     Budget,
     budget_svg,
@@ -51,7 +51,7 @@ from linkage_ros.tools.view.pages import fill_marks, table_lines
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
-METHOD, EFFECTS = DOCS / 'accuracy/method.md', DOCS / 'accuracy/effects.md'
+METHOD, EFFECT_COSTS = DOCS / 'accuracy/method.md', DOCS / 'accuracy/effects.md'
 FOUR_BAR = shipped_path('linkages/four_bar.yaml')
 
 _MARK = 'measured'
@@ -72,31 +72,10 @@ SHOWN = (
     Shown('jansen_leg', 'A walking leg', like='sine'),
 )
 
-EVERY_EFFECT = """
-linkage: four_bar
-publish_input: true
-rate: 1000
-loads: {gravity: [0, -9.81]}
-effects:
-  tolerance: {standard_deviation: 2.0e-5}
-  backlash: {play: 0.01}
-  velocity: {}
-  acceleration: {}
-  friction: {joints: {O2: {coulomb: 0.01}}}
-  effort: {}
-  pin_forces: {}
-  compliance: {links: {coupler: 1.0e+7}}
-  clearance: {pins: {B: 1.0e-4}}
-  jitter: {seconds: 1.0e-4}
-  bias: {joints: {rocker_joint: 0.01}}
-  noise: {joints: {rocker_joint: {white: 0.001, walk: 0.001, rate_white: 0.01}}}
-  measuring_range: {joints: {rocker_joint: {low: 1.0, high: 2.2}}}
-  encoder: {joints: {rocker_joint: {counts: 4096}}}
-  rate_limit: {rate: 500}
-  dropout: {probability: 0.1, burst: 3}
-  delay: {seconds: 0.002}
-  markers: {rate: 30}
-"""
+EVERY_EFFECT = (
+    'linkage: four_bar\npublish_input: true\nrate: 1000\nloads: {gravity: [0, -9.81]}\neffects:\n'
+    + ''.join(f'  {name}: {effect_class(name).sample}\n' for name in EFFECTS)
+)
 """A scene with every effect, each on one joint, pin or link of the four-bar."""
 
 
@@ -122,7 +101,7 @@ def main() -> int:
     lines += hard_lines()
     fill(PAGE, lines)
     fill(METHOD, [f'- {name}: {value}' for name, value in describe_machine()])
-    fill(EFFECTS, effect_lines(quick=quick))
+    fill(EFFECT_COSTS, effect_lines(quick=quick))
     return 0
 
 
@@ -210,8 +189,9 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
     scene = parse_scene('effects', 'effects', files)
     (scene_linkage,) = scene.linkages
     names = [*scene_linkage.effects]
-    # Friction acts on nothing without a force effect.
-    beside = {'friction': ('effort',)}
+    # Friction acts on nothing without an effect that needs forces.
+    forces = [name for name in names if issubclass(effect_class(name), ForceEffect)]
+    beside = dict.fromkeys(forces, ('effort',))
     alone = [_only(scene, name, *beside.get(name, ())) for name in names]
     without = [_only(scene, *beside.get(name, ())) for name in names]
     bare = tick_price(_only(scene))
@@ -219,7 +199,7 @@ def effect_lines(*, quick: bool) -> Iterator[str]:
     for name, one, other in zip(names, alone, without, strict=True):
         (price,) = price_scenes(other, [one], 0.2 if quick else 2.0)
         (found,) = compare_runs(one, [other], turn_crank, 2000)
-        needed = [*NEEDS.get(name, ()), *PUBLISHED_WITH.get(name, ())]
+        needed = [*needed_effects(name), *effect_class(name).publishes_with]
         rows.append(
             (
                 name,

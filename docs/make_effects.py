@@ -27,7 +27,7 @@ from linkage_ros.cli import parameters_of, REGISTRIES, Table, table_of
 from linkage_ros.description import first_docstring_line, parameter_rows, parse_scene
 from linkage_ros.dynamics import AppliedLoads
 from linkage_ros.errors import FileError
-from linkage_ros.stages.effects import EFFECTS, NEEDS, PUBLISHED_WITH
+from linkage_ros.stages.effects import BASES, EFFECTS, MessageEffect, needed_effects
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.view.pages import markdown
 import yaml
@@ -49,17 +49,17 @@ LARGEST_SMALL = 30_000
 """Maximum sizes of a picture and of a small one, in bytes."""
 
 _WORKS_ON = {
-    'alter': 'the linkage, once, when the scene is built',
-    'drive_stage': 'the crank, before the loops are closed',
-    'stage': 'the mechanism, once its loops are closed',
-    'sensor': 'the reading of the sensors',
-    'writer': 'nothing: it draws the mechanism',
-    'friction': 'all effects and drives that compute forces; it is no stage of the tick',
+    'LinkageEffect': 'the linkage, once, when the scene is built',
+    'DriveEffect': 'the crank, before the loops are closed',
+    'MechanismEffect': 'the mechanism, once its loops are closed',
+    'SensorEffect': 'the reading of the sensors',
+    'MessageEffect': 'nothing: it draws the mechanism',
+    'ForceEffect': 'all effects and drives that compute forces; it is no stage of the tick',
     'clock': 'the time of a tick',
     'message': 'the messages of the crank',
     'mechanism': 'the loop, once it is closed',
 }
-"""The object of a module that has this function, or whose parameters have this attribute."""
+"""The object of an effect of this base, or of a fault that has this method."""
 
 
 class Section(NamedTuple):
@@ -164,26 +164,26 @@ def order() -> str:
 def place(kind: str, name: str) -> str:
     """Return the summary of a drive, an effect or a fault, and its place in the order."""
     owner = parameters_of(kind, name)
-    module = import_module(owner.__module__ if kind == 'fault' else REGISTRIES[kind][name])
+    module = import_module(REGISTRIES[kind][name] if kind == 'drive' else owner.__module__)
     lines = [f'*{_summary(kind, name)}*', '']
-    works_on = next(
-        (text for key, text in _WORKS_ON.items() if hasattr(module, key) or hasattr(owner, key)),
-        '',
-    )
     if kind == 'drive':
         topic = getattr(module, 'TOPIC', '')
         listens = f'Listens to `{topic}`, sensor_msgs/msg/JointState.' if topic else ''
         lines.append(listens or 'Listens to no topic.')
     elif kind == 'fault':
+        works_on = next((text for key, text in _WORKS_ON.items() if key in vars(owner)), '')
+        if 'sensor' in vars(owner):
+            works_on = _WORKS_ON['SensorEffect']
         lines.append(f'Works on {works_on}.')
     else:
+        works_on = next(_WORKS_ON[b.__name__] for b in BASES if issubclass(owner, b))
         lines.append(f'{_neighbours(name)}. Works on {works_on}.')
-        if name in NEEDS:
-            lines.append(f'Needs {_listed(NEEDS[name])}, computed but not published for it.')
-        if name in PUBLISHED_WITH:
-            lines[-1] = f'Needs {_listed(PUBLISHED_WITH[name])}, published with it.'
-        if hasattr(module, 'TOPIC'):
-            lines.append(f'Publishes `{module.TOPIC}`, {module.MESSAGE}.')
+        if owner.publishes_with:
+            lines.append(f'Needs {_listed(owner.publishes_with)}, published with it.')
+        elif needs := needed_effects(name):
+            lines.append(f'Needs {_listed(needs)}, computed but not published for it.')
+        if issubclass(owner, MessageEffect):
+            lines.append(f'Publishes `{owner.topic}`, {owner.message}.')
     source = Path(str(module.__file__)).relative_to(DOCS.parent).as_posix()
     lines.append(f'In [{source}](../../{source}).')
     return '\n'.join(lines)

@@ -156,7 +156,7 @@ effects:
 """)
 
 pipeline = lr.Pipeline(lr.load_scene('scene.yaml'))
-pipeline.linkages[0].effect_names
+tuple(pipeline.linkages[0].wanted.effects)
 
 # %%
 ticks = [pipeline.tick(index * 10_000_000) for index in range(101)]

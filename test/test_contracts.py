@@ -20,27 +20,29 @@ from linkage_ros.dynamics import JointFriction
 from linkage_ros.errors import FileError
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import (
-    BacklashParameters,
-    BiasParameters,
-    ClearanceParameters,
-    ComplianceParameters,
-    DelayParameters,
-    DropoutParameters,
+    BacklashEffect,
+    BASES,
+    BiasEffect,
+    ClearanceEffect,
+    ComplianceEffect,
+    DelayEffect,
+    DropoutEffect,
+    effect_class,
     EFFECTS,
-    EncoderParameters,
-    FrictionParameters,
-    JitterParameters,
+    EncoderEffect,
+    FrictionEffect,
+    JitterEffect,
     JointDelay,
     JointDropout,
     JointEncoder,
     JointNoise,
     JointRange,
     JointRateLimit,
-    MeasuringRangeParameters,
-    NEEDS,
-    NoiseParameters,
-    RateLimitParameters,
-    ToleranceParameters,
+    MeasuringRangeEffect,
+    needed_effects,
+    NoiseEffect,
+    RateLimitEffect,
+    ToleranceEffect,
 )
 from linkage_ros.stages.faults import FAULTS
 import pytest
@@ -48,25 +50,25 @@ import pytest
 from .support.scenes import LINKAGES, pipeline_of, scene_of
 
 READ = [
-    ('tolerance', 'four_bar', '{}', ToleranceParameters()),
+    ('tolerance', 'four_bar', '{}', ToleranceEffect()),
     (
         'tolerance',
         'four_bar',
         '{standard_deviation: 2.0e-5, links: [ground, coupler], given: {coupler.B: [0.0001, 0]}}',
-        ToleranceParameters(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)}),
+        ToleranceEffect(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)}),
     ),
     (
         'backlash',
         'five_bar',
         '{play: 0.01, inputs: {right_crank_joint: 0.02}}',
-        BacklashParameters(0.01, {'right_crank_joint': 0.02}),
+        BacklashEffect(0.01, {'right_crank_joint': 0.02}),
     ),
     (
         'friction',
         'slider_crank',
         # B is a pin too: of the rod and the block that the slot in the cylinder stands for.
         '{joints: {A: {viscous: 0.002}, B: {coulomb: 0.1}, cylinder: {viscous: 3, coulomb: 4}}}',
-        FrictionParameters(
+        FrictionEffect(
             {
                 'A': JointFriction(0.002),
                 'B': JointFriction(0.0, 0.1),
@@ -78,25 +80,25 @@ READ = [
         'compliance',
         'four_bar',
         '{links: {coupler: 2.0e6}}',
-        ComplianceParameters({'coupler': 2e6}),
+        ComplianceEffect({'coupler': 2e6}),
     ),
     (
         'clearance',
         'slider_crank',
         '{pins: {A: 2.0e-5, B: 0}}',
-        ClearanceParameters({'A': 2e-5, 'B': 0.0}),
+        ClearanceEffect({'A': 2e-5, 'B': 0.0}),
     ),
     (
         'bias',
         'four_bar',
         '{joints: {rocker_joint: -1}}',
-        BiasParameters({'rocker_joint': -1.0}),
+        BiasEffect({'rocker_joint': -1.0}),
     ),
     (
         'noise',
         'four_bar',
         '{joints: {rocker_joint: {white: 0.1}, coupler_joint: {walk: 2}}}',
-        NoiseParameters(
+        NoiseEffect(
             {'rocker_joint': JointNoise(0.1, 0.0, 0.0), 'coupler_joint': JointNoise(0.0, 2.0, 0.0)}
         ),
     ),
@@ -104,35 +106,35 @@ READ = [
         'measuring_range',
         'four_bar',
         '{joints: {rocker_joint: {low: -1, high: 2, rate: 3, effort: 4}}}',
-        MeasuringRangeParameters({'rocker_joint': JointRange(-1.0, 2.0, 3.0, 4.0)}),
+        MeasuringRangeEffect({'rocker_joint': JointRange(-1.0, 2.0, 3.0, 4.0)}),
     ),
     (
         'encoder',
         'four_bar',
         '{joints: {rocker_joint: {counts: 4096}}}',
-        EncoderParameters({'rocker_joint': JointEncoder(4096, 0.0, False, True)}, 'differenced'),
+        EncoderEffect({'rocker_joint': JointEncoder(4096, 0.0, False, True)}, 'differenced'),
     ),
-    ('jitter', 'four_bar', '{seconds: 0.002}', JitterParameters(0.002, 'uniform')),
-    ('rate_limit', 'four_bar', '{rate: 100}', RateLimitParameters(100.0)),
+    ('jitter', 'four_bar', '{seconds: 0.002}', JitterEffect(0.002, 'uniform')),
+    ('rate_limit', 'four_bar', '{rate: 100}', RateLimitEffect(100.0)),
     (
         'rate_limit',
         'four_bar',
         '{rate: 100, joints: {rocker_joint: {rate: 20, phase: 0.01}}}',
-        RateLimitParameters(100.0, joints={'rocker_joint': JointRateLimit(20.0, 0.01)}),
+        RateLimitEffect(100.0, joints={'rocker_joint': JointRateLimit(20.0, 0.01)}),
     ),
-    ('dropout', 'four_bar', '{probability: 0.1}', DropoutParameters(0.1)),
+    ('dropout', 'four_bar', '{probability: 0.1}', DropoutEffect(0.1)),
     (
         'dropout',
         'four_bar',
         '{probability: 0, joints: {rocker_joint: {probability: 0.1, burst: 5}}}',
-        DropoutParameters(0.0, joints={'rocker_joint': JointDropout(0.1, 5.0)}),
+        DropoutEffect(0.0, joints={'rocker_joint': JointDropout(0.1, 5.0)}),
     ),
-    ('delay', 'four_bar', '{seconds: 0.002}', DelayParameters(0.002)),
+    ('delay', 'four_bar', '{seconds: 0.002}', DelayEffect(0.002)),
     (
         'delay',
         'four_bar',
         '{seconds: 0.004, joints: {rocker_joint: {seconds: 0.02}}}',
-        DelayParameters(0.004, joints={'rocker_joint': JointDelay(0.02)}),
+        DelayEffect(0.004, joints={'rocker_joint': JointDelay(0.02)}),
     ),
 ]
 
@@ -373,11 +375,18 @@ def test_an_effect_without_rows_needs_no_key(effect):
     assert effect in scene.linkages[0].effects
 
 
-@pytest.mark.parametrize('names', [EFFECTS, DRIVES], ids=['effects', 'drives'])
-def test_each_has_its_module_and_its_parameters(names):
-    for name, module in names.items():
+def test_each_drive_has_its_module_and_its_parameters():
+    for name, module in DRIVES.items():
         assert module.rpartition('.')[2] == name
         assert declared_fields(import_module(module).PARAMETERS) is not None
+
+
+def test_each_effect_has_its_class_and_its_place():
+    for name in EFFECTS:
+        effect = effect_class(name)
+        assert effect.__name__.lower() == name.replace('_', '') + 'effect'
+        assert declared_fields(effect) is not None
+        assert effect.place in {base.place for base in BASES if issubclass(effect, base)}
 
 
 def test_each_fault_has_its_type_and_one_place():
@@ -390,12 +399,12 @@ def test_each_fault_has_its_type_and_one_place():
 
 @pytest.mark.parametrize('effect', ['velocity', 'acceleration'])
 def test_rates_and_accelerations_have_no_parameters(effect):
-    assert declared_fields(import_module(EFFECTS[effect]).PARAMETERS) == []
+    assert declared_fields(effect_class(effect)) == []
 
 
 def test_in_the_order_of_the_effects_each_stands_behind_what_it_needs():
     order = list(EFFECTS)
     assert order[:2] == ['tolerance', 'backlash'], 'before the crank moves anything'
     assert order.index('clearance') > order.index('compliance')
-    for effect, needs in NEEDS.items():
-        assert all(order.index(need) < order.index(effect) for need in needs)
+    for effect in order:
+        assert all(order.index(need) < order.index(effect) for need in needed_effects(effect))

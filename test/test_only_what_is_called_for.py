@@ -20,7 +20,7 @@ import sys
 from typing import NamedTuple
 
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS
+from linkage_ros.stages.effects import effect_class, EFFECTS
 from linkage_ros.stages.faults import FAULTS
 import pytest
 
@@ -33,7 +33,6 @@ BARE = 'drive: {constant_rate: {rate: 2.0}}\n'
 class Expected(NamedTuple):
     """A scene with one effect, and what it has that the empty scene has not."""
 
-    text: str  # What the scene says to the effect
     brings: tuple[str, ...] = ()  # Effects that it starts from
     arrays: tuple[str, ...] = ()  # Arrays of the joint state that are not empty
     # Packages of ours of which more is imported; that of the effects always is.
@@ -44,30 +43,17 @@ class Expected(NamedTuple):
 
 RATES = ('velocity', 'acceleration')
 FORCES = (*RATES, 'pin_forces')
-SCENES = {
-    'tolerance': Expected('{standard_deviation: 1.0e-5}'),
-    'backlash': Expected('{play: 0.01}'),
-    'velocity': Expected('{}', arrays=('velocity',)),
-    'acceleration': Expected('{}', ('velocity',), ('velocity',), (), ('~/motion',)),
-    'friction': Expected(
-        '{joints: {A: {viscous: 0.1}}}, effort: {}',
-        (*RATES, 'effort'),
-        ('effort',),
-        ('dynamics',),
-    ),
-    'effort': Expected('{}', RATES, ('effort',), ('dynamics',)),
-    'pin_forces': Expected('{}', RATES, (), ('dynamics',), ('~/pin_forces',), numpy=True),
-    'compliance': Expected('{links: {coupler: 1.0e6}}', FORCES, (), ('dynamics',), numpy=True),
-    'clearance': Expected('{pins: {A: 1.0e-5}}', FORCES, (), ('dynamics',), numpy=True),
-    'jitter': Expected('{seconds: 0.001}', ('velocity',)),
-    'bias': Expected('{joints: {rocker_joint: 0.1}}'),
-    'noise': Expected('{joints: {rocker_joint: {white: 0.001}}}'),
-    'measuring_range': Expected('{joints: {rocker_joint: {high: 2}}}'),
-    'encoder': Expected('{joints: {rocker_joint: {counts: 4096}}}'),
-    'rate_limit': Expected('{rate: 100}'),
-    'dropout': Expected('{probability: 0.1}'),
-    'delay': Expected('{seconds: 0.002}', ('velocity',)),
-    'markers': Expected('{}', (), (), (), ('~/markers',)),
+SCENES = dict.fromkeys(EFFECTS, Expected()) | {
+    'velocity': Expected(arrays=('velocity',)),
+    'acceleration': Expected(('velocity',), ('velocity',), topics=('~/motion',)),
+    'friction': Expected((*RATES, 'effort'), ('effort',), ('dynamics',)),
+    'effort': Expected(RATES, ('effort',), ('dynamics',)),
+    'pin_forces': Expected(RATES, (), ('dynamics',), ('~/pin_forces',), numpy=True),
+    'compliance': Expected(FORCES, packages=('dynamics',), numpy=True),
+    'clearance': Expected(FORCES, packages=('dynamics',), numpy=True),
+    'jitter': Expected(('velocity',)),
+    'delay': Expected(('velocity',)),
+    'markers': Expected(topics=('~/markers',)),
 }
 ALTERING = {'tolerance', 'friction'}
 """Effects that change what is built, and have no part in a tick."""
@@ -104,7 +90,7 @@ sys.setprofile(None)
 print(json.dumps({
     'modules': modules, 'after': sorted(sys.modules), 'files': sorted(seen),
     'messages': [tick.message.hex() for tick in ticks if tick.message],
-    'stages': pipeline.linkages[0].effect_names,
+    'stages': [*pipeline.linkages[0].wanted.effects],
     'topics': [extra.topic for extra in pipeline.extras],
 }))
 """
@@ -157,9 +143,17 @@ OPTIONAL = {'dynamics', 'tools'}
 """Packages of which nothing is in a tick, unless the scene asks for it."""
 
 
+EFFECT_MODULES = {name: path.rpartition('.')[0] for name, path in EFFECTS.items()}
+
+
 def of_registry(names, modules):
     """Return which effects or drives have their module among some."""
     return {name for name, module in names.items() if module in modules}
+
+
+def sharing(effects):
+    """Return effects, and those that stand in the same files."""
+    return of_registry(EFFECT_MODULES, {EFFECT_MODULES[effect] for effect in effects})
 
 
 def packages(modules):
@@ -184,7 +178,7 @@ def test_everything_has_its_scene():
 
 def test_an_empty_scene_has_nothing(bare):
     for found in (bare.modules, bare.passed):
-        assert not of_registry(EFFECTS, found)
+        assert not of_registry(EFFECT_MODULES, found)
         assert FAULTS_MODULE not in found
         assert of_registry(DRIVES, found) == {'constant_rate'}
     assert not packages(bare.passed) & OPTIONAL
@@ -197,12 +191,14 @@ def test_an_empty_scene_has_nothing(bare):
 @pytest.mark.parametrize('effect', SCENES)
 def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     expected = SCENES[effect]
-    look = Look(tmp_path, f'{BARE}effects: {{{effect}: {expected.text}}}')
+    # Friction acts where forces are.
+    beside = ', effort: {}' if effect == 'friction' else ''
+    look = Look(tmp_path, f'{BARE}effects: {{{effect}: {effect_class(effect).sample}{beside}}}')
     effects = {effect, *expected.brings}
     assert look.stages == effects
-    assert of_registry(EFFECTS, look.modules) == effects
-    assert of_registry(EFFECTS, look.passed) <= effects
-    assert effect in of_registry(EFFECTS, look.passed) or effect in ALTERING
+    assert of_registry(EFFECT_MODULES, look.modules) == sharing(effects)
+    assert of_registry(EFFECT_MODULES, look.passed) <= sharing(effects)
+    assert effect in of_registry(EFFECT_MODULES, look.passed) or effect in ALTERING
     assert look.arrays == set(expected.arrays)
     assert look.topics == list(expected.topics)
     assert packages(look.modules - bare.modules) == {'stages.effects', *expected.packages}

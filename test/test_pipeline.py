@@ -103,10 +103,10 @@ def test_without_velocity_the_array_is_empty():
     ('effects', 'imported'),
     [
         ('{}', set()),
-        ('{velocity: {}}', {'stages.effects.velocity'}),
+        ('{velocity: {}}', {'stages.effects.derivatives'}),
         (
             '{acceleration: {}}',
-            {'stages.effects.velocity', 'stages.effects.acceleration', 'messages.joint_values'},
+            {'stages.effects.derivatives', 'messages.joint_values'},
         ),
     ],
 )
@@ -128,7 +128,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
         check=True,
     )
     modules = set(done.stdout.split())
-    optional = {'stages.effects.velocity', 'stages.effects.acceleration', 'messages.joint_values'}
+    optional = {'stages.effects.derivatives', 'messages.joint_values'}
     assert {name for name in optional if f'linkage_ros.{name}' in modules} == imported
     assert not modules & {'rclpy', 'trajectory_msgs'}
 

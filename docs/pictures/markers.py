@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.stages.effects import MESSAGE
+from linkage_ros.stages.effects import MarkersEffect
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch
@@ -43,7 +43,7 @@ def markers(scene: Scene) -> Figure:
     lines: list[tuple[Any, float]] = []
     for place, (moment, label) in zip(axes, _MOMENTS, strict=True):
         shown: Display = {}
-        for message in extra_messages(scene, MESSAGE, moment):
+        for message in extra_messages(scene, MarkersEffect.message, moment):
             receive(shown, message)
         lines += show(place, shown, 2.4 if place is axes[0] else 1.5)
         place.set_xlim(-0.85, 1.65)
@@ -63,7 +63,7 @@ def markers(scene: Scene) -> Figure:
 
 def receive(shown: Display, message: bytes) -> None:
     """Add, replace or delete the markers of a message in CDR."""
-    for marker in _STORE.deserialize_cdr(message, MESSAGE).markers:
+    for marker in _STORE.deserialize_cdr(message, MarkersEffect.message).markers:
         key = marker.ns, marker.id
         if marker.action == _DELETE:
             shown.pop(key, None)

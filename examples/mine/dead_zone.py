@@ -11,27 +11,24 @@
 from dataclasses import dataclass
 
 from linkage_ros.description import number
-
-AFTER = 'noise'
+from linkage_ros.stages.effects import SensorEffect
 
 
 @dataclass(frozen=True, slots=True)
-class DeadZoneParameters:
+class DeadZone(SensorEffect):
     """A sensor shows a new value only after the joint has moved far enough."""
+
+    after = 'noise'
 
     width: float = number('least change shown', unit='rad or m', above=0.0, most=1e6)
 
+    def sensor(self, context):
+        """Build the sensor; it remembers the values shown last."""
+        shown = []
 
-PARAMETERS = DeadZoneParameters
+        def dead_zone(now, reading):
+            values = zip(shown or reading.joints, reading.joints)
+            shown[:] = [new if abs(new - old) >= self.width else old for old, new in values]
+            return reading._replace(joints=tuple(shown))
 
-
-def sensor(parameters, context):
-    """Build the sensor; it remembers the values shown last."""
-    shown = []
-
-    def dead_zone(now, reading):
-        values = zip(shown or reading.joints, reading.joints)
-        shown[:] = [new if abs(new - old) >= parameters.width else old for old, new in values]
-        return reading._replace(joints=tuple(shown))
-
-    return dead_zone
+        return dead_zone

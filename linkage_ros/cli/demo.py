@@ -39,7 +39,7 @@ from linkage_ros.signals import heed_signals
 from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
-    from linkage_ros.stages.faults import Fault
+    from linkage_ros.stages.faults import FaultEntry
 
 _BESIDE = {
     'topic': ('linkage_ros.node.crank_source',),
@@ -147,7 +147,7 @@ def _companion_command(scene_linkage: SceneLinkage, seconds: float) -> list[str]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 
 
-def _fault_text(name: str, fault: Fault) -> str:
+def _fault_text(name: str, fault: FaultEntry) -> str:
     """Return a fault as text: its name, its kind, and when it happens."""
     times = list_names(f'{time:g}' for time in fault.at)
     when = f'at {times} s for {fault.seconds:g} s' if fault.at else 'by service call'

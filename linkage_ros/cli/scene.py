@@ -47,19 +47,9 @@ from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS, effects_requiring, module_of
+from linkage_ros.stages.effects import effect_class, EFFECTS, effects_requiring
 from linkage_ros.stages.faults import FAULTS
 from linkage_ros.tick import LinkagePipeline, Pipeline
-
-_WHERE = {
-    'alter': 'in the place of the linkage that is drawn',
-    'drive_stage': 'between motor and crank',
-    'begin': 'in the mechanism',
-    'stage': 'in the mechanism',
-    'sensor': 'between mechanism and message',
-    'writer': 'beside the joint states',
-}
-"""Place of an effect within a tick, by the function that builds it."""
 
 _MOST_NAMES = 4
 _LONGEST = 60
@@ -148,15 +138,9 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
     name, parameters = linkage.scene_linkage.drive
     yield Stage(name, 'drive', parameters, ())
     given = linkage.scene_linkage.effects
-    for stage in linkage.effect_names:
-        module = module_of(stage)
-        where = next(
-            (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
-        )
-        if stage in given:
-            yield Stage(stage, where, given[stage], ())
-        else:
-            yield Stage(stage, where, module.PARAMETERS(), effects_requiring(stage, given))
+    for name, effect in linkage.wanted.effects.items():
+        needed_by = () if name in given else effects_requiring(name, given)
+        yield Stage(name, effect.place, effect, needed_by)
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
@@ -286,8 +270,9 @@ def parameters_of(what: str, name: str) -> Any:
     """Return the parameter type of a drive, effect or fault."""
     if what == 'fault':
         return FAULTS[name]
-    module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
-    return module.PARAMETERS
+    if what == 'effect':
+        return effect_class(name)
+    return import_module(REGISTRIES[what][name]).PARAMETERS
 
 
 def table_of(what: str, name: str) -> Table:

@@ -21,7 +21,7 @@ from linkage_ros.dynamics import Loads
 from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint
 
 if TYPE_CHECKING:
-    from linkage_ros.stages.faults import Fault
+    from linkage_ros.stages.faults import FaultEntry
 
 SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
 """
@@ -192,7 +192,7 @@ class Scene:
     rate: float
     wrapped: bool
     seed: int
-    faults: Mapping[str, Fault]
+    faults: Mapping[str, FaultEntry]
     record: RecordParameters | None
     files: Mapping[str, bytes]
     folder: str = field(compare=False)

@@ -40,10 +40,11 @@ from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_na
 from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS, in_order, module_of
+from linkage_ros.stages.effects import effect_class, EFFECTS, in_order
 
 if TYPE_CHECKING:
-    from linkage_ros.stages.faults import Fault
+    from linkage_ros.stages.effects import Effect
+    from linkage_ros.stages.faults import FaultEntry
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of a scene's files in a bag; further linkage files are numbered."""
@@ -330,18 +331,18 @@ def _read_scene_linkage(
     drive = _drive_name(drives)
     effects = section_with('effects').section('effects', required=False)
     loads = section_with('loads').section('loads') if 'loads' in section_with('loads') else None
-    default = drive != 'topic' or 'effort' in effects
-    published = section_with('publish_input').flag('publish_input', default)
-    if closure is None:
-        closure = read_closure(linkage_content, publish_inputs=published)
-    linkage = closure.linkage
-    _refuse_effects(effects, drive, published)
-    parts = parts_of(linkage)
-    _set_slide_units((drives, effects, *([] if loads is None else [loads]), own, scene), linkage)
     not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     for effect in not_imported:
         effects.section(effect)
     types = _effect_types(effects, not_imported)
+    default = drive != 'topic' or any(each.without_inputs for each in types.values())
+    published = section_with('publish_input').flag('publish_input', default)
+    if closure is None:
+        closure = read_closure(linkage_content, publish_inputs=published)
+    linkage = closure.linkage
+    _refuse_effects(effects, types, drive, published)
+    parts = parts_of(linkage)
+    _set_slide_units((drives, effects, *([] if loads is None else [loads]), own, scene), linkage)
     parameters = import_module(DRIVES[drive]).PARAMETERS
     driven = drives.section(drive, required=False)
     scene_linkage = SceneLinkage(
@@ -371,20 +372,15 @@ def _drive_name(drives: Section) -> str:
     return named[0]
 
 
-def _refuse_effects(effects: Section, drive: str, published: bool) -> None:
+def _refuse_effects(
+    effects: Section, types: Mapping[str, type[Effect]], drive: str, published: bool
+) -> None:
     """Refuse effects that do not fit to the drive, or to what is published."""
-    if 'effort' in effects and not published:
-        raise effects.error(
-            'effort',
-            'is the effort of the input joint, which is not published',
-            'set publish_input: true, or name pin_forces',
-        )
-    if drive == 'torque' and 'backlash' in effects:
-        raise effects.error(
-            'backlash',
-            'is play without masses, and torque moves masses',
-            'write drive.torque.play: {width: …, inertia: …} instead',
-        )
+    for name, effect in types.items():
+        if effect.without_inputs and not published:
+            raise effects.error(name, *effect.without_inputs)
+        if drive in effect.refused_drives:
+            raise effects.error(name, *effect.refused_drives[drive])
 
 
 def _set_slide_units(sections: Collection[Section], linkage: Linkage) -> None:
@@ -405,12 +401,12 @@ def _read_prefix(content: Section, default: str) -> str:
     return prefix
 
 
-def _effect_types(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
-    """Return the parameter types of the named effects, in physical order."""
+def _effect_types(effects: Section, left_out: Collection[str]) -> dict[str, type[Effect]]:
+    """Return the classes of the named effects, in physical order."""
     known = [name for name in effects if name in EFFECTS or '.' in name]
     try:
         named = in_order([name for name in known if name not in left_out])
-        return {name: module_of(name).PARAMETERS for name in named}
+        return {name: effect_class(name) for name in named}
     except DefinitionError as error:
         raise effects.locate_error(error) from None
 
@@ -501,7 +497,7 @@ def _read_spring_end(content: Section, key: str) -> tuple[str, str]:
     return link, point
 
 
-def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
+def _read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, FaultEntry]:
     """Return the faults of a scene, by name."""
     section = content.section('faults', required=False)
     parts: dict[str, tuple[str, ...]] = {}
@@ -531,8 +527,8 @@ def kinds_of_fault(name: str, kinds: Sequence[str]) -> tuple[str, str]:
     return 'names no kind of fault', f'write {shape}; kinds: {list_names(FAULTS)}'
 
 
-def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
-    from linkage_ros.stages.faults import Fault, FAULTS  # local import: as above
+def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]]) -> FaultEntry:
+    from linkage_ros.stages.faults import FaultEntry, FAULTS  # local import: as above
 
     kinds = [key for key in content if key in FAULTS]
     for key in () if kinds else content:
@@ -548,7 +544,7 @@ def _read_fault(name: str, content: Section, parts: Mapping[str, tuple[str, ...]
         )
     seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
     content.finish(_WHEN)
-    return Fault(kinds[0], parameters, tuple(at), seconds)
+    return FaultEntry(kinds[0], parameters, tuple(at), seconds)
 
 
 def _read_storage(content: Section) -> StorageParameters:

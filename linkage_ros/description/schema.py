@@ -42,7 +42,7 @@ from linkage_ros.description.scene_file import (
 from linkage_ros.description.units import ANGLES, LENGTHS
 from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, STIFFEST
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS
+from linkage_ros.stages.effects import effect_class, EFFECTS
 from linkage_ros.stages.faults import FAULTS
 
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
@@ -53,13 +53,6 @@ DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
 """Pattern of the name of a module within a package."""
 
 _RATE = 'ticks a second; 0: one for every crank sample'
-_NO_PLAY_UNDER_TORQUE: Schema = {
-    'if': {
-        'required': ['drive'],
-        'properties': {'drive': {'required': ['torque']}},
-    },
-    'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
-}
 _OWN_EFFECT: Schema = {
     'description': 'A user-defined effect: a module that Python finds, and its parameters.',
     'type': 'object',
@@ -107,7 +100,22 @@ def _point_schema(description: str, unit: str, most: float) -> Schema:
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
     """Return the parameter types of all drives or effects in a registry."""
+    if registry is EFFECTS:
+        return {name: effect_class(name) for name in registry}
     return {name: import_module(module).PARAMETERS for name, module in registry.items()}
+
+
+def _refused_pairs() -> Schema:
+    """Return the schema that refuses an effect beside a drive that excludes it."""
+    drives: dict[str, dict[str, bool]] = {}
+    for name in EFFECTS:
+        for drive in effect_class(name).refused_drives:
+            drives.setdefault(drive, {})[name] = False
+    ((drive, refused),) = drives.items()
+    return {
+        'if': {'required': ['drive'], 'properties': {'drive': {'required': [drive]}}},
+        'then': {'properties': {'effects': {'properties': refused}}},
+    }
 
 
 def scene_schema() -> Schema:
@@ -155,7 +163,7 @@ def scene_schema() -> Schema:
         **whole,
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
-        'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
+        'else': {'required': ['linkage'], **_refused_pairs()},
         '$defs': _of_a_linkage(),
     }
 
@@ -195,7 +203,7 @@ def _linkages_schema(own: Mapping[str, Schema]) -> Schema:
         },
         required=('name', 'linkage'),
     )
-    one |= _NO_PLAY_UNDER_TORQUE
+    one |= _refused_pairs()
     return {
         'description': 'Several linkages instead of one.',
         'if': {'type': 'array'},

@@ -32,13 +32,6 @@ from linkage_ros.tick import Pipeline
 
 IDENTICAL, DIFFERENT, UNDECIDED = 'identical', 'different', 'cannot be told'
 
-_NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
-"""
-Effects whose state is not recovered: random generators, and the time of the first tick. So for an
-incremental encoder, which counts from power-on, for a low-pass, which never forgets to the last
-bit, for random latencies, for loads over the time, and for markers with a trail.
-"""
-
 _REPORT_EVERY = 1024
 
 
@@ -141,18 +134,8 @@ def _lost_state(scene: Scene) -> tuple[str, ...]:
     for scene_linkage in scene.linkages:
         if scene_linkage.loads is not None and scene_linkage.loads.applied.changes_with_time:
             named.append('loads')
-        named += [effect for effect in scene_linkage.effects if effect in _NEVER_FOUND_AGAIN]
-        encoder = scene_linkage.effects.get('encoder')
-        if encoder and (
-            encoder.cutoff or any(each.incremental for each in encoder.joints.values())
-        ):
-            named.append('encoder')
-        delay = scene_linkage.effects.get('delay')
-        if delay and any(line.is_random for line in delay.delay_lines):
-            named.append('delay')
-        markers = scene_linkage.effects.get('markers')
-        if markers and markers.trace:
-            named.append('markers')
+        effects = scene_linkage.effects.items()
+        named += [name for name, effect in effects if not effect.is_recoverable]
     return tuple(dict.fromkeys(named))
 
 

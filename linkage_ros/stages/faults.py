@@ -9,20 +9,8 @@
 """
 Faults that a scene can inject at set times or on demand: their kinds, and what activates them.
 
-Imported only where a scene has a section ``faults``. A kind of fault is the type of its parameters
-(see `linkage_ros.description.parameters`) with one method, whose name gives the place and which
-builds the fault from its `Switch`:
-
-``clock(switch) -> Callable[[int], int]``
-    Map the true time to the time of the tick, in [ns].
-``message(switch) -> Callable[[bytes], bytes]``
-    Change a crank message before it is read.
-``mechanism(switch, context) -> Callable[[Position], Position] | None``
-    Change the position after the loops are closed.
-``sensor(switch, joints) -> Callable[[int, Reading], Reading | None] | None``
-    Change the reading after all effects, at a time in [ns].
-
-Each of several linkages calls these methods; they return None if it is not concerned.
+Imported only where a scene has a section ``faults``. A kind of fault is a class that derives from
+`Fault`; its fields are its parameters (see `linkage_ros.description.parameters`).
 """
 
 from __future__ import annotations
@@ -39,13 +27,41 @@ from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects import restamp, Sensor, SensorReading
 
 
-@dataclass(frozen=True, slots=True)
 class Fault:
+    """
+    A kind of fault: its parameters, and one of these methods, which builds it from its `Switch`.
+
+    Each of several linkages calls them; they return None if it is not concerned.
+    """
+
+    __slots__ = ()
+
+    def clock(self, _switch: Switch) -> Callable[[int], int] | None:
+        """Build a function of the true time that returns the time of the tick, in [ns]."""
+        return None
+
+    def message(self, _switch: Switch) -> Callable[[bytes], bytes] | None:
+        """Build a function that changes a crank message before it is read."""
+        return None
+
+    def mechanism(
+        self, _switch: Switch, _context: Context
+    ) -> Callable[[Position], Position] | None:
+        """Build a function that changes the position after the loops are closed."""
+        return None
+
+    def sensor(self, _switch: Switch, _joints: Sequence[str]) -> Sensor | None:
+        """Build a function that changes the reading after all effects, at a time in [ns]."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class FaultEntry:
     """A fault that a scene can inject."""
 
-    # Key of `FAULTS`, and an object of its type.
+    # Key of `FAULTS`, and an object of its class.
     kind: str
-    parameters: Any
+    parameters: Fault
     at: tuple[float, ...]  # Times at which it begins by itself, in [s] from the first tick
     seconds: float  # Its duration then, in [s]
 
@@ -60,7 +76,7 @@ class Switch:
 
 
 @dataclass(frozen=True, slots=True)
-class TimeJump:
+class TimeJump(Fault):
     """
     The clock jumps, and jumps back when the fault ends.
 
@@ -82,7 +98,7 @@ class TimeJump:
 
 
 @dataclass(frozen=True, slots=True)
-class NotANumber:
+class NotANumber(Fault):
     """
     The crank's messages hold NaN.
 
@@ -100,7 +116,7 @@ class NotANumber:
 
 
 @dataclass(frozen=True, slots=True)
-class BrokenLink:
+class BrokenLink(Fault):
     """
     A link is broken: the linkage has no pose.
 
@@ -124,7 +140,7 @@ class BrokenLink:
 
 
 @dataclass(frozen=True, slots=True)
-class Stuck:
+class Stuck(Fault):
     """
     The sensor of one joint stands still.
 
@@ -162,7 +178,7 @@ class Stuck:
 
 
 @dataclass(frozen=True, slots=True)
-class Freeze:
+class Freeze(Fault):
     """
     The last reading is published again and again, with new stamps.
 
@@ -201,7 +217,7 @@ class FrozenSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class Silence:
+class Silence(Fault):
     """
     Nothing is published.
 
@@ -217,7 +233,7 @@ class Silence:
         return silence
 
 
-FAULTS: Mapping[str, type[Any]] = {
+FAULTS: Mapping[str, type[Fault]] = {
     'time_jump': TimeJump,
     'not_a_number': NotANumber,
     'broken_link': BrokenLink,
@@ -242,7 +258,7 @@ class Injection:
     Time here is the true time: a `TimeJump` changes the clock, but not its own end.
     """
 
-    def __init__(self, faults: Mapping[str, Fault]) -> None:
+    def __init__(self, faults: Mapping[str, FaultEntry]) -> None:
         self.faults = faults
         self.switches = {name: Switch() for name in faults}
         self.injected = dict.fromkeys(faults, 0)
@@ -295,14 +311,14 @@ class Injection:
 
     def build_functions(self, function: str, *arguments: Any) -> list[Any]:
         """Build the functions of all faults for one place of the pipeline, named by `function`."""
-        built = []
-        for fault, switch in zip(self.faults.values(), self.switches.values(), strict=True):
-            if hasattr(fault.parameters, function):
-                built.append(getattr(fault.parameters, function)(switch, *arguments))
+        pairs = zip(self.faults.values(), self.switches.values(), strict=True)
+        built = [
+            getattr(fault.parameters, function)(switch, *arguments) for fault, switch in pairs
+        ]
         return [each for each in built if each is not None]
 
 
-def _fault_windows(fault: Fault) -> list[tuple[int, int]]:
+def _fault_windows(fault: FaultEntry) -> list[tuple[int, int]]:
     """Return the windows of a fault, in [ns]; overlapping windows are merged."""
     windows: list[tuple[int, int]] = []
     for at in sorted(fault.at):

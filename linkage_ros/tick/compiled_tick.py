@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.generated_code import define_function, Lines
 from linkage_ros.kinematics import all_finite
 from linkage_ros.stages.drives import compile_drive, CrankState
-from linkage_ros.stages.effects import FORCE_EFFECTS, MechanismState, SensorReading
+from linkage_ros.stages.effects import MechanismEffect, MechanismState, SensorReading
 from linkage_ros.tick.interpreted_tick import InterpretedTick, Tick
 from linkage_ros.tick.linkage_pipeline import LinkagePipeline
 from linkage_ros.tick.linkage_state import LinkageState
@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiling import Compiled, TracedMotion
 
 _CRANK_FIELDS = ', '.join(CrankState._fields)
-
-_KINEMATIC = ('velocity', 'acceleration')
-"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
 
 
 class CompiledTick(NamedTuple):
@@ -191,27 +188,27 @@ class _OutputSelection:
         _velocity, _acceleration, *stages = self.linkage.mechanism_stages
         for stage in stages:
             moved = stage(moved)
-        published = any(extra.forces_only for extra in self.linkage.extras)
-        reactions = [*chain(*moved.reactions)] if published else []
+        reactions = [*chain(*moved.reactions)] if self.linkage.writes_forces else []
         return [*self.linkage.observe(0, moved)[1:], reactions]
 
 
 def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     """Compile the tick of a linkage up to the reading; None where a part has no such form."""
     wanted = linkage.wanted
-    moved = {effect.name for effect in wanted.effects if effect.stage is not None}
+    acting = wanted.of_kind(MechanismEffect).values()
+    derivatives = [each.derivative for each in acting if each.derivative]
     if linkage.mechanism_faults:
         return None
-    if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
+    if not all(each.is_compiled for each in acting):
         return None
-    loads = None if moved.isdisjoint(FORCE_EFFECTS) else linkage.changing_loads
+    loads = linkage.changing_loads if any(each.needs_forces for each in acting) else None
     outputs = None
-    if 'acceleration' in moved:
-        of = [wanted.parameters[name] for name in linkage.effect_names if name in moved]
-        of += [linkage.observed_effects, linkage.context.loads, linkage.context.friction]
+    if 2 in derivatives:
+        of = [*acting, linkage.published_fields, linkage.writes_forces]
+        of += [linkage.context.loads, linkage.context.friction]
         outputs = _OutputSelection(of, linkage)
     compiled = linkage.closure.compile_linkage(
-        len(moved.intersection(_KINEMATIC)), outputs, loads.given_count if loads else 0
+        len(derivatives), outputs, loads.given_count if loads else 0
     )
     # Where the forces have no solution, a compiled path has fewer values.
     if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
@@ -238,7 +235,7 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         # Within its play, the motor moves alone and carries only itself.
         lines += _fall_back_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
     if efforts and exerts:
-        # As `linkage_ros.stages.effects.effort` for an input at rest.
+        # As `linkage_ros.stages.effects.forces` for an input at rest.
         effort = efforts[0]
         lines.append("bearing = getattr(crank, 'bearing', ())")
         lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')

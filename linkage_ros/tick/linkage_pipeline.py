@@ -28,8 +28,14 @@ from linkage_ros.messages import Rejection
 from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
 from linkage_ros.stages.effects import (
     Continuous,
+    DriveEffect,
     first_values,
+    ForceEffect,
+    LinkageEffect,
+    MechanismEffect,
     MechanismState,
+    MessageEffect,
+    SensorEffect,
     SensorReading,
     SensorStage,
     wrap_all,
@@ -41,9 +47,6 @@ from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
 if TYPE_CHECKING:
     from linkage_ros.dynamics import AppliedForces, HeldWrench
     from linkage_ros.stages.faults import Injection
-
-_FORCES_ONLY = {'pin_forces'}
-"""Effects whose messages contain joint forces only."""
 
 
 class AuxiliaryOutput(NamedTuple):
@@ -58,7 +61,7 @@ class AuxiliaryOutput(NamedTuple):
     @property
     def forces_only(self) -> bool:
         """Return whether the message contains joint forces only."""
-        return self.effect in _FORCES_ONLY
+        return self.writer.of_forces
 
 
 class LinkagePipeline:
@@ -89,18 +92,21 @@ class LinkagePipeline:
     ) -> None:
         scene_linkage = self.scene_linkage
         self.wanted = wanted = choose_effects(scene_linkage)
-        self.effect_names = tuple(effect.name for effect in wanted.effects)
-        """Names of the computed effects, in physical order."""
+        mechanism = wanted.of_kind(MechanismEffect)
+        self._computed_fields = frozenset(each.gives for each in mechanism.values()) - {''}
+        self.published_fields = self._computed_fields - frozenset(
+            each.gives for name, each in mechanism.items() if name not in wanted.named
+        )
+        """Fields of the reading that are published beside the joints."""
         seed = f'{scene.seed}/{scene_linkage.name}'
         self.closure = closure or _make_closure(scene_linkage, wanted, seed)
-        friction = wanted.parameters.get('friction')
         self.context = Context(
             closure=self.closure,
             rate=scene.rate,
-            needs_rate='velocity' in self.effect_names,
+            needs_rate='rates' in self._computed_fields,
             seed=seed,
             loads=scene_linkage.loads,
-            friction=friction.friction if friction is not None else None,
+            friction=next((f.friction for f in wanted.of_kind(ForceEffect).values()), None),
             prefix=scene_linkage.prefix,
             dependent=scene.dependent_joints,
             effects=frozenset(scene_linkage.effects),
@@ -126,7 +132,9 @@ class LinkagePipeline:
             raise DefinitionError(
                 'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
             )
-        self.drive_stages = [*wanted.build('drive_stage', self.context).values()]
+        self.drive_stages = [
+            effect.drive_stage(self.context) for effect in wanted.of_kind(DriveEffect).values()
+        ]
 
     def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
@@ -145,24 +153,26 @@ class LinkagePipeline:
         self.mechanism_faults = (
             injection.build_functions('mechanism', self.context) if injection is not None else []
         )
-        self.mechanism_stages = [*wanted.build('stage', self.context).values()]
+        mechanism = wanted.of_kind(MechanismEffect).values()
+        self.mechanism_stages = [effect.stage(self.context) for effect in mechanism]
 
     def _build_sensors(
         self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
     ) -> None:
         """Build what makes the published reading of the ideal one."""
-        sensors = wanted.build('sensor', self.context)
-        if {'encoder', 'rate_limit'} <= set(sensors):
-            sensors['rate_limit'].read_by(sensors['encoder'])
+        sensors: dict[str, Any] = {}
+        for name, effect in wanted.of_kind(SensorEffect).items():
+            sensors[name] = effect.sensor(self.context)
+            if effect.reads in sensors:
+                sensors[name].read_by(sensors[effect.reads])
         joints = self.scene_linkage.joint_names
         broken = injection.build_functions('sensor', joints) if injection is not None else []
         angles = Continuous(self.closure.turning, first_values(self.closure))
         behind = [*sensors.values(), *broken]
         self.running = angles if behind or not wrapped else None
-        self.observed_effects = wanted.named
-        if behind and 'velocity' in self.effect_names and 'velocity' not in wanted.named:
+        if behind and 'rates' in self._computed_fields - self.published_fields:
             # Only used between readings; not published.
-            self.observed_effects |= {'velocity'}
+            self.published_fields |= {'rates'}
             behind.append(_remove_rates)
         if wrapped:
             behind.append(wrap_all(self.closure.turning))
@@ -175,18 +185,18 @@ class LinkagePipeline:
     def _build_outputs(self, wanted: WantedEffects) -> None:
         """Build the messages beside the joint states: of the effects, and of the drive."""
         scene_linkage = self.scene_linkage
-        writers = wanted.build('writer', self.context, wanted.named)
         self.extras = [
             _make_output(
-                effect.name,
+                name,
                 effect.topic,
                 effect.message,
-                writers[effect.name],
+                effect.writer(self.context),
                 scene_linkage.name,
                 of_reading=effect.of_reading,
+                of_forces=effect.of_forces,
             )
-            for effect in wanted.effects
-            if effect.name in writers
+            for name, effect in wanted.of_kind(MessageEffect).items()
+            if name in wanted.named
         ]
         """The topics beside the joint states."""
         drive, parameters = scene_linkage.drive
@@ -200,6 +210,11 @@ class LinkagePipeline:
                         drive, topic, message, written, scene_linkage.name, of_reading=True
                     )
                 )
+
+    @property
+    def writes_forces(self) -> bool:
+        """Return whether a message contains joint forces only."""
+        return any(extra.forces_only for extra in self.extras)
 
     def interpret(self, now: int) -> LinkageState:
         """Return the state of the linkage at a time, in [ns], step by step."""
@@ -246,7 +261,7 @@ class LinkagePipeline:
         """Return the ideal reading of a motion, with the values that the scene asks for."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
-        if 'effort' in self.observed_effects and motion.efforts:
+        if 'efforts' in self.published_fields and motion.efforts:
             # Efforts of the inputs, which are published first; 0 for the other joints.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
@@ -254,9 +269,9 @@ class LinkagePipeline:
             tuple(map(add, position.joints, motion.deflection))
             if motion.deflection
             else position.joints,
-            velocity.joints if velocity and 'velocity' in self.observed_effects else (),
+            velocity.joints if velocity and 'rates' in self.published_fields else (),
             acceleration.joints
-            if acceleration and 'acceleration' in self.observed_effects
+            if acceleration and 'accelerations' in self.published_fields
             else (),
             efforts,
         )
@@ -327,12 +342,10 @@ def _write_extra(extra: AuxiliaryOutput, now: int, state: LinkageState) -> bytes
 
 
 def _make_output(
-    name: str, topic: str, message: str, writer: Any, linkage_name: str, *, of_reading: bool
+    name: str, topic: str, message: str, writer: Any, linkage_name: str, **made_of: bool
 ) -> AuxiliaryOutput:
     within = f'~/{linkage_name}/{topic[2:]}' if linkage_name else topic
-    return AuxiliaryOutput(
-        name, within, message, WriterStage.from_writer(writer, of_reading=of_reading)
-    )
+    return AuxiliaryOutput(name, within, message, WriterStage.from_writer(writer, **made_of))
 
 
 def _remove_rates(_now: int, reading: SensorReading) -> SensorReading:
@@ -357,8 +370,6 @@ def _suppress_beyond_limits(
 def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
     """Return the closure of a linkage as its effects alter it."""
     linkage = scene_linkage.linkage
-    for effect in wanted.effects:
-        if effect.alter is not None:
-            random = Context.generator(seed, effect.name)
-            linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
+    for name, effect in wanted.of_kind(LinkageEffect).items():
+        linkage = effect.alter(linkage, Context.generator(seed, name))
     return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)

@@ -26,12 +26,6 @@ if TYPE_CHECKING:
     from linkage_ros.stages.faults import Injection
     from linkage_ros.tick.wrench_topics import WrenchTopic
 
-_SUPPRESSING = {'rate_limit', 'dropout', 'delay', 'jitter'}
-"""Effects that may suppress the message of a tick."""
-
-_RUNNING_IN_GAPS = {'backlash'}
-"""Effects that keep running while a loop is open."""
-
 
 class Pipeline:
     """
@@ -82,7 +76,7 @@ class Pipeline:
                 f'has the topics {" and ".join(topics)}',
                 'write the same kind of drive for all',
             )
-        _refuse_stamps(scene)
+        _refuse_beside(scene)
         self.topic = topics[0] if topics else ''
         """The topic of the drives; '' for none."""
         self.wrenches: tuple[WrenchTopic, ...] = ()
@@ -98,13 +92,17 @@ class Pipeline:
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._has_state = any(
             linkage.scene_linkage.drive[0] != 'topic'
-            or not _RUNNING_IN_GAPS.isdisjoint(linkage.effect_names)
+            or any(effect.runs_in_gaps for effect in linkage.wanted.effects.values())
             for linkage in self.linkages
         )
         self.suppresses_ticks = (
             self._has_state
             or injection is not None
-            or any(not _SUPPRESSING.isdisjoint(linkage.effect_names) for linkage in self.linkages)
+            or any(
+                effect.suppresses_ticks
+                for linkage in self.linkages
+                for effect in linkage.wanted.effects.values()
+            )
         )
         """Whether ticks without a message may matter to a replay."""
         self._router = SampleRouter(
@@ -179,13 +177,10 @@ class Pipeline:
         return max(linkage.drive.max_age for linkage in self.linkages)
 
 
-def _refuse_stamps(scene: Scene) -> None:
-    """Refuse measurement stamps that cannot share one message of several linkages."""
-    delays = [scene_linkage.effects.get('delay') for scene_linkage in scene.linkages]
-    for scene_linkage, delay in zip(scene.linkages, delays, strict=True):
-        if delay is not None and delay.stamp == 'measured' and delays.count(delay) < len(delays):
-            raise scene_linkage.content.error(
-                'effects.delay.stamp',
-                'measured gives a linkage its own stamp, and all linkages share one message',
-                'give all linkages the same delay, or write arrival',
-            )
+def _refuse_beside(scene: Scene) -> None:
+    """Refuse effects that do not fit to those of the other linkages."""
+    for scene_linkage in scene.linkages:
+        for name, effect in scene_linkage.effects.items():
+            beside = [other.effects.get(name) for other in scene.linkages]
+            if (error := effect.refusal_beside(beside)) is not None:
+                raise scene_linkage.content.locate_error(error)

@@ -10,22 +10,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects import (
     Effect,
-    effect_of,
-    FORCE_EFFECTS,
+    effect_class,
+    force_effects,
+    ForceEffect,
     in_order,
-    module_of,
     needed_effects,
-    PUBLISHED_WITH,
 )
+
+_Base = TypeVar('_Base', bound=Effect)
 
 
 @dataclass(frozen=True)
@@ -33,52 +33,36 @@ class WantedEffects:
     """The effects that a linkage computes, with their parameters."""
 
     named: frozenset[str]  # Those that the scene names, and those published with them
-    effects: list[Effect]  # All that are computed, in physical order
-    parameters: Mapping[str, Any]  # Of each of these, by its name
+    effects: Mapping[str, Effect]  # All that are computed, by name, in physical order
     computes_forces: bool  # Whether an effect or the drive asks for forces
     moves_by_rates: bool  # Whether the drive moves the crank on by its rates between samples
 
-    def build(
-        self, part: str, context: Context, names: Container[str] | None = None
-    ) -> dict[str, Any]:
-        """Build one part of each effect (or of those named) that has it, in physical order."""
-        return {
-            effect.name: builder(self.parameters[effect.name], context)
-            for effect in self.effects
-            if (builder := getattr(effect, part)) is not None
-            and (names is None or effect.name in names)
-        }
+    def of_kind(self, base: type[_Base]) -> dict[str, _Base]:
+        """Return the effects that act in the place of a base, by name, in physical order."""
+        return {name: effect for name, effect in self.effects.items() if isinstance(effect, base)}
 
 
 def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     """Return the effects of a linkage, and those that they start from."""
     _refuse_not_imported(scene_linkage)
     drive, drive_parameters = scene_linkage.drive
-    named = frozenset(scene_linkage.effects)
-    named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
+    effects = dict(scene_linkage.effects)
+    for effect in scene_linkage.effects.values():
+        for also in effect.publishes_with:
+            effects.setdefault(also, effect_class(also)())
+    named = frozenset(effects)
     moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
-    starting = named - _rate_free_effects(scene_linkage, named, moves_by_rates)
-    computed = named | {need for effect in starting for need in needed_effects(effect)}
-    effects = [effect_of(name) for name in in_order(computed)]
-    computes_forces = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
-    _refuse_idle(scene_linkage, computes_forces)
-    parameters = {
-        effect.name: scene_linkage.effects.get(effect.name) or effect.parameters()
-        for effect in effects
+    needs = {
+        need
+        for effect in effects.values()
+        for need in effect.needs_here(named, moves_by_rates=moves_by_rates)
     }
-    return WantedEffects(named, effects, parameters, computes_forces, moves_by_rates)
-
-
-def _rate_free_effects(
-    scene_linkage: SceneLinkage, named: frozenset[str], moves_by_rates: bool
-) -> set[str]:
-    """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
-    mixing = {'jitter', 'delay'} & named
-    if moves_by_rates and 'delay' in mixing:
-        delay = module_of('delay')
-        parameters = scene_linkage.effects.get('delay') or delay.PARAMETERS()
-        return set() if delay.interpolates_readings(parameters, named) else {'delay'}
-    return set() if moves_by_rates else mixing
+    for name in needs.union(*map(needed_effects, needs)):
+        effects.setdefault(name, effect_class(name)())
+    computes_forces = drive == 'torque' or any(each.needs_forces for each in effects.values())
+    _refuse_idle(scene_linkage, computes_forces)
+    ordered = {name: effects[name] for name in in_order(effects)}
+    return WantedEffects(named, ordered, computes_forces, moves_by_rates)
 
 
 def _refuse_not_imported(scene_linkage: SceneLinkage) -> None:
@@ -98,13 +82,13 @@ def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
     """Refuse an effect that has nothing to act on."""
     # With several linkages, one without forces may share an effect that another one needs.
     section = scene_linkage.content
-    for given, key in (
-        (scene_linkage.loads and 'loads' in section, 'loads'),
-        ('friction' in scene_linkage.effects and 'effects' in section, 'effects.friction'),
-    ):
-        if given and not forced:
-            raise DefinitionError(
-                key,
-                'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {list_names(FORCE_EFFECTS)}',
-            )
+    idle = ['loads'] if scene_linkage.loads and 'loads' in section else []
+    if 'effects' in section:
+        effects = scene_linkage.effects.items()
+        idle += [f'effects.{name}' for name, each in effects if isinstance(each, ForceEffect)]
+    if idle and not forced:
+        raise DefinitionError(
+            idle[0],
+            'acts on nothing here: no effect and no drive asks for forces',
+            f'leave it out, drive by torque, or name one of {list_names(force_effects())}',
+        )

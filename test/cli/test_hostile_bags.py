@@ -289,15 +289,16 @@ Path(__file__).parents[1].joinpath('{RAN}').write_text('')
 
 DOES_NOTHING = """
 from dataclasses import dataclass
+from linkage_ros.stages.effects import SensorEffect
 
 @dataclass(frozen=True, slots=True)
-class PARAMETERS:
+class Nothing(SensorEffect):
     'Nothing.'
 
-AFTER = 'bias'
+    after = 'bias'
 
-def sensor(parameters, context):
-    return lambda now, reading: reading
+    def sensor(self, context):
+        return lambda now, reading: reading
 """
 
 # Arguments after the bag, by command; at least one line for each command that takes a bag.

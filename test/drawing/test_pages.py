@@ -17,7 +17,7 @@ import sys
 
 from linkage_ros.description import load, parse_scene
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import EFFECTS
+from linkage_ros.stages.effects import effect_class, EFFECTS
 from linkage_ros.stages.faults import FAULTS
 from linkage_ros.tick import Pipeline
 import pytest
@@ -95,7 +95,11 @@ def squeezed(text):
 
 def equations(name):
     """Return the equations of a module: the indented lines of its docstring."""
-    lines = inspect.getdoc(import_module(EFFECTS[name])).splitlines()
+    module = import_module(effect_class(name).__module__)
+    text = inspect.getdoc(module)
+    # Of a module with several effects, each has its own part.
+    _, named, own = text.partition(f'\n`{name}`: ')
+    lines = (own.partition('\n`')[0] if named else text).splitlines()
     return [squeezed(line) for line in lines if line.startswith('    ') and '=' in line]
 
 
@@ -180,7 +184,7 @@ def test_the_effect_that_the_page_has_for_an_example_works(monkeypatch):
     module = type(sys)('saturation')
     monkeypatch.setitem(sys.modules, 'saturation', module)
     exec(compile(code, 'docs/effects.md', 'exec'), module.__dict__)
-    monkeypatch.setitem(EFFECTS, 'saturation', 'saturation')
+    monkeypatch.setitem(EFFECTS, 'saturation', 'saturation.SaturationEffect')
     text = (
         'linkage: ../linkages/four_bar.yaml\n'
         'drive: {constant_rate: {rate: 1.0}}\n'

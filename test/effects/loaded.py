@@ -8,12 +8,10 @@
 
 """A linkage with masses under gravity, and its motion through the effects that use forces."""
 
-from importlib import import_module
-
 from linkage_ros.dynamics import Loads
 from linkage_ros.kinematics import Closure
 from linkage_ros.stages.drives import Context, CrankState
-from linkage_ros.stages.effects import EFFECTS, MechanismState, velocity
+from linkage_ros.stages.effects import effect_class, EFFECTS, MechanismState, VelocityEffect
 
 from ..support.scenes import four_bar_text
 
@@ -25,21 +23,15 @@ def context(of, friction=None, gravity=(0.0, -GRAVITY), drive_inertia=0.0):
     return Context(Closure(of), 1000.0, True, 'seed', loads, friction)
 
 
-def parameters(effect, *given):
-    return import_module(EFFECTS[effect]).PARAMETERS(*given)
-
-
 def moved(within, crank, effects):
     """Return the motion that effects make of a crank's (value, rate, acceleration)."""
     state = CrankState(*((value,) for value in crank), 0)
-    motion = velocity.stage(velocity.PARAMETERS(), within)(
+    motion = VelocityEffect().stage(within)(
         MechanismState(state, within.closure.position(crank[0]), None, None, (), (), ())
     )
     for effect in EFFECTS:
         if effect == 'acceleration' or effect in effects:
-            module = import_module(EFFECTS[effect])
-            given = parameters(effect, *effects.get(effect, ()))
-            motion = module.stage(given, within)(motion)
+            motion = effect_class(effect)(*effects.get(effect, ())).stage(within)(motion)
     return motion
 
 

@@ -14,7 +14,12 @@ from math import inf, isfinite, nan
 from hypothesis import given, strategies as st
 from linkage_ros.kinematics import Status
 from linkage_ros.stages.drives import Context, CrankState
-from linkage_ros.stages.effects import acceleration, MechanismState, SensorReading, velocity
+from linkage_ros.stages.effects import (
+    AccelerationEffect,
+    MechanismState,
+    SensorReading,
+    VelocityEffect,
+)
 import pytest
 
 from .sensors import ANGLES, SLIDE
@@ -30,10 +35,10 @@ def moved(loop, angle, rate, alpha=0.0):
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (alpha,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    motion = velocity.stage(velocity.PARAMETERS(), context)(
+    motion = VelocityEffect().stage(context)(
         MechanismState(crank, position, None, None, (), (), ())
     )
-    return acceleration.stage(acceleration.PARAMETERS(), context)(motion)
+    return AccelerationEffect().stage(context)(motion)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
@@ -86,7 +91,7 @@ def test_what_is_no_number_is_left_out(value):
             return replace(found, joints=(1.0, value))
 
     context = Context(Overflowing(), 1000.0, True, 'seed', None, None)
-    stage = acceleration.stage(acceleration.AccelerationParameters(), context)
+    stage = AccelerationEffect().stage(context)
     motion = MechanismState(CRANK, POSITION, VELOCITY, None, (), (), ())
     assert stage(motion) == motion
 
@@ -102,7 +107,7 @@ def test_the_message_is_the_motion_at_one_point():
     # Turns added, and whatever else sensors do: what is written is what is read.
     reading = SensorReading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
     context = Context(ANGLES, 1000.0, True, 'seed', None, None, prefix='left_')
-    data = acceleration.writer(acceleration.PARAMETERS(), context)(9, motion, reading)
+    data = AccelerationEffect().writer(context)(9, motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     assert message.joint_names == ['left_coupler_joint', 'left_rocker_joint']

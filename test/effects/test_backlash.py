@@ -13,7 +13,7 @@ from math import pi, remainder, sin, tau
 from hypothesis import given, strategies as st
 from linkage_ros.kinematics import Closure
 from linkage_ros.stages.drives import Context, CrankState
-from linkage_ros.stages.effects import backlash, BacklashParameters
+from linkage_ros.stages.effects import BacklashEffect
 import pytest
 
 from ..support.messages import read_joint_state
@@ -37,7 +37,7 @@ joints: {lever_joint: {parent: ground, child: lever}}
 
 def stage(play, loop=FOUR_BAR, **inputs):
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    return backlash.drive_stage(BacklashParameters(play, inputs), context)
+    return BacklashEffect(play, inputs).drive_stage(context)
 
 
 def crank(angle, rate=0.0, acceleration=0.0, age=0):

@@ -10,7 +10,7 @@
 
 from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import bias, BiasParameters, EccentricDisc
+from linkage_ros.stages.effects import BiasEffect, EccentricDisc
 from mpmath import mp
 import pytest
 
@@ -26,18 +26,18 @@ from .sensors import ANGLES, BEGIN, context, likely, MS, published, reading, SLI
     ],
 )
 def test_it_is_added_to_the_position_of_the_joint_that_it_names(biases, expected):
-    sensor = bias.sensor(BiasParameters(biases), context())
+    sensor = BiasEffect(biases).sensor(context())
     for ms in range(3):
         assert sensor(BEGIN + ms * MS, reading(BEGIN, 1.0, 2.0)).joints == expected
 
 
 def test_that_of_a_slide_is_in_metres():
-    sensor = bias.sensor(BiasParameters({'rod_slide': 0.001}), context(SLIDE))
+    sensor = BiasEffect({'rod_slide': 0.001}).sensor(context(SLIDE))
     assert sensor(BEGIN, reading(BEGIN, 1.0, 0.125)).joints == (1.0, 0.126)
 
 
 def test_the_rest_of_the_reading_is_passed_on():
-    sensor = bias.sensor(BiasParameters({'rocker_joint': 0.25}), context())
+    sensor = BiasEffect({'rocker_joint': 0.25}).sensor(context())
     rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0, **rest)) == reading(BEGIN, 1.0, 2.25, **rest)
     assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0)) == reading(BEGIN, 1.0, 2.25)
@@ -54,8 +54,8 @@ def test_the_zero_is_drawn_once_from_the_seed():
     # Over seeds it spreads by its deviation; in a run it stays.
     drawn = []
     for seed in range(2000):
-        parameters = BiasParameters({'rocker_joint': 5.0}, deviations={'rocker_joint': 0.25})
-        sensor = bias.sensor(parameters, context(seed=f'{seed}'))
+        parameters = BiasEffect({'rocker_joint': 5.0}, deviations={'rocker_joint': 0.25})
+        sensor = parameters.sensor(context(seed=f'{seed}'))
         first, later = (sensor(BEGIN + ms * MS, reading(BEGIN, 1.0, 2.0)).joints for ms in (0, 9))
         assert first == later
         assert first[0] == 1.0
@@ -69,7 +69,7 @@ def test_the_zero_is_drawn_once_from_the_seed():
     [('rates', 'rates', (3.0, 4.5)), ('efforts', 'efforts', (5.0, 6.5))],
 )
 def test_rates_and_efforts_have_a_bias_of_their_own(kind, field, expected):
-    sensor = bias.sensor(BiasParameters(**{kind: {'rocker_joint': 0.5}}), context())
+    sensor = BiasEffect(**{kind: {'rocker_joint': 0.5}}).sensor(context())
     rest = {'rates': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     found = sensor(BEGIN, reading(BEGIN, 1.0, 2.0, **rest))
     assert found == reading(BEGIN, 1.0, 2.0, **{**rest, field: expected})
@@ -79,11 +79,11 @@ def test_rates_and_efforts_have_a_bias_of_their_own(kind, field, expected):
 @given(st.floats(-20.0, 20.0), st.floats(-9.0, 9.0), st.floats(-0.1, 0.1), st.floats(-4.0, 4.0))
 def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, scale, phase):
     # The rate that is read is the slope of what is read, by mpmath.
-    parameters = BiasParameters(
+    parameters = BiasEffect(
         scales={'rocker_joint': scale},
         eccentricities={'rocker_joint': EccentricDisc(0.01, phase)},
     )
-    sensor = bias.sensor(parameters, context())
+    sensor = parameters.sensor(context())
     found = sensor(BEGIN, reading(BEGIN, 1.0, angle, rates=(7.0, rate)))
 
     def read(x):
@@ -99,10 +99,10 @@ def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, sc
 @pytest.mark.parametrize(
     ('parameters', 'where', 'line'),
     [
-        (BiasParameters(), ANGLES, 'names no joint'),
-        (BiasParameters(eccentricities={'rod_slide': EccentricDisc(0.1)}), SLIDE, 'has no disc'),
+        (BiasEffect(), ANGLES, 'names no joint'),
+        (BiasEffect(eccentricities={'rod_slide': EccentricDisc(0.1)}), SLIDE, 'has no disc'),
     ],
 )
 def test_what_has_no_error_is_refused(parameters, where, line):
     with pytest.raises(DefinitionError, match=line):
-        bias.sensor(parameters, context(where))
+        parameters.sensor(context(where))

@@ -12,7 +12,7 @@ from cmath import rect
 from math import hypot, sqrt
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import clearance, ClearanceParameters
+from linkage_ros.stages.effects import ClearanceEffect
 import pytest
 
 from .four_bar_by_hand import FourBar
@@ -136,7 +136,7 @@ def test_a_force_that_is_rounding_leans_nothing():
         reaction._replace(fx=1e-13 * reaction.fx, fy=1e-13 * reaction.fy) if i else reaction
         for i, reaction in enumerate(before.reactions)
     )
-    stage = clearance.stage(ClearanceParameters({'A': 1e-5, 'B': 1e-5, 'O4': 1e-5}), within)
+    stage = ClearanceEffect({'A': 1e-5, 'B': 1e-5, 'O4': 1e-5}).stage(within)
     names = within.reactions.names
     assert names[0] == 'O2'
     assert stage(before._replace(reactions=tiny)).deflection == (0.0, 0.0)
@@ -151,7 +151,7 @@ def test_at_a_toggle_nothing_leans():
 def test_it_is_added_to_what_the_links_yield_and_the_rest_is_passed_on():
     within = context(FOUR_BAR)
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
-    stage = clearance.stage(ClearanceParameters({'A': 1e-5}), within)
+    stage = ClearanceEffect({'A': 1e-5}).stage(within)
     alone = stage(before)
     assert alone == before._replace(deflection=alone.deflection)
     further = stage(before._replace(deflection=(0.5, -0.25)))
@@ -199,7 +199,7 @@ def test_a_slider_is_refused(name):
         match=f"^effects.clearance.pins.{name}: '{name}' is a slider, and clearance is a property "
         'of pins; name pins: A, B, O2$',
     ):
-        clearance.stage(ClearanceParameters({name: 1e-5}), context(SLIDER_CRANK))
+        ClearanceEffect({name: 1e-5}).stage(context(SLIDER_CRANK))
 
 
 def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():

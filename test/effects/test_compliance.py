@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure
-from linkage_ros.stages.effects import compliance, ComplianceParameters
+from linkage_ros.stages.effects import ComplianceEffect
 import pytest
 
 from .four_bar_by_hand import FourBar, mp, turn
@@ -142,7 +142,7 @@ def test_at_a_toggle_nothing_yields():
 def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
     within = context(FOUR_BAR)
     before = moved(within, MOTIONS[2], {'pin_forces': ()})
-    stage = compliance.stage(ComplianceParameters({'coupler': 1e4}), within)
+    stage = ComplianceEffect({'coupler': 1e4}).stage(within)
     alone = stage(before)
     assert alone == before._replace(deflection=alone.deflection)
     further = stage(before._replace(deflection=(0.5, -0.25)))
@@ -160,7 +160,7 @@ def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
 )
 def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
     with pytest.raises(DefinitionError, match=f'^effects.compliance.links.{link}: .*{reason}'):
-        compliance.stage(ComplianceParameters({link: 1e4}), context(of))
+        ComplianceEffect({link: 1e4}).stage(context(of))
 
 
 def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():

@@ -15,7 +15,7 @@ from random import Random
 
 from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import delay, DelayParameters, History
+from linkage_ros.stages.effects import DelayEffect, History
 import pytest
 from scipy.stats import expon, kstest, uniform
 
@@ -25,7 +25,7 @@ from .sensors import ANGLES, BEGIN, context, likely, MS, published, reading
 
 
 def delayed(seconds, **parameters):
-    return delay.sensor(DelayParameters(seconds, **parameters), context())
+    return DelayEffect(seconds, **parameters).sensor(context())
 
 
 def shown(found):
@@ -377,7 +377,7 @@ TICK = 10_000  # ns
 
 def arrivals(count, *, every=1000, seed='seed', **parameters):
     """Return what was sent and what arrived when: (message, time in ns), a tick each 10 µs."""
-    sensor = delay.sensor(DelayParameters(**parameters), context(seed=seed))
+    sensor = DelayEffect(**parameters).sensor(context(seed=seed))
     sent, arrived, number = {}, [], 0
     while len(sent) < count or sensor._way:
         now = BEGIN + number * TICK
@@ -429,7 +429,7 @@ def test_with_reordering_messages_overtake_and_tell_when_they_were_measured():
     _, arrived = arrivals(200, every=10, seconds=0.0, spread=0.002, reorder=True)
     messages = [message for message, _ in arrived]
     assert messages != sorted(messages)
-    sensor = delay.sensor(DelayParameters(0.0, stamp='measured', spread=0.001), context())
+    sensor = DelayEffect(0.0, stamp='measured', spread=0.001).sensor(context())
     assert sensor(BEGIN, reading(BEGIN, 1.0)) is None
     assert sensor.silence(BEGIN + MS, False).stamp == BEGIN
 

@@ -12,7 +12,7 @@ from itertools import groupby, pairwise
 from math import ceil, inf, log
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import dropout, DropoutParameters
+from linkage_ros.stages.effects import DropoutEffect
 import pytest
 
 from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY
@@ -21,7 +21,7 @@ N = 100_000
 
 
 def line(probability, burst=0.0, hold='silent', seed='seed'):
-    return dropout.sensor(DropoutParameters(probability, burst, hold), context(seed=seed))
+    return DropoutEffect(probability, burst, hold).sensor(context(seed=seed))
 
 
 def losses(probability, burst=0.0, n=N, seed='seed'):

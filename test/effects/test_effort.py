@@ -15,7 +15,7 @@ from linkage_ros.dynamics import Friction, JointFriction
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Status
 from linkage_ros.stages.drives import CrankState
-from linkage_ros.stages.effects import effort, MechanismState
+from linkage_ros.stages.effects import EffortEffect, MechanismState
 import numpy as np
 import pytest
 
@@ -127,7 +127,7 @@ def test_the_rest_of_the_motion_is_passed_on():
     motion = MechanismState(
         crank, position, velocity, acceleration, (), ('reactions',), (0.5, 0.5)
     )
-    found = effort.stage(effort.EffortParameters(), within)(motion)
+    found = EffortEffect().stage(within)(motion)
     assert found == motion._replace(efforts=found.efforts)
     assert len(found.efforts) == 1
 

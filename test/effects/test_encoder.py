@@ -14,7 +14,7 @@ from math import exp, floor, isclose, pi, tau, ulp
 
 from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import encoder, EncoderParameters, JointEncoder
+from linkage_ros.stages.effects import EncoderEffect, JointEncoder
 import pytest
 
 from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE
@@ -26,12 +26,12 @@ def angle_encoder(rates='differenced', cutoff=0.0, **parameters):
     """Return the encoder of rocker_joint, the second of two angles; turns are counted."""
     parameters.setdefault('multi_turn', not parameters.get('incremental', False))
     joints = {'rocker_joint': JointEncoder(**parameters)}
-    return encoder.sensor(EncoderParameters(joints, rates, cutoff), context(ANGLES))
+    return EncoderEffect(joints, rates, cutoff).sensor(context(ANGLES))
 
 
 def slide_encoder(**parameters):
     joints = {'rod_slide': JointEncoder(**parameters)}
-    return encoder.sensor(EncoderParameters(joints), context(SLIDE))
+    return EncoderEffect(joints).sensor(context(SLIDE))
 
 
 def read(sensor, values, period=MS):

@@ -10,7 +10,7 @@
 
 from linkage_ros.dynamics import Friction, JointFriction
 from linkage_ros.errors import FileError
-from linkage_ros.stages.effects import friction, FrictionParameters
+from linkage_ros.stages.effects import BASES, ForceEffect, FrictionEffect
 import pytest
 
 from .loaded import context, moved
@@ -22,13 +22,13 @@ SLIDER_CRANK = shipped('slider_crank')
 
 def test_each_joint_has_its_own_friction():
     joints = {'A': JointFriction(viscous=0.002), 'cylinder': JointFriction(3.0, 4.0)}
-    assert FrictionParameters(joints).friction == Friction(joints)
+    assert FrictionEffect(joints).friction == Friction(joints)
 
 
 @pytest.mark.parametrize('rate', [5.0, -5.0])
 def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
     # The piston's rate is the slope of its place over time: the rod's pin on its line.
-    rubbing = FrictionParameters({'cylinder': JointFriction(3.0, 4.0)}).friction
+    rubbing = FrictionEffect({'cylinder': JointFriction(3.0, 4.0)}).friction
     with_it, without = (
         moved(context(SLIDER_CRANK, by), (1.0, rate, 7.0), {'effort': ()})
         for by in (rubbing, None)
@@ -61,5 +61,4 @@ def test_where_nothing_asks_for_forces_it_is_refused():
 
 
 def test_it_has_no_stage():
-    for part in ('alter', 'drive_stage', 'stage', 'sensor', 'writer'):
-        assert not hasattr(friction, part)
+    assert [base for base in BASES if issubclass(FrictionEffect, base)] == [ForceEffect]

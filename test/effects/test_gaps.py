@@ -17,7 +17,7 @@ from cmath import rect
 from math import pi, sin
 
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.stages.effects import Delay, DelayParameters
+from linkage_ros.stages.effects import Delay, DelayEffect
 import pytest
 
 from .sensors import BEGIN, MS, reading
@@ -114,7 +114,7 @@ def test_a_topic_that_pauses_leaves_a_gap_that_arrives_a_delay_later():
 
 
 def test_the_first_silence_of_a_sensor_arrives_a_delay_later():
-    line = Delay(DelayParameters(0.0025), mixes=True)
+    line = Delay(DelayEffect(0.0025), mixes=True)
     found = []
     for ms in range(12):
         now = BEGIN + ms * MS
@@ -126,7 +126,7 @@ def test_the_first_silence_of_a_sensor_arrives_a_delay_later():
 
 def test_a_gap_behind_a_silent_sensor_is_counted_once():
     # With a lossy sensor before the delay, the line carries messages: a gap takes as long as they.
-    line = Delay(DelayParameters(0.002), mixes=True)
+    line = Delay(DelayEffect(0.002), mixes=True)
     found = []
     for ms in range(12):
         now = BEGIN + ms * MS

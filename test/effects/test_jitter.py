@@ -11,7 +11,7 @@
 from itertools import pairwise
 from math import erf, sqrt
 
-from linkage_ros.stages.effects import jitter, JitterParameters
+from linkage_ros.stages.effects import JitterEffect
 import pytest
 
 from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKELY
@@ -19,7 +19,7 @@ from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKEL
 
 def earlier(seconds, distribution='uniform', seed='seed', n=20_000, period=MS):
     """Return how much earlier each tick has looked, in [ns], but the first ones."""
-    sensor = jitter.sensor(JitterParameters(seconds, distribution), context(seed=seed))
+    sensor = JitterEffect(seconds, distribution).sensor(context(seed=seed))
     # The value is the time itself, in [ns] since the first tick: whole up to 2⁵³.
     found = [sensor(BEGIN + i * period, reading(BEGIN, float(i * period))) for i in range(n)]
     begin = round(seconds * 1e9) // period + 1
@@ -51,7 +51,7 @@ def test_the_instants_have_the_distribution_and_stay_within_the_bounds(seconds, 
 
 
 def test_all_that_is_read_is_of_one_instant():
-    sensor = jitter.sensor(JitterParameters(0.002), context())
+    sensor = JitterEffect(0.002).sensor(context())
     for i in range(200):
         now, t = BEGIN + i * MS, i * 1e-3
         found = sensor(
@@ -69,7 +69,7 @@ def test_all_that_is_read_is_of_one_instant():
 
 def test_an_accelerated_motion_is_read_where_it_was():
     # With rates it is read off a cubic, which a motion at a constant acceleration is.
-    sensor = jitter.sensor(JitterParameters(0.005), context())
+    sensor = JitterEffect(0.005).sensor(context())
     instants = []
     for i in range(1000):
         now, t = BEGIN + 2 * i * MS, 0.002 * i
@@ -81,7 +81,7 @@ def test_an_accelerated_motion_is_read_where_it_was():
 
 
 def test_before_the_first_tick_there_is_nothing_to_see():
-    sensor = jitter.sensor(JitterParameters(1.0), context())
+    sensor = JitterEffect(1.0).sensor(context())
     found = [sensor(BEGIN + i * MS, reading(BEGIN, 1.0 + i)).joints[0] for i in range(100)]
     assert found[0] == 1.0
     assert min(found) == 1.0
@@ -89,7 +89,7 @@ def test_before_the_first_tick_there_is_nothing_to_see():
 
 
 def test_the_stamp_does_not_know():
-    sensor = jitter.sensor(JitterParameters(0.01), context())
+    sensor = JitterEffect(0.01).sensor(context())
     for i in range(100):
         now = BEGIN + i * MS
         assert sensor(now, reading(now, 1.0)).stamp == now
@@ -106,7 +106,7 @@ def test_the_seed_decides():
 
 
 def test_while_time_stands_the_newest_reading_counts():
-    sensor = jitter.sensor(JitterParameters(0.001), context())
+    sensor = JitterEffect(0.001).sensor(context())
     for value in range(10):
         assert sensor(BEGIN, reading(BEGIN, 1.0 * value)).joints == (1.0 * value,)
 

@@ -10,7 +10,7 @@
 
 from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import JointRange, measuring_range, MeasuringRangeParameters
+from linkage_ros.stages.effects import JointRange, MeasuringRangeEffect
 import pytest
 
 from .sensors import BEGIN, context, published, reading
@@ -18,7 +18,7 @@ from .sensors import BEGIN, context, published, reading
 
 def limited(**limits):
     joints = {'rocker_joint': JointRange(**limits)}
-    return measuring_range.sensor(MeasuringRangeParameters(joints), context())
+    return MeasuringRangeEffect(joints).sensor(context())
 
 
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))

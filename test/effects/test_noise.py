@@ -12,7 +12,7 @@ from itertools import accumulate, cycle, islice, pairwise
 from math import exp, sqrt
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import JointNoise, noise, NoiseParameters
+from linkage_ros.stages.effects import JointNoise, NoiseEffect
 import pytest
 
 from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE
@@ -25,7 +25,7 @@ IRREGULAR = list(accumulate(islice(cycle((MS, 50, 7 * MS, 0, 300_000)), N - 1), 
 def noisy(joints, times=REGULAR, *, seed='seed', loop=None, rates=lambda _: (0.0, 0.0)):
     """Return what is read of a mechanism at rest."""
     where = context(seed=seed) if loop is None else context(loop, seed)
-    sensor = noise.sensor(NoiseParameters(joints), where)
+    sensor = NoiseEffect(joints).sensor(where)
     return [sensor(now, reading(now, 0.0, 0.0, rates=rates(now))) for now in times]
 
 
@@ -129,7 +129,7 @@ def test_a_density_is_white_noise_of_the_root_of_the_rate():
 
 def test_the_noise_of_efforts_is_in_the_efforts_only():
     where = context(seed='seed')
-    sensor = noise.sensor(NoiseParameters({'rocker_joint': JointNoise(effort_white=0.3)}), where)
+    sensor = NoiseEffect({'rocker_joint': JointNoise(effort_white=0.3)}).sensor(where)
     found = [sensor(now, reading(now, 0.0, 0.0)._replace(efforts=(0.0, 0.0))) for now in REGULAR]
     assert_white([read.efforts[1] for read in found], 0.3)
     assert {read.joints for read in found} == {(0.0, 0.0)}
@@ -199,7 +199,7 @@ def test_that_of_a_slide_is_in_metres():
 
 
 def test_the_rest_of_the_reading_is_passed_on():
-    sensor = noise.sensor(NoiseParameters({'rocker_joint': JointNoise(white=1.0)}), context())
+    sensor = NoiseEffect({'rocker_joint': JointNoise(white=1.0)}).sensor(context())
     rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     found = sensor(BEGIN, reading(BEGIN + 5, 1.0, 2.0, **rest))
     assert found == reading(BEGIN + 5, 1.0, found.joints[1], **rest)

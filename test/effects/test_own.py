@@ -20,7 +20,7 @@ from linkage_ros.description import find_violations, load_scene, read_yaml, scen
 from linkage_ros.errors import FileError
 from linkage_ros.messages import JointStateWriter, time_message
 from linkage_ros.replay import user_effects_here
-from linkage_ros.stages.effects import EFFECTS, FUNCTIONS
+from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -33,76 +33,84 @@ RATE = 3.0
 HEAD = """
 from dataclasses import dataclass
 
-from linkage_ros.description.parameters import number
+from linkage_ros.description import number
+from linkage_ros.stages import effects
 
 
 @dataclass(frozen=True, slots=True)
-class MineParameters:
+class Mine(effects.BASE):
     'What is mine.'
 
     by: float = number('how much', 1.0, unit='rad', least=-10.0, most=10.0)
-
-
-PARAMETERS = MineParameters
 """
-ADD = """
-AFTER = 'bias'
+ADD = (
+    HEAD.replace('BASE', 'SensorEffect')
+    + """
+    after = 'bias'
 
+    def sensor(self, context):
+        def mine(now, reading):
+            return reading._replace(joints=tuple(joint + self.by for joint in reading.joints))
 
-def sensor(parameters, context):
-    def mine(now, reading):
-        return reading._replace(joints=tuple(joint + parameters.by for joint in reading.joints))
-
-    return mine
+        return mine
 """
-DOUBLE = ADD.replace('joint + parameters.by', 'joint * 2.0')
-YIELD = """
-from linkage_ros.stages.effects.stage import with_deflection
+)
+DOUBLE = ADD.replace('joint + self.by', 'joint * 2.0')
+YIELD = (
+    HEAD.replace('BASE', 'MechanismEffect')
+    + """
+    needs = ('pin_forces',)
+    after = 'pin_forces'
 
-NEEDS = ('pin_forces',)
-AFTER = 'pin_forces'
+    def stage(self, context):
+        from linkage_ros.stages.effects.stage import with_deflection
 
+        def mine(motion):
+            force = motion.reactions[0].fx
+            return with_deflection(motion, (self.by * force,) * len(context.joints))
 
-def stage(parameters, context):
-    def mine(motion):
-        force = motion.reactions[0].fx
-        return with_deflection(motion, (parameters.by * force,) * len(context.joints))
-
-    return mine
+        return mine
 """
-LATE_CRANK = """
-AFTER = 'backlash'
+)
+LATE_CRANK = (
+    HEAD.replace('BASE', 'DriveEffect')
+    + """
+    after = 'backlash'
 
+    def drive_stage(self, context):
+        def mine(crank):
+            return crank._replace(angles=tuple(angle - self.by for angle in crank.angles))
 
-def drive_stage(parameters, context):
-    def mine(crank):
-        return crank._replace(angles=tuple(angle - parameters.by for angle in crank.angles))
-
-    return mine
+        return mine
 """
-LONGER = """
-from dataclasses import replace
+)
+LONGER = (
+    HEAD.replace('BASE', 'LinkageEffect')
+    + """
+    after = 'tolerance'
 
-AFTER = 'tolerance'
+    def alter(self, linkage, random):
+        from dataclasses import replace
 
-
-def alter(parameters, linkage, random):
-    crank = {**linkage.links['crank'], 'A': (0.04 + parameters.by, 0.0)}
-    return replace(linkage, links={**linkage.links, 'crank': crank})
+        crank = {**linkage.links['crank'], 'A': (0.04 + self.by, 0.0)}
+        return replace(linkage, links={**linkage.links, 'crank': crank})
 """
-TELL = """
-from linkage_ros.messages.single_values import time_message
+)
+TOPIC = "    topic, message = '~/mine', 'builtin_interfaces/msg/Time'\n"
+TELL = (
+    HEAD.replace('BASE', 'MessageEffect')
+    + f"""
+    after = 'delay'
+{TOPIC}
+    def writer(self, context):
+        from linkage_ros.messages import time_message
 
-AFTER = 'delay'
-TOPIC, MESSAGE = '~/mine', 'builtin_interfaces/msg/Time'
+        def mine(now, motion, reading):
+            return time_message(reading.stamp)
 
-
-def writer(parameters, context):
-    def mine(now, motion, reading):
-        return time_message(reading.stamp)
-
-    return mine
+        return mine
 """
+)
 
 _numbers = count()
 
@@ -151,7 +159,7 @@ def refusal(file):
 
 def test_a_module_of_ones_own_is_an_effect(tmp_path, package):
     ideal = joints(scene_file(tmp_path, ['velocity: {}']))
-    mine = package(add=HEAD + ADD)
+    mine = package(add=ADD)
     file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}'])
     assert joints(file) == tuple(joint + 0.25 for joint in ideal)
 
@@ -167,7 +175,7 @@ def test_a_module_of_ones_own_is_an_effect(tmp_path, package):
     ],
 )
 def test_it_acts_behind_the_effect_that_it_says(tmp_path, package, behind, expected):
-    mine = package(**{name: HEAD + code for name, code in behind.items()})
+    mine = package(**behind)
     ideal = joints(scene_file(tmp_path, ['velocity: {}']))
     own = [f'{mine}.{name}: {{}}' for name in behind]
     file = scene_file(tmp_path, ['bias: {joints: {rocker_joint: 0.5}}', *own])
@@ -175,34 +183,39 @@ def test_it_acts_behind_the_effect_that_it_says(tmp_path, package, behind, expec
 
 
 def test_the_order_in_the_file_does_not_matter(tmp_path, package):
-    mine = package(add=HEAD + ADD, double=HEAD + DOUBLE)
+    mine = package(add=ADD, double=DOUBLE)
     lines = [f'{mine}.add: {{}}', f'{mine}.double: {{}}', 'velocity: {}']
     stages = [
-        Pipeline(load_scene(scene_file(tmp_path, order))).linkages[0].effect_names
+        tuple(Pipeline(load_scene(scene_file(tmp_path, order))).linkages[0].wanted.effects)
         for order in (lines, lines[::-1])
     ]
     assert stages == [('velocity', f'{mine}.add', f'{mine}.double')] * 2
 
 
 def test_it_may_stand_between_motor_and_crank(tmp_path, package):
-    mine = package(late=HEAD + LATE_CRANK)
+    mine = package(late=LATE_CRANK)
     file = scene_file(tmp_path, [f'{mine}.late: {{by: 0.5}}'])
     assert joints(file, 2)[0] == pytest.approx(2 * RATE - 0.5, rel=1e-15)
 
 
 def test_it_may_alter_the_linkage(tmp_path, package):
-    mine = package(longer=HEAD + LONGER)
+    mine = package(longer=LONGER)
     file = scene_file(tmp_path, [f'{mine}.longer: {{by: 0.02}}'])
     altered = Pipeline(load_scene(file)).closures[0].linkage
     assert altered.links['crank']['A'] == (0.06, 0.0)
 
 
 def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
-    mine = package(soft=HEAD + YIELD)
+    mine = package(soft=YIELD)
     rigid = joints(scene_file(tmp_path, ['velocity: {}']))
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
     (linkage,) = pipeline.linkages
-    assert linkage.effect_names == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
+    assert tuple(linkage.wanted.effects) == (
+        'velocity',
+        'acceleration',
+        'pin_forces',
+        f'{mine}.soft',
+    )
     (look,) = pipeline.tick(0).states
     assert look.reading.rates == ()
     assert pipeline.extras == []
@@ -212,13 +225,12 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
 
 
 def test_it_may_publish_a_message_of_its_own(tmp_path, package):
-    mine = package(tell=HEAD + TELL)
+    mine = package(tell=TELL)
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.tell: {{}}'])))
     assert [extra.topic for extra in pipeline.extras] == ['~/mine']
     assert pipeline.tick(3 * SECOND + 7).extras == (time_message(3 * SECOND + 7),)
 
 
-NO_TOPIC = TELL.replace("TOPIC, MESSAGE = '~/mine', 'builtin_interfaces/msg/Time'", '')
 REFUSED = {
     'syntax': ('def', 'cannot be imported: SyntaxError: '),
     'what it imports is not there': (
@@ -229,40 +241,51 @@ REFUSED = {
         ),
     ),
     'it ends the interpreter': ('raise SystemExit(3)', "cannot be imported: SystemExit: '3'"),
-    'no parameters': (ADD, 'has no PARAMETERS; name a frozen dataclass whose fields'),
-    'parameters of another kind': (
-        'from dataclasses import dataclass\n@dataclass\nclass PARAMETERS:\n    by: float = 1.0\n'
-        + ADD,
-        'has no PARAMETERS',
+    'no effect': (HEAD.partition('@')[0], 'defines no effect; derive a class from one of Linkage'),
+    'two effects': (
+        ADD + ADD.replace('Mine', 'Other'),
+        'defines the effects Mine and Other; leave one, and give each of the others a module',
     ),
-    'no function': (
-        HEAD + "AFTER = 'bias'\n",
-        f'does nothing; define one of {", ".join(FUNCTIONS)}',
+    'no dataclass': (
+        ADD.replace('@dataclass(frozen=True, slots=True)', ''),
+        'Mine is not a dataclass of parameters; write @dataclass(frozen=True, slots=True) before',
+    ),
+    'parameters of another kind': (
+        ADD.replace("number('how much', 1.0, unit='rad', least=-10.0, most=10.0)", '1.0'),
+        'Mine is not a dataclass of parameters',
+    ),
+    'no method': (
+        HEAD.replace('BASE', 'SensorEffect') + "    after = 'bias'\n",
+        'Mine does nothing; define sensor',
+    ),
+    'no place in the tick': (
+        HEAD.replace('BASE', 'Effect') + "    after = 'bias'\n",
+        'Mine does nothing; derive it from one of LinkageEffect, DriveEffect, MechanismEffect',
     ),
     'a place that is none': (
-        HEAD + ADD.replace("'bias'", "'bais'"),
-        "AFTER is 'bais': that is not an effect; did you mean 'bias'?",
+        ADD.replace("'bias'", "'bais'"),
+        "after is 'bais': that is not an effect; did you mean 'bias'?",
     ),
-    'no place': (HEAD + ADD.replace('AFTER', 'BEHIND'), 'does not say AFTER which'),
+    'no place': (ADD.replace('after', 'behind'), 'does not say after which'),
     'behind the last': (
-        HEAD + ADD.replace("'bias'", "'delay'"),
-        "AFTER is 'delay', and delay is the last sensor; set AFTER = 'dropout'",
+        ADD.replace("'bias'", "'delay'"),
+        "after is 'delay', and delay is the last sensor; set after = 'dropout'",
     ),
     'before what it starts from': (
-        HEAD + YIELD.replace("AFTER = 'pin_forces'", "AFTER = 'velocity'"),
-        "starts from pin_forces and acts before it; set AFTER = 'pin_forces'",
+        YIELD.replace("after = 'pin_forces'", "after = 'velocity'"),
+        "starts from pin_forces and acts before it; set after = 'pin_forces'",
     ),
     'a need that is none': (
-        HEAD + YIELD.replace("('pin_forces',)", "('noise',)"),
-        "NEEDS 'noise'; name some of velocity, acceleration, effort, pin_forces",
+        YIELD.replace("('pin_forces',)", "('noise',)"),
+        "needs 'noise'; name some of velocity, acceleration, effort, pin_forces",
     ),
     'a message without a topic': (
-        HEAD + NO_TOPIC,
-        'has writer alone; TOPIC, MESSAGE and writer(parameters, context) go together',
+        TELL.replace(TOPIC, ''),
+        "Mine publishes a message without topic or type; write topic = '~/name' and message = 'pa",
     ),
     'a topic that is not its own': (
-        HEAD + TELL.replace('~/mine', '/joint_states'),
-        "has the TOPIC '/joint_states'; write one of the node's own: '~/name'",
+        TELL.replace('~/mine', '/joint_states'),
+        "has the topic '/joint_states'; write one of the node's own: '~/name'",
     ),
 }
 
@@ -300,13 +323,13 @@ def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
     ],
 )
 def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, line, said):
-    mine = package(add=HEAD + ADD)
+    mine = package(add=ADD)
     file = scene_file(tmp_path, ['velocity: {}', line.replace('MINE', mine)])
     assert refusal(file).startswith(f'{file}:5: {said.replace("MINE", mine)}')
 
 
 def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, package):
-    mine = package(add=HEAD + ADD)
+    mine = package(add=ADD)
     file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}', 'biass: {}', f'{mine}.other: 3'])
     wrong = find_violations(read_yaml(file)[0], scene_schema())
     assert [error.key for error in wrong] == ['effects.biass', f'effects.{mine}.other']
@@ -331,7 +354,7 @@ def test_a_scene_without_one_does_not_import_what_looks_for_them():
     ],
 )
 def test_a_run_says_which_module_it_was(tmp_path, package, where, line, expected):
-    code = {'effect': HEAD + ADD, '__init__': ''}
+    code = {'effect': ADD, '__init__': ''}
     mine = package(**{name: text + line * (name == where) for name, text in code.items()})
     file = scene_file(tmp_path, [f'{mine}.effect: {{}}', 'bias: {joints: {rocker_joint: 1}}'])
     digest = sha256((tmp_path / mine / 'effect.py').read_bytes()).hexdigest()[:16]
@@ -351,7 +374,7 @@ def crank_bag(folder):
 
 
 def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
-    mine, folder = package(add=HEAD + ADD), tmp_path / 'elsewhere'
+    mine, folder = package(add=ADD), tmp_path / 'elsewhere'
     folder.mkdir()
     scene_file(folder, []).write_text(f'linkage: linkage.yaml\neffects: {{{mine}.add: {{}}}}\n')
     crank_bag(folder / 'crank')
@@ -371,7 +394,7 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
         'add its folder to PYTHONPATH, or source its workspace\n'
     )
     # Of another size too: what Python has compiled it takes again within the same second.
-    file.write_text(file.read_text().replace('+ parameters', '- 1.0 * parameters'))
+    file.write_text(file.read_text().replace('+ self', '- 1.0 * self'))
     now = sha256(file.read_bytes()).hexdigest()[:16]
     changed = linkage(folder, *trusting, '--json', PYTHONPATH=str(tmp_path))
     account = json.loads(changed.stdout)
@@ -383,7 +406,7 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
 
 def test_the_node_writes_it_into_its_bag(tmp_path, package):
     run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
-    mine = package(add=HEAD + ADD)
+    mine = package(add=ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
     files = run_recording._make_attachments(scene, [], 'with the run', tmp_path)
     assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

@@ -13,15 +13,12 @@ from math import floor, tau
 
 from hypothesis import given, strategies as st
 from linkage_ros.stages.effects import (
-    delay,
-    DelayParameters,
-    dropout,
-    DropoutParameters,
+    DelayEffect,
+    DropoutEffect,
     JointDelay,
     JointDropout,
     JointRateLimit,
-    rate_limit,
-    RateLimitParameters,
+    RateLimitEffect,
 )
 import pytest
 
@@ -29,19 +26,19 @@ from .sensors import BEGIN, context, likely, MS, published, reading
 
 
 def limited(rate, own, **parameters):
-    use = RateLimitParameters(rate, joints={'rocker_joint': JointRateLimit(**own)}, **parameters)
-    return rate_limit.sensor(use, context())
+    use = RateLimitEffect(rate, joints={'rocker_joint': JointRateLimit(**own)}, **parameters)
+    return use.sensor(context())
 
 
 def delayed(seconds, own, **parameters):
-    use = DelayParameters(seconds, joints={'rocker_joint': JointDelay(**own)}, **parameters)
-    return delay.sensor(use, context())
+    use = DelayEffect(seconds, joints={'rocker_joint': JointDelay(**own)}, **parameters)
+    return use.sensor(context())
 
 
 def lossy(probability, joints, seed='seed', **parameters):
     own = {joint: JointDropout(*each) for joint, each in joints.items()}
-    use = DropoutParameters(probability, joints=own, **parameters)
-    return dropout.sensor(use, context(seed=seed))
+    use = DropoutEffect(probability, joints=own, **parameters)
+    return use.sensor(context(seed=seed))
 
 
 def values(found):
@@ -255,7 +252,7 @@ def test_a_joint_that_is_silent_is_so_for_its_delay():
 
 def test_one_more_joint_changes_no_other():
     alone, _ = losses(lossy(0.1, {'rocker_joint': (0.3,)}), 500)
-    whole = dropout.sensor(DropoutParameters(0.1), context())
+    whole = DropoutEffect(0.1).sensor(context())
     told = [whole(BEGIN, reading(BEGIN, n, n)) is None for n in range(500)]
     # Before the rocker's first reading nothing is published.
     first = alone.index(False)

@@ -13,7 +13,7 @@ from cmath import rect
 from hypothesis import given, strategies as st
 from linkage_ros.description import parse_scene
 from linkage_ros.kinematics import Status
-from linkage_ros.stages.effects import MechanismState, pin_forces, SensorReading
+from linkage_ros.stages.effects import MechanismState, PinForcesEffect, SensorReading
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -60,7 +60,7 @@ def test_at_a_toggle_there_are_none_and_no_message():
     assert motion.position.status is Status.TOGGLE
     assert motion.reactions == ()
     reading = SensorReading(7, motion.position.joints, (), (), ())
-    assert pin_forces.writer(pin_forces.PARAMETERS(), within)(9, motion, reading) == b''
+    assert PinForcesEffect().writer(within)(9, motion, reading) == b''
 
 
 def test_where_the_balance_has_no_solution_there_are_none():
@@ -72,7 +72,7 @@ def test_where_the_balance_has_no_solution_there_are_none():
 def test_the_rest_of_the_motion_is_passed_on():
     within = context(FOUR_BAR)
     before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(deflection=(0.5, 0.5))
-    found = pin_forces.stage(pin_forces.PARAMETERS(), within)(before)
+    found = PinForcesEffect().stage(within)(before)
     assert found == before._replace(reactions=found.reactions)
     assert isinstance(found, MechanismState)
     assert len(found.reactions) == 4

@@ -12,14 +12,14 @@ from fractions import Fraction
 from math import floor
 
 from hypothesis import given, strategies as st
-from linkage_ros.stages.effects import rate_limit, RateLimitParameters
+from linkage_ros.stages.effects import RateLimitEffect
 import pytest
 
 from .sensors import BEGIN, context, MS, published, reading
 
 
 def limited(rate, hold='repeat'):
-    return rate_limit.sensor(RateLimitParameters(rate, hold=hold), context())
+    return RateLimitEffect(rate, hold=hold).sensor(context())
 
 
 def sampled_at(rate, times):
@@ -101,7 +101,7 @@ def test_a_scene_holds_readings_or_is_silent_between_samples():
 
 def test_a_sensor_begins_when_its_own_first_sample_is_due():
     # 100 samples a second from 3.5 ms on; ticks each ms. Before there is nothing to read.
-    sensor = rate_limit.sensor(RateLimitParameters(100.0, phase=0.0035), context())
+    sensor = RateLimitEffect(100.0, phase=0.0035).sensor(context())
     found = [sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, ms)) for ms in range(30)]
     assert found[:4] == [None] * 4
     assert [each.joints[0] for each in found[4:]] == [4] * 10 + [14] * 10 + [24] * 6
@@ -109,7 +109,7 @@ def test_a_sensor_begins_when_its_own_first_sample_is_due():
 
 @given(st.floats(-1000.0, 1000.0), st.integers(1, 10**9))
 def test_a_clock_that_runs_fast_is_as_fast_to_the_nanosecond(ppm, k):
-    sensor = rate_limit.sensor(RateLimitParameters(250.0, ppm=ppm), context())
+    sensor = RateLimitEffect(250.0, ppm=ppm).sensor(context())
     rate = Fraction(250) * (1 + Fraction(ppm) / 10**6)
     due = floor(k * Fraction(10**9) / rate + Fraction(1, 2))
     before = floor((k - 1) * Fraction(10**9) / rate + Fraction(1, 2))

@@ -16,7 +16,7 @@ from random import Random
 
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure
-from linkage_ros.stages.effects import alter, tolerance, ToleranceParameters
+from linkage_ros.stages.effects import BEFORE, ToleranceEffect
 import mpmath
 import pytest
 
@@ -27,7 +27,7 @@ FOUR_BAR = linkage_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
 
 
 def made(parameters, seed='seed', drawn=FOUR_BAR):
-    return alter(parameters, drawn, Random(seed))
+    return parameters.alter(drawn, Random(seed))
 
 
 def deviations(altered, drawn=FOUR_BAR):
@@ -42,17 +42,17 @@ def deviations(altered, drawn=FOUR_BAR):
 
 
 def test_the_same_seed_makes_the_same_linkage_and_another_one_another():
-    parameters = ToleranceParameters(1e-4)
+    parameters = ToleranceEffect(1e-4)
     assert made(parameters) == made(parameters)
     assert made(parameters, 'other') != made(parameters)
 
 
 def test_every_point_deviates_those_of_the_ground_too():
-    assert all(dx and dy for dx, dy in deviations(made(ToleranceParameters(1e-4))).values())
+    assert all(dx and dy for dx, dy in deviations(made(ToleranceEffect(1e-4))).values())
 
 
 def test_nothing_else_than_the_points_changes():
-    altered = made(ToleranceParameters(1e-4))
+    altered = made(ToleranceEffect(1e-4))
     for name in FOUR_BAR.__slots__:
         assert (getattr(altered, name) == getattr(FOUR_BAR, name)) is (
             name not in ('links', 'nominal')
@@ -62,7 +62,7 @@ def test_nothing_else_than_the_points_changes():
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_without_a_deviation_the_linkage_is_the_drawn_one(file):
     drawn = linkage_of(file.read_bytes())
-    assert made(ToleranceParameters(), drawn=drawn) == drawn
+    assert made(ToleranceEffect(), drawn=drawn) == drawn
 
 
 def left_of(before):
@@ -77,7 +77,7 @@ def left_of(before):
 
 
 def test_what_is_cut_off_has_the_standard_deviation_that_is_written():
-    square, _ = left_of(tolerance.BEFORE)
+    square, _ = left_of(BEFORE)
     assert abs(square - 1) < 1e-15
 
 
@@ -86,14 +86,14 @@ def test_what_comes_out_is_normal_within_three_times_its_standard_deviation():
     values = sorted(
         value / sigma
         for seed in range(5000)
-        for pair in deviations(made(ToleranceParameters(sigma), str(seed))).values()
+        for pair in deviations(made(ToleranceEffect(sigma), str(seed))).values()
         for value in pair
     )
     n = len(values)
     assert n == 80_000
     assert 2.9 < max(map(abs, values)) <= 3.0 + 1e-9
     # Kolmogorov and Smirnov: beyond 1.95/√n in one of a thousand samples.
-    wide = tolerance.BEFORE * sqrt(2.0)
+    wide = BEFORE * sqrt(2.0)
     inside = erf(3.0 / wide)
     distance = max(
         abs(0.5 * (1.0 + erf(v / wide) / inside) - (i + 0.5) / n) for i, v in enumerate(values)
@@ -101,7 +101,7 @@ def test_what_comes_out_is_normal_within_three_times_its_standard_deviation():
     assert distance < 1.95 / sqrt(n)
     # The variance is the one that is written. Four times the standard deviation of its estimate is
     # 0.018; cut off without more it would be 0.973.
-    _, fourth = left_of(tolerance.BEFORE)
+    _, fourth = left_of(BEFORE)
     error = 4.0 * sqrt((float(fourth) - 1.0) / n)
     assert error < 0.02
     assert sum(v * v for v in values) / n == pytest.approx(1.0, abs=error)
@@ -111,7 +111,7 @@ def test_a_length_deviates_by_the_root_of_two():
     sigma = 1e-5
     off = []
     for seed in range(2000):
-        coupler = made(ToleranceParameters(sigma), str(seed)).links['coupler']
+        coupler = made(ToleranceEffect(sigma), str(seed)).links['coupler']
         off.append(hypot(*(b - a for a, b in zip(*coupler.values(), strict=True))) - 0.12)
     found = sum(value * value for value in off) / len(off) / (2.0 * sigma**2)
     # The variance of a variance is below 2/n here; four times its root.
@@ -119,30 +119,30 @@ def test_a_length_deviates_by_the_root_of_two():
 
 
 def test_twice_the_deviation_is_the_same_mechanism_twice_as_badly_made():
-    one, two = (deviations(made(ToleranceParameters(s))) for s in (1e-4, 2e-4))
+    one, two = (deviations(made(ToleranceEffect(s))) for s in (1e-4, 2e-4))
     for point, pair in one.items():
         assert two[point] == pytest.approx([2.0 * value for value in pair], abs=1e-16)
 
 
 def test_links_that_are_not_named_stay_and_those_that_are_draw_what_they_drew():
-    every = made(ToleranceParameters(1e-4))
-    some = made(ToleranceParameters(1e-4, links=('rocker', 'ground')))
+    every = made(ToleranceEffect(1e-4))
+    some = made(ToleranceEffect(1e-4, links=('rocker', 'ground')))
     for link in FOUR_BAR.links:
         deviating = link in ('rocker', 'ground')
         assert some.links[link] == (every if deviating else FOUR_BAR).links[link]
 
 
 def test_what_is_given_takes_the_place_of_what_is_drawn():
-    every = deviations(made(ToleranceParameters(1e-4)))
+    every = deviations(made(ToleranceEffect(1e-4)))
     given = {'coupler.B': (1e-4, 0.0), 'ground.O4': (0.0, -2e-4)}
-    some = deviations(made(ToleranceParameters(1e-4, given=given)))
+    some = deviations(made(ToleranceEffect(1e-4, given=given)))
     for point, pair in every.items():
         assert some[point] == pytest.approx(given.get(point, pair), abs=1e-16)
 
 
 def test_given_lengths_are_those_of_a_linkage_written_so():
     # The coupler 0.1 mm longer, the ground 0.2 mm shorter.
-    altered = made(ToleranceParameters(given={'coupler.B': (1e-4, 0), 'ground.O4': (-2e-4, 0)}))
+    altered = made(ToleranceEffect(given={'coupler.B': (1e-4, 0), 'ground.O4': (-2e-4, 0)}))
     written = linkage_of('four_bar: {a: 0.04, b: 0.1201, c: 0.08, d: 0.0998}')
     for crank in (0.0, 1.0, 2.5, 4.0):
         found, expected = (Closure(each).position(crank).joints for each in (altered, written))
@@ -151,7 +151,7 @@ def test_given_lengths_are_those_of_a_linkage_written_so():
 
 def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
     # The rocker's frame stays that of the drawing: its pin lies 1 mm to the left of its axis.
-    altered = made(ToleranceParameters(given={'rocker.B': (0.0, 1e-3)}))
+    altered = made(ToleranceEffect(given={'rocker.B': (0.0, 1e-3)}))
     straight = linkage_of(f'four_bar: {{a: 0.04, b: 0.12, c: {hypot(0.08, 1e-3)!r}, d: 0.1}}')
     coupler, rocker = Closure(altered).position(1.0).joints
     expected_coupler, expected_rocker = Closure(straight).position(1.0).joints
@@ -162,7 +162,7 @@ def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
     drawn = linkage_of(file.read_bytes())
-    closure = Closure(made(ToleranceParameters(1e-6), drawn=drawn))
+    closure = Closure(made(ToleranceEffect(1e-6), drawn=drawn))
     if len(drawn.inputs) > 1:
         inputs = (1.5,) * len(drawn.inputs)
     else:
@@ -178,7 +178,7 @@ def test_a_parallelogram_as_it_was_made_is_none_any_more():
     drawn = linkage_of('four_bar: {a: 0.3, b: 1.6, c: 0.3, d: 1.6}')
     follower = [Closure(drawn).position(pi * i / 50).joints[1] for i in range(101)]
     assert all(b > a for a, b in pairwise(follower[:50]))
-    altered = Closure(made(ToleranceParameters(given={'coupler.B': (1e-3, 0.0)}), drawn=drawn))
+    altered = Closure(made(ToleranceEffect(given={'coupler.B': (1e-3, 0.0)}), drawn=drawn))
     gaps = [altered.position(pi * i / 1000).gap for i in range(2001)]
     assert max(gaps) > 0.0
 
@@ -186,8 +186,8 @@ def test_a_parallelogram_as_it_was_made_is_none_any_more():
 @pytest.mark.parametrize(
     ('parameters', 'reason'),
     [
-        (ToleranceParameters(given={'coupler.B': (0.2, 0.0)}), 'at no value of the input'),
-        (ToleranceParameters(given={'coupler.B': (-0.12, 0.0)}), r"links.coupler.B: lies on 'A'"),
+        (ToleranceEffect(given={'coupler.B': (0.2, 0.0)}), 'at no value of the input'),
+        (ToleranceEffect(given={'coupler.B': (-0.12, 0.0)}), r"links.coupler.B: lies on 'A'"),
     ],
 )
 def test_what_does_not_close_any_more_is_refused(parameters, reason):

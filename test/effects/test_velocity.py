@@ -13,7 +13,7 @@ from math import isfinite, remainder, tau
 from hypothesis import given, strategies as st
 from linkage_ros.kinematics import Status
 from linkage_ros.stages.drives import Context, CrankState
-from linkage_ros.stages.effects import MechanismState, velocity
+from linkage_ros.stages.effects import MechanismState, VelocityEffect
 import pytest
 
 from .sensors import ANGLES, SLIDE
@@ -28,7 +28,7 @@ def moved(loop, angle, rate):
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (0.0,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    stage = velocity.stage(velocity.VelocityParameters(), context)
+    stage = VelocityEffect().stage(context)
     return stage(MechanismState(crank, position, None, None, (), (), ()))
 
 

@@ -12,7 +12,7 @@ from math import isnan
 
 from linkage_ros.kinematics import Status
 from linkage_ros.messages import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.stages.faults import Fault, FaultChange, Freeze, Injection
+from linkage_ros.stages.faults import FaultChange, FaultEntry, Freeze, Injection
 from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
@@ -153,7 +153,7 @@ def test_windows_that_touch_are_two():
     ],
 )
 def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
-    injection = Injection({'hang': Fault('freeze', Freeze(), tuple(at), seconds)})
+    injection = Injection({'hang': FaultEntry('freeze', Freeze(), tuple(at), seconds)})
     seen = []
     for ms in range(15):
         injection.advance(BEGIN + ms * MS)

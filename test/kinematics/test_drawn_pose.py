@@ -34,7 +34,7 @@ from linkage_ros.kinematics import (
     sides_at,
     Slider,
 )
-from linkage_ros.stages.effects import alter, ToleranceParameters
+from linkage_ros.stages.effects import ToleranceEffect
 import pytest
 
 from .linkages import four_bar_linkage
@@ -423,7 +423,7 @@ def test_a_changed_length_stays_on_the_branch_through_change_points(name, side, 
 @pytest.mark.parametrize('seed', range(10))
 def test_tolerance_leaves_the_linkage_on_its_branch(name, seed):
     linkage = four_bar_linkage(FAMILIES[name], 'left')
-    made = Closure(alter(ToleranceParameters(1e-5), linkage, random.Random(seed)))
+    made = Closure(ToleranceEffect(1e-5).alter(linkage, random.Random(seed)))
     for at, angles in ONCE[name, 1].items():
         coupler, rocker = made.position(at).joints
         assert max(off(coupler + at, angles[0]), off(rocker, angles[1])) < radians(0.2)

@@ -15,7 +15,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics import RevoluteJoint, SlideJoint, Status
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.stages.drives import ConstantRateParameters, TopicParameters
-from linkage_ros.stages.effects import VelocityParameters
+from linkage_ros.stages.effects import VelocityEffect
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -98,7 +98,7 @@ record: {directory: bags, name: first, queue: 1000}
         'topic',
         TopicParameters(carry_forward=False, max_age=0.5, max_lead=0.0),
     )
-    assert scene_linkage.effects == {'velocity': VelocityParameters()}
+    assert scene_linkage.effects == {'velocity': VelocityEffect()}
     assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
 
 

@@ -12,56 +12,82 @@ from linkage_ros.stages.effects.angle_unwrap import (
     wrap_all as wrap_all,
     wrap_angle as wrap_angle,
 )
-from linkage_ros.stages.effects.backlash import BacklashParameters as BacklashParameters
+from linkage_ros.stages.effects.backlash import (
+    BacklashEffect as BacklashEffect,
+)
 from linkage_ros.stages.effects.bias import (
-    BiasParameters as BiasParameters,
+    BiasEffect as BiasEffect,
     EccentricDisc as EccentricDisc,
 )
-from linkage_ros.stages.effects.clearance import ClearanceParameters as ClearanceParameters
-from linkage_ros.stages.effects.compliance import ComplianceParameters as ComplianceParameters
+from linkage_ros.stages.effects.deflections import (
+    ClearanceEffect as ClearanceEffect,
+    ComplianceEffect as ComplianceEffect,
+)
 from linkage_ros.stages.effects.delay import (
     Delay as Delay,
-    DelayParameters as DelayParameters,
+    DelayEffect as DelayEffect,
     JointDelay as JointDelay,
 )
-from linkage_ros.stages.effects.dispatch import (
-    Effect as Effect,
-    effect_of as effect_of,
-    effects_requiring as effects_requiring,
-    in_order as in_order,
-    module_of as module_of,
-    needed_effects as needed_effects,
+from linkage_ros.stages.effects.derivatives import (
+    AccelerationEffect as AccelerationEffect,
+    VelocityEffect as VelocityEffect,
 )
 from linkage_ros.stages.effects.dropout import (
-    DropoutParameters as DropoutParameters,
+    DropoutEffect as DropoutEffect,
     JointDropout as JointDropout,
 )
+from linkage_ros.stages.effects.effect import (
+    BASES as BASES,
+    DriveEffect as DriveEffect,
+    Effect as Effect,
+    EFFECTS as EFFECTS,
+    ForceEffect as ForceEffect,
+    LinkageEffect as LinkageEffect,
+    MechanismEffect as MechanismEffect,
+    MessageEffect as MessageEffect,
+    SensorEffect as SensorEffect,
+)
 from linkage_ros.stages.effects.encoder import (
-    EncoderParameters as EncoderParameters,
+    EncoderEffect as EncoderEffect,
     JointEncoder as JointEncoder,
 )
-from linkage_ros.stages.effects.friction import FrictionParameters as FrictionParameters
-from linkage_ros.stages.effects.history import History as History
-from linkage_ros.stages.effects.jitter import JitterParameters as JitterParameters
-from linkage_ros.stages.effects.markers import MESSAGE as MESSAGE
+from linkage_ros.stages.effects.forces import (
+    EffortEffect as EffortEffect,
+    PinForcesEffect as PinForcesEffect,
+)
+from linkage_ros.stages.effects.friction import (
+    FrictionEffect as FrictionEffect,
+)
+from linkage_ros.stages.effects.history import (
+    History as History,
+)
+from linkage_ros.stages.effects.jitter import (
+    JitterEffect as JitterEffect,
+)
+from linkage_ros.stages.effects.markers import (
+    MarkersEffect as MarkersEffect,
+)
 from linkage_ros.stages.effects.measuring_range import (
     JointRange as JointRange,
-    MeasuringRangeParameters as MeasuringRangeParameters,
+    MeasuringRangeEffect as MeasuringRangeEffect,
 )
 from linkage_ros.stages.effects.noise import (
     JointNoise as JointNoise,
-    NoiseParameters as NoiseParameters,
+    NoiseEffect as NoiseEffect,
 )
 from linkage_ros.stages.effects.rate_limit import (
     JointRateLimit as JointRateLimit,
-    RateLimitParameters as RateLimitParameters,
+    RateLimitEffect as RateLimitEffect,
+)
+from linkage_ros.stages.effects.registry import (
+    effect_class as effect_class,
+    effects_requiring as effects_requiring,
+    force_effects as force_effects,
+    in_order as in_order,
+    needed_effects as needed_effects,
 )
 from linkage_ros.stages.effects.stage import (
-    EFFECTS as EFFECTS,
-    FORCE_EFFECTS as FORCE_EFFECTS,
     MechanismState as MechanismState,
-    NEEDS as NEEDS,
-    PUBLISHED_WITH as PUBLISHED_WITH,
     restamp as restamp,
     Sensor as Sensor,
     SensorReading as SensorReading,
@@ -69,12 +95,10 @@ from linkage_ros.stages.effects.stage import (
     WriterStage as WriterStage,
 )
 from linkage_ros.stages.effects.tolerance import (
-    alter as alter,
-    ToleranceParameters as ToleranceParameters,
+    BEFORE as BEFORE,
+    ToleranceEffect as ToleranceEffect,
 )
 from linkage_ros.stages.effects.user_effects import (
     effect_version as effect_version,
     found_in as found_in,
-    FUNCTIONS as FUNCTIONS,
 )
-from linkage_ros.stages.effects.velocity import VelocityParameters as VelocityParameters

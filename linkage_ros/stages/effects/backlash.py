@@ -37,16 +37,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, tau
+from typing import ClassVar
 
 from linkage_ros.description import each_part, Number, number
 from linkage_ros.stages.drives import Context, CrankBehindPlay, CrankState
+from linkage_ros.stages.effects.effect import DriveEffect
 from linkage_ros.stages.effects.stage import DriveStage
 
 _LARGEST = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class BacklashParameters:
+class BacklashEffect(DriveEffect):
     """Play between motor and crank: the crank rests until the motor has crossed the play."""
 
     play: float = number(
@@ -58,33 +60,38 @@ class BacklashParameters:
         Number('from one end to the other', 'rad or m', least=0.0, most=_LARGEST),
     )
 
-
-PARAMETERS = BacklashParameters
-
-
-def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
-    """Build the stage; it stores the positions of the cranks."""
-    linkage = context.closure.linkage
-    plays = tuple(
-        Play(parameters.inputs.get(given.joint, parameters.play), turns=not given.slider)
-        for given in linkage.inputs
-    )
-
-    def backlash(motor: CrankState) -> CrankState:
-        angles, rates, accelerations, free_motors = zip(
-            *[
-                play.follow_motor(*of_one)
-                for play, *of_one in zip(
-                    plays, motor.angles, motor.rates, motor.accelerations, strict=True
-                )
-            ],
-            strict=True,
+    runs_in_gaps = True
+    refused_drives: ClassVar = {
+        'torque': (
+            'is play without masses, and torque moves masses',
+            'write drive.torque.play: {width: …, inertia: …} instead',
         )
-        crank = CrankBehindPlay(angles, rates, accelerations, motor.age)
-        crank.free_motors = free_motors
-        return crank
+    }
+    sample = '{play: 0.01}'
 
-    return backlash
+    def drive_stage(self, context: Context) -> DriveStage:
+        """Build the stage; it stores the positions of the cranks."""
+        linkage = context.closure.linkage
+        plays = tuple(
+            Play(self.inputs.get(given.joint, self.play), turns=not given.slider)
+            for given in linkage.inputs
+        )
+
+        def backlash(motor: CrankState) -> CrankState:
+            angles, rates, accelerations, free_motors = zip(
+                *[
+                    play.follow_motor(*of_one)
+                    for play, *of_one in zip(
+                        plays, motor.angles, motor.rates, motor.accelerations, strict=True
+                    )
+                ],
+                strict=True,
+            )
+            crank = CrankBehindPlay(angles, rates, accelerations, motor.age)
+            crank.free_motors = free_motors
+            return crank
+
+        return backlash
 
 
 class Play:

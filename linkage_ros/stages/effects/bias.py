@@ -35,6 +35,7 @@ from operator import add
 from linkage_ros.description import each_part, Number, number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _Systematic = tuple[int, float, float, float]
@@ -50,7 +51,7 @@ class EccentricDisc:
 
 
 @dataclass(frozen=True, slots=True)
-class BiasParameters:
+class BiasEffect(SensorEffect):
     """Systematic errors of measured joints: of the zero, of the scale, and once a turn."""
 
     joints: Mapping[str, float] = each_part(
@@ -82,56 +83,54 @@ class BiasParameters:
         'eccentric disc of a joint', 'joint', EccentricDisc
     )
 
+    sample = '{joints: {rocker_joint: 0.01}}'
 
-PARAMETERS = BiasParameters
-
-
-def sensor(parameters: BiasParameters, context: Context) -> Sensor:
-    """Build the sensor; raise `DefinitionError` if there is no error, or if a slide has a disc."""
-    if parameters == BiasParameters():
-        raise DefinitionError(
-            'effects.bias', 'names no joint', 'write joints: {JOINT: 0.01}, or leave it out'
-        )
-    disc, joints = EccentricDisc(0.0), context.joints
-    for joint, turns in zip(joints, context.closure.turning, strict=True):
-        if joint in parameters.eccentricities and not turns:
+    def sensor(self, context: Context) -> Sensor:
+        """Build the sensor; raise `DefinitionError` for no error, or the disc of a slide."""
+        if self == BiasEffect():
             raise DefinitionError(
-                f'effects.bias.eccentricities.{joint}',
-                'is a slide and has no disc',
-                'leave it out',
+                'effects.bias', 'names no joint', 'write joints: {JOINT: 0.01}, or leave it out'
             )
-    zeros = tuple(
-        parameters.joints.get(joint, 0.0)
-        + (
-            context.random(f'bias/{joint}').gauss(0.0, parameters.deviations[joint])
-            if joint in parameters.deviations
-            else 0.0
+        disc, joints = EccentricDisc(0.0), context.joints
+        for joint, turns in zip(joints, context.closure.turning, strict=True):
+            if joint in self.eccentricities and not turns:
+                raise DefinitionError(
+                    f'effects.bias.eccentricities.{joint}',
+                    'is a slide and has no disc',
+                    'leave it out',
+                )
+        zeros = tuple(
+            self.joints.get(joint, 0.0)
+            + (
+                context.random(f'bias/{joint}').gauss(0.0, self.deviations[joint])
+                if joint in self.deviations
+                else 0.0
+            )
+            for joint in joints
         )
-        for joint in joints
-    )
-    systematic: tuple[_Systematic, ...] = tuple(
-        (i, parameters.scales.get(joint, 0.0), found.amplitude, found.phase)
-        for i, joint in enumerate(joints)
-        if joint in parameters.scales or joint in parameters.eccentricities
-        for found in [parameters.eccentricities.get(joint, disc)]
-    )
-    of_rates = tuple(parameters.rates.get(joint, 0.0) for joint in joints)
-    of_efforts = tuple(parameters.efforts.get(joint, 0.0) for joint in joints)
-
-    def bias(_now: int, reading: SensorReading) -> SensorReading:
-        return reading._replace(joints=tuple(map(add, reading.joints, zeros)))
-
-    def every_bias(_now: int, reading: SensorReading) -> SensorReading:
-        values, rates, efforts = list(reading.joints), list(reading.rates), reading.efforts
-        for i, scale, amplitude, phase in systematic:
-            value = values[i]
-            values[i] += scale * value + amplitude * sin(value - phase)
-            if rates:
-                rates[i] *= 1.0 + scale + amplitude * cos(value - phase)
-        return reading._replace(
-            joints=tuple(map(add, values, zeros)),
-            rates=tuple(map(add, rates, of_rates)) if rates else (),
-            efforts=tuple(map(add, efforts, of_efforts)) if efforts else (),
+        systematic: tuple[_Systematic, ...] = tuple(
+            (i, self.scales.get(joint, 0.0), found.amplitude, found.phase)
+            for i, joint in enumerate(joints)
+            if joint in self.scales or joint in self.eccentricities
+            for found in [self.eccentricities.get(joint, disc)]
         )
+        of_rates = tuple(self.rates.get(joint, 0.0) for joint in joints)
+        of_efforts = tuple(self.efforts.get(joint, 0.0) for joint in joints)
 
-    return every_bias if systematic or any(of_rates) or any(of_efforts) else bias
+        def bias(_now: int, reading: SensorReading) -> SensorReading:
+            return reading._replace(joints=tuple(map(add, reading.joints, zeros)))
+
+        def every_bias(_now: int, reading: SensorReading) -> SensorReading:
+            values, rates, efforts = list(reading.joints), list(reading.rates), reading.efforts
+            for i, scale, amplitude, phase in systematic:
+                value = values[i]
+                values[i] += scale * value + amplitude * sin(value - phase)
+                if rates:
+                    rates[i] *= 1.0 + scale + amplitude * cos(value - phase)
+            return reading._replace(
+                joints=tuple(map(add, values, zeros)),
+                rates=tuple(map(add, rates, of_rates)) if rates else (),
+                efforts=tuple(map(add, efforts, of_efforts)) if efforts else (),
+            )
+
+        return every_bias if systematic or any(of_rates) or any(of_efforts) else bias

@@ -48,7 +48,7 @@ A joint under ``joints`` has its own line, with its own latency: see `own_sensor
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from random import Random
@@ -56,6 +56,7 @@ from random import Random
 from linkage_ros.description import choice, flag, number, own_parameters
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import Effect, SensorEffect
 from linkage_ros.stages.effects.history import History
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
@@ -94,7 +95,7 @@ class JointDelay:
 
 
 @dataclass(frozen=True, slots=True)
-class DelayParameters(JointDelay):
+class DelayEffect(JointDelay, SensorEffect):
     """Transport delay: readings arrive later."""
 
     stamp: str = choice(
@@ -104,55 +105,72 @@ class DelayParameters(JointDelay):
     )
     joints: Mapping[str, JointDelay] | None = own_parameters('own line of a joint', JointDelay)
 
+    needs = ('velocity',)
+    suppresses_ticks = True
+    sample = '{seconds: 0.002}'
+
     @property
     def delay_lines(self) -> tuple[JointDelay, ...]:
         """Return the line of the joints without their own one, and these."""
         return self, *(self.joints or {}).values()
 
+    @property
+    def is_recoverable(self) -> bool:
+        """Return whether no line has random latencies."""
+        return not any(line.is_random for line in self.delay_lines)
 
-PARAMETERS = DelayParameters
+    def needs_here(self, named: Collection[str], *, moves_by_rates: bool) -> tuple[str, ...]:
+        """Return `needs` if a line interpolates, and the crank moves by its rates."""
+        return self.needs if moves_by_rates and self.interpolates_readings(named) else ()
 
-
-def interpolates_readings(parameters: DelayParameters, named: Collection[str]) -> bool:
-    """Return whether a line interpolates readings, given the effects of the scene."""
-    between = {line.between for line in parameters.delay_lines if not line.is_random}
-    return 'interpolated' in between or (_AUTOMATIC in between and 'encoder' not in named)
-
-
-def sensor(parameters: DelayParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raise `DefinitionError` if readings of random latency are to be interpolated, or to overtake
-    without a spread, or if joints that were measured at several times are to have one stamp.
-    """
-    if parameters.joints is not None:
-        from linkage_ros.stages.effects.own_sensors import (
-            own_sensors,  # local import: only for joints
+    def refusal_beside(self, beside: Sequence[Effect | None]) -> DefinitionError | None:
+        """Return an error for measurement stamps that cannot share one message of linkages."""
+        if self.stamp != 'measured' or all(other == self for other in beside):
+            return None
+        return DefinitionError(
+            'effects.delay.stamp',
+            'measured gives a linkage its own stamp, and all linkages share one message',
+            'give all linkages the same delay, or write arrival',
         )
 
-        if parameters.stamp == 'measured':
-            raise DefinitionError(
-                'effects.delay.stamp',
-                'measured is one time, and joints with their own lines have several',
-                'write arrival, or leave joints out',
+    def interpolates_readings(self, named: Collection[str]) -> bool:
+        """Return whether a line interpolates readings, given the effects of the scene."""
+        between = {line.between for line in self.delay_lines if not line.is_random}
+        return 'interpolated' in between or (_AUTOMATIC in between and 'encoder' not in named)
+
+    def sensor(self, context: Context) -> Sensor:
+        """
+        Build the sensor.
+
+        Raise `DefinitionError` if readings of random latency are to be interpolated, or to
+        overtake without a spread, or if joints that were measured at several times are to have one
+        stamp.
+        """
+        if self.joints is not None:
+            from linkage_ros.stages.effects.own_sensors import (
+                own_sensors,  # local import: only for joints
             )
-        return own_sensors('delay', sensor, parameters, context)
-    if parameters.is_random and parameters.between == 'interpolated':
-        raise DefinitionError(
-            'effects.delay.between',
-            'interpolated takes one latency for all readings',
-            'leave it out, or spread and duplicates',
-        )
-    if parameters.reorder and not parameters.spread:
-        raise DefinitionError(
-            'effects.delay.reorder', 'nothing overtakes without a spread', 'write spread too'
-        )
-    if parameters.is_random:
-        return RandomDelay(parameters, context.random('delay'))
-    return Delay(
-        parameters, interpolates_readings(parameters, context.effects), context.moves_by_rates
-    )
+
+            if self.stamp == 'measured':
+                raise DefinitionError(
+                    'effects.delay.stamp',
+                    'measured is one time, and joints with their own lines have several',
+                    'write arrival, or leave joints out',
+                )
+            return own_sensors('delay', self, context)
+        if self.is_random and self.between == 'interpolated':
+            raise DefinitionError(
+                'effects.delay.between',
+                'interpolated takes one latency for all readings',
+                'leave it out, or spread and duplicates',
+            )
+        if self.reorder and not self.spread:
+            raise DefinitionError(
+                'effects.delay.reorder', 'nothing overtakes without a spread', 'write spread too'
+            )
+        if self.is_random:
+            return RandomDelay(self, context.random('delay'))
+        return Delay(self, self.interpolates_readings(context.effects), context.moves_by_rates)
 
 
 class Delay:
@@ -168,7 +186,7 @@ class Delay:
         'gap_begins',
     )  # fmt: skip
 
-    def __init__(self, use: DelayParameters, mixes: bool, with_rates: bool = True) -> None:
+    def __init__(self, use: DelayEffect, mixes: bool, with_rates: bool = True) -> None:
         self._delay = round(use.seconds * 1e9)
         self._history = History(self._delay, with_rates)
         self._look = self._history.arriving_reading if mixes else self._history.newest_reading
@@ -230,7 +248,7 @@ class RandomDelay:
     __slots__ = ('_count', '_delay', '_draw', '_duplicates', '_latest', '_measured', '_random',
                  '_reorder', '_way', 'gap_begins')  # fmt: skip
 
-    def __init__(self, use: DelayParameters, random: Random) -> None:
+    def __init__(self, use: DelayEffect, random: Random) -> None:
         self._delay, spread = round(use.seconds * 1e9), use.spread * 1e9
         self._random = random.random
         self._draw: Callable[[], int] = (

@@ -43,6 +43,7 @@ from random import Random
 from linkage_ros.description import choice, number, own_parameters
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 
@@ -61,7 +62,7 @@ class JointDropout:
 
 
 @dataclass(frozen=True, slots=True)
-class DropoutParameters(JointDropout):
+class DropoutEffect(JointDropout, SensorEffect):
     """Samples are lost, one by one or in bursts."""
 
     hold: str = choice(
@@ -71,17 +72,19 @@ class DropoutParameters(JointDropout):
     )
     joints: Mapping[str, JointDropout] | None = own_parameters('own line of a joint', JointDropout)
 
+    suppresses_ticks = True
+    is_recoverable = False
+    sample = '{probability: 0.1, burst: 3}'
 
-PARAMETERS = DropoutParameters
+    def sensor(self, context: Context) -> Sensor:
+        """Build the sensor; raise `DefinitionError` if the bursts are too short for the losses."""
+        if self.joints is None:
+            return Dropout(self, context.random('dropout'))
+        from linkage_ros.stages.effects.own_sensors import (
+            own_sensors,  # local import: only for joints
+        )
 
-
-def sensor(parameters: DropoutParameters, context: Context) -> Sensor:
-    """Build the sensor; raise `DefinitionError` if the bursts are too short for the losses."""
-    if parameters.joints is None:
-        return Dropout(parameters, context.random('dropout'))
-    from linkage_ros.stages.effects.own_sensors import own_sensors  # local import: only for joints
-
-    return own_sensors('dropout', sensor, parameters, context)
+        return own_sensors('dropout', self, context)
 
 
 def _loss_probabilities(loss: float, burst: float) -> tuple[float, float]:
@@ -126,7 +129,7 @@ class Dropout:
 
     __slots__ = ('_begins', '_chance', '_goes_on', '_last', '_random', '_repeat')
 
-    def __init__(self, use: DropoutParameters, random: Random) -> None:
+    def __init__(self, use: DropoutEffect, random: Random) -> None:
         self._begins, self._goes_on = _loss_probabilities(use.probability, use.burst)
         self._chance = use.probability
         self._repeat = use.hold == 'repeat'

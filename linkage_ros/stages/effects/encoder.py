@@ -52,6 +52,7 @@ from math import expm1, floor, tau
 from linkage_ros.description import choice, each_part, flag, number, whole_number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 
@@ -71,7 +72,7 @@ class JointEncoder:
 
 
 @dataclass(frozen=True, slots=True)
-class EncoderParameters:
+class EncoderEffect(SensorEffect):
     """Joints are read in whole counts."""
 
     joints: Mapping[str, JointEncoder] = each_part(
@@ -91,44 +92,47 @@ class EncoderParameters:
         most=1e6,
     )
 
+    sample = '{joints: {rocker_joint: {counts: 4096}}}'
 
-PARAMETERS = EncoderParameters
+    @property
+    def is_recoverable(self) -> bool:
+        """Return whether it neither counts from power-on nor has a low-pass."""
+        return not self.cutoff and not any(each.incremental for each in self.joints.values())
 
+    def sensor(self, context: Context) -> Sensor:
+        """
+        Build the sensor.
 
-def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
-
-    Raise `DefinitionError` if an absolute encoder has ``index: false``, or if a low-pass has no
-    differences to smooth.
-    """
-    if parameters.cutoff and parameters.rates == 'exact':
-        raise DefinitionError(
-            'effects.encoder.cutoff', 'smooths differences', 'leave it or rates: exact out'
-        )
-    counters = []
-    for place, (joint, turns) in enumerate(
-        zip(context.joints, context.closure.turning, strict=True)
-    ):
-        encoder = parameters.joints.get(joint)
-        if encoder is None:
-            continue
-        if not (encoder.index or encoder.incremental):
+        Raise `DefinitionError` if an absolute encoder has ``index: false``, or if a low-pass has
+        no differences to smooth.
+        """
+        if self.cutoff and self.rates == 'exact':
             raise DefinitionError(
-                f'effects.encoder.joints.{joint}.index',
-                'an absolute encoder needs no mark',
-                'leave it out, or write incremental: true',
+                'effects.encoder.cutoff', 'smooths differences', 'leave it or rates: exact out'
             )
-        if encoder.multi_turn and (encoder.incremental or not turns):
-            raise DefinitionError(
-                f'effects.encoder.joints.{joint}.multi_turn',
-                'an incremental encoder counts on and on'
-                if encoder.incremental
-                else f'{joint} is a slide and has no turns',
-                'leave it out',
-            )
-        counters.append((place, Counter(encoder, turns, parameters.cutoff)))
-    return Encoder(tuple(counters), parameters.rates == 'differenced')
+        counters = []
+        for place, (joint, turns) in enumerate(
+            zip(context.joints, context.closure.turning, strict=True)
+        ):
+            encoder = self.joints.get(joint)
+            if encoder is None:
+                continue
+            if not (encoder.index or encoder.incremental):
+                raise DefinitionError(
+                    f'effects.encoder.joints.{joint}.index',
+                    'an absolute encoder needs no mark',
+                    'leave it out, or write incremental: true',
+                )
+            if encoder.multi_turn and (encoder.incremental or not turns):
+                raise DefinitionError(
+                    f'effects.encoder.joints.{joint}.multi_turn',
+                    'an incremental encoder counts on and on'
+                    if encoder.incremental
+                    else f'{joint} is a slide and has no turns',
+                    'leave it out',
+                )
+            counters.append((place, Counter(encoder, turns, self.cutoff)))
+        return Encoder(tuple(counters), self.rates == 'differenced')
 
 
 class Counter:

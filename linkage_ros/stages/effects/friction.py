@@ -33,10 +33,11 @@ from dataclasses import dataclass
 
 from linkage_ros.description import each_part, flag
 from linkage_ros.dynamics import Friction, JointFriction
+from linkage_ros.stages.effects.effect import ForceEffect
 
 
 @dataclass(frozen=True, slots=True)
-class FrictionParameters:
+class FrictionEffect(ForceEffect):
     """Friction in pins and sliders, for all effects and drives that use forces."""
 
     joints: Mapping[str, JointFriction] = each_part(
@@ -47,10 +48,9 @@ class FrictionParameters:
         False,
     )
 
+    sample = '{joints: {O2: {coulomb: 0.01}}}'
+
     @property
     def friction(self) -> Friction:
         """Return the friction in the form that `Mechanics` takes."""
         return Friction(self.joints, self.holds)
-
-
-PARAMETERS = FrictionParameters

@@ -28,17 +28,19 @@ All instants are whole nanoseconds.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from random import Random
 
 from linkage_ros.description import choice, number
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.history import History
 from linkage_ros.stages.effects.stage import restamp, SensorReading
 
 
 @dataclass(frozen=True, slots=True)
-class JitterParameters:
+class JitterEffect(SensorEffect):
     """The sensor measures earlier than the stamp says, by a varying time."""
 
     seconds: float = number('longest time by which it is earlier', unit='s', least=0.0, most=1.0)
@@ -46,13 +48,18 @@ class JitterParameters:
         'of that time, between 0 and its maximum', ('uniform', 'half_normal'), 'uniform'
     )
 
+    needs = ('velocity',)
+    suppresses_ticks = True
+    is_recoverable = False
+    sample = '{seconds: 1.0e-4}'
 
-PARAMETERS = JitterParameters
+    def needs_here(self, _named: Collection[str], *, moves_by_rates: bool) -> tuple[str, ...]:
+        """Return `needs` if the crank moves by its rates between two readings."""
+        return self.needs if moves_by_rates else ()
 
-
-def sensor(parameters: JitterParameters, context: Context) -> Jitter:
-    """Build the sensor."""
-    return Jitter(parameters, context.random('jitter'), context.moves_by_rates)
+    def sensor(self, context: Context) -> Jitter:
+        """Build the sensor."""
+        return Jitter(self, context.random('jitter'), context.moves_by_rates)
 
 
 class Jitter:
@@ -64,7 +71,7 @@ class Jitter:
 
     __slots__ = ('_earlier', '_history', 'gap_begins')
 
-    def __init__(self, use: JitterParameters, random: Random, with_rates: bool) -> None:
+    def __init__(self, use: JitterEffect, random: Random, with_rates: bool) -> None:
         most = round(use.seconds * 1e9)
         self._history = History(most, with_rates)
         self.gap_begins = False

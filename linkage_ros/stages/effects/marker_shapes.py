@@ -317,7 +317,7 @@ class Arrows:
         self, points: Points, reactions: Sequence[tuple[float, float, float]]
     ) -> list[list[complex]]:
         """Return the arrow of each joint."""
-        if not reactions:
+        if not (self._joints and reactions):
             return [[] for _ in self._joints]
         drawn = []
         for at, (fx, fy, _) in zip(self._joints, reactions, strict=True):
@@ -336,7 +336,7 @@ class Arrows:
         efforts: Sequence[float],
     ) -> list[list[complex]]:
         """Return the effort arrow of each input: an arc about the pin, or a straight arrow."""
-        if not efforts:
+        if not (inputs and efforts):
             return [[] for _ in inputs]
         return [
             self._straight_arrow(given, points, angles, effort)

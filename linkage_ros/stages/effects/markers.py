@@ -36,17 +36,15 @@ from linkage_ros.description import number, text
 from linkage_ros.kinematics import GROUND, links_of, Position, Status, usual_inputs
 from linkage_ros.messages import DELETE, MarkerArrayWriter, NANOSECONDS
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import MessageEffect
 from linkage_ros.stages.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Writer
-
-TOPIC = '~/markers'
-MESSAGE = 'visualization_msgs/msg/MarkerArray'
 
 _LONGEST_TRAIL = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class MarkersParameters:
+class MarkersEffect(MessageEffect):
     """The linkage drawn for RViz and Foxglove, on ~/markers."""
 
     rate: float = number('messages a second, at most', 30.0, unit='Hz', least=0.01, most=1000.0)
@@ -75,13 +73,17 @@ class MarkersParameters:
         most=0.5 * pi,
     )
 
+    topic = '~/markers'
+    message = 'visualization_msgs/msg/MarkerArray'
 
-PARAMETERS = MarkersParameters
+    @property
+    def is_recoverable(self) -> bool:
+        """Return whether it draws no trail."""
+        return not self.trace
 
-
-def writer(parameters: MarkersParameters, context: Context) -> Writer:
-    """Build the writer of the message."""
-    return Markers(parameters, context)
+    def writer(self, context: Context) -> Writer:
+        """Build the writer of the message."""
+        return Markers(self, context)
 
 
 class Markers:
@@ -92,7 +94,7 @@ class Markers:
         '_second', '_shapes', '_slot', '_trails', '_unit',
     )  # fmt: skip
 
-    def __init__(self, use: MarkersParameters, context: Context) -> None:
+    def __init__(self, use: MarkersEffect, context: Context) -> None:
         self._closure = closure = context.closure
         self._unit, denominator = use.rate.as_integer_ratio()
         self._per = NANOSECONDS * denominator
@@ -206,7 +208,7 @@ def _show_arrow(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> 
     write.move_points(marker, drawn)
 
 
-def _marker_lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
+def _marker_lifetimes(use: MarkersEffect, context: Context) -> tuple[int, int]:
     """
     Return the lifetimes of moving and of still markers, in [ns].
 

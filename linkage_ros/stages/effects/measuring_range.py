@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from linkage_ros.description import each_part, number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _LARGEST = 1e9
@@ -56,41 +57,39 @@ class JointRange:
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuringRangeParameters:
+class MeasuringRangeEffect(SensorEffect):
     """Readings end at the limits of their sensors."""
 
     joints: Mapping[str, JointRange] = each_part(
         "range of a joint's sensors", 'joint', JointRange, required=True
     )
 
+    sample = '{joints: {rocker_joint: {low: 1.0, high: 2.2}}}'
 
-PARAMETERS = MeasuringRangeParameters
+    def sensor(self, context: Context) -> Sensor:
+        """Build the sensor; raise `DefinitionError` if the limits of a joint cross."""
+        joints = context.closure.linkage.joints
+        for joint, limits in self.joints.items():
+            if limits.low >= limits.high:
+                unit = joints[joint].unit
+                raise DefinitionError(
+                    f'effects.measuring_range.joints.{joint}',
+                    f'low {limits.low:g} {unit} is not below high {limits.high:g} {unit}',
+                    'write the lower limit as low',
+                )
+        ranges = [self.joints.get(joint, JointRange()) for joint in context.joints]
+        positions = tuple((each.low, each.high) for each in ranges)
+        rates = tuple((-each.rate, each.rate) for each in ranges)
+        efforts = tuple((-each.effort, each.effort) for each in ranges)
 
-
-def sensor(parameters: MeasuringRangeParameters, context: Context) -> Sensor:
-    """Build the sensor; raise `DefinitionError` if the limits of a joint cross."""
-    joints = context.closure.linkage.joints
-    for joint, limits in parameters.joints.items():
-        if limits.low >= limits.high:
-            unit = joints[joint].unit
-            raise DefinitionError(
-                f'effects.measuring_range.joints.{joint}',
-                f'low {limits.low:g} {unit} is not below high {limits.high:g} {unit}',
-                'write the lower limit as low',
+        def measuring_range(_now: int, reading: SensorReading) -> SensorReading:
+            return reading._replace(
+                joints=_clip_values(reading.joints, positions),
+                rates=_clip_values(reading.rates, rates),
+                efforts=_clip_values(reading.efforts, efforts),
             )
-    ranges = [parameters.joints.get(joint, JointRange()) for joint in context.joints]
-    positions = tuple((each.low, each.high) for each in ranges)
-    rates = tuple((-each.rate, each.rate) for each in ranges)
-    efforts = tuple((-each.effort, each.effort) for each in ranges)
 
-    def measuring_range(_now: int, reading: SensorReading) -> SensorReading:
-        return reading._replace(
-            joints=_clip_values(reading.joints, positions),
-            rates=_clip_values(reading.rates, rates),
-            efforts=_clip_values(reading.efforts, efforts),
-        )
-
-    return measuring_range
+        return measuring_range
 
 
 def _clip_values(

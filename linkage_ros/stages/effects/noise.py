@@ -42,6 +42,7 @@ from math import exp, sqrt
 from linkage_ros.description import each_part, number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import Sensor, SensorReading
 
 _Source = tuple[int, float, Callable[[float, float], float]]
@@ -88,47 +89,45 @@ class JointNoise:
 
 
 @dataclass(frozen=True, slots=True)
-class NoiseParameters:
+class NoiseEffect(SensorEffect):
     """White noise, a random walk and a drift in the readings of joints."""
 
     joints: Mapping[str, JointNoise] = each_part(
         'noise of a joint', 'joint', JointNoise, required=True
     )
 
+    is_recoverable = False
+    sample = '{joints: {rocker_joint: {white: 0.001, walk: 0.001, rate_white: 0.01}}}'
 
-PARAMETERS = NoiseParameters
+    def sensor(self, context: Context) -> Sensor:
+        """
+        Build the sensor.
 
+        Raise `DefinitionError` if self of a joint exclude or lack each other, or if a density
+        has no rate.
+        """
+        for joint, noise in self.joints.items():
+            _check_noise(f'effects.noise.joints.{joint}', noise, context.rate)
 
-def sensor(parameters: NoiseParameters, context: Context) -> Sensor:
-    """
-    Build the sensor.
+        def make_sources(kind: str, factor: float = 1.0) -> tuple[_Source, ...]:
+            return tuple(
+                (i, factor * strength, context.random(f'noise/{joint}/{kind}').gauss)
+                for i, joint in enumerate(context.joints)
+                if joint in self.joints and (strength := getattr(self.joints[joint], kind)) > 0.0
+            )
 
-    Raise `DefinitionError` if parameters of a joint exclude or lack each other, or if a density
-    has no rate.
-    """
-    for joint, noise in parameters.joints.items():
-        _check_noise(f'effects.noise.joints.{joint}', noise, context.rate)
-
-    def make_sources(kind: str, factor: float = 1.0) -> tuple[_Source, ...]:
-        return tuple(
-            (i, factor * strength, context.random(f'noise/{joint}/{kind}').gauss)
-            for i, joint in enumerate(context.joints)
-            if joint in parameters.joints
-            and (strength := getattr(parameters.joints[joint], kind)) > 0.0
+        times = [
+            self.joints[joint].correlation_time
+            for joint in context.joints
+            if joint in self.joints and self.joints[joint].drift
+        ]
+        return Noise(
+            (*make_sources('white'), *make_sources('density', sqrt(context.rate))),
+            make_sources('walk'),
+            make_sources('rate_white'),
+            make_sources('effort_white'),
+            tuple(map(_Drift, make_sources('drift'), times)),
         )
-
-    times = [
-        parameters.joints[joint].correlation_time
-        for joint in context.joints
-        if joint in parameters.joints and parameters.joints[joint].drift
-    ]
-    return Noise(
-        (*make_sources('white'), *make_sources('density', sqrt(context.rate))),
-        make_sources('walk'),
-        make_sources('rate_white'),
-        make_sources('effort_white'),
-        tuple(map(_Drift, make_sources('drift'), times)),
-    )
 
 
 def _check_noise(key: str, noise: JointNoise, rate: float) -> None:

@@ -33,7 +33,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.drives import Context
-from linkage_ros.stages.effects.stage import Sensor, SensorReading
+from linkage_ros.stages.effects.stage import SensorReading
 
 if TYPE_CHECKING:
     from linkage_ros.stages.effects.encoder import Encoder
@@ -41,9 +41,7 @@ if TYPE_CHECKING:
 _Values = tuple[float, ...]
 
 
-def own_sensors(
-    effect: str, build: Callable[[Any, Context], Sensor], parameters: Any, context: Context
-) -> OwnSensors:
+def own_sensors(effect: str, parameters: Any, context: Context) -> OwnSensors:
     """
     Build one sensor of an effect for each joint under ``joints``, and one for all other joints.
 
@@ -54,14 +52,14 @@ def own_sensors(
             f'effects.{effect}.joints', 'names no joint', 'write {JOINT: {…}}, or leave it out'
         )
     others: list[int] = []
-    groups = [(others, build(replace(parameters, joints=None), context))]
+    groups = [(others, replace(parameters, joints=None).sensor(context))]
     for place, joint in enumerate(context.joints):
         if joint not in parameters.joints:
             others.append(place)
             continue
         own = replace(parameters, **asdict(parameters.joints[joint]), joints=None)
         try:
-            built = build(own, replace(context, seed=f'{context.seed}/joints/{joint}'))
+            built = own.sensor(replace(context, seed=f'{context.seed}/joints/{joint}'))
         except DefinitionError as error:
             key = error.where.removeprefix(f'effects.{effect}.')
             where = f'effects.{effect}.joints.{joint}.{key}'

@@ -40,6 +40,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.description import choice, number, own_parameters
 from linkage_ros.stages.drives import Context
+from linkage_ros.stages.effects.effect import SensorEffect
 from linkage_ros.stages.effects.stage import restamp, Sensor, SensorReading
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class JointRateLimit:
 
 
 @dataclass(frozen=True, slots=True)
-class RateLimitParameters(JointRateLimit):
+class RateLimitEffect(JointRateLimit, SensorEffect):
     """The sensor's own, slower rate: sample and hold."""
 
     hold: str = choice(
@@ -72,17 +73,20 @@ class RateLimitParameters(JointRateLimit):
         'own sensor of a joint', JointRateLimit
     )
 
+    suppresses_ticks = True
+    is_recoverable = False
+    reads = 'encoder'
+    sample = '{rate: 500}'
 
-PARAMETERS = RateLimitParameters
+    def sensor(self, context: Context) -> Sensor:
+        """Build the sensor."""
+        if self.joints is None:
+            return RateLimit(self)
+        from linkage_ros.stages.effects.own_sensors import (
+            own_sensors,  # local import: only for joints
+        )
 
-
-def sensor(parameters: RateLimitParameters, context: Context) -> Sensor:
-    """Build the sensor."""
-    if parameters.joints is None:
-        return RateLimit(parameters)
-    from linkage_ros.stages.effects.own_sensors import own_sensors  # local import: only for joints
-
-    return own_sensors('rate_limit', sensor, parameters, context)
+        return own_sensors('rate_limit', self, context)
 
 
 class RateLimit:
@@ -90,7 +94,7 @@ class RateLimit:
 
     __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_phase', '_repeat', '_unit')
 
-    def __init__(self, use: RateLimitParameters) -> None:
+    def __init__(self, use: RateLimitEffect) -> None:
         # f = numerator/denominator, and the k-th sample is due after ⌊(k·per + unit)/(2·unit)⌋ ns.
         rate = Fraction(use.rate) * (1 + Fraction(use.ppm) / 1_000_000)
         self._unit = rate.numerator

@@ -42,6 +42,7 @@ from random import Random
 from linkage_ros.description import each_part, number, part_names, Point
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.stages.effects.effect import LinkageEffect
 
 TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""
@@ -54,7 +55,7 @@ _FARTHEST = 1e9
 
 
 @dataclass(frozen=True, slots=True)
-class ToleranceParameters:
+class ToleranceEffect(LinkageEffect):
     """Points of links, including pivots, that deviate from the linkage file."""
 
     standard_deviation: float = number(
@@ -74,25 +75,23 @@ class ToleranceParameters:
         Point('from the place in the file to the real one', 'm', _FARTHEST),
     )
 
+    sample = '{standard_deviation: 2.0e-5}'
 
-PARAMETERS = ToleranceParameters
-
-
-def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> Linkage:
-    """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
-    deviating = parameters.links or tuple(linkage.links)
-    links = {}
-    for link, points in linkage.links.items():
-        scale = parameters.standard_deviation if link in deviating else 0.0
-        made = {}
-        for point, (x, y) in points.items():
-            drawn = scale * _draw_deviation(random), scale * _draw_deviation(random)
-            dx, dy = parameters.given.get(f'{link}.{point}', drawn)
-            made[point] = (x + dx, y + dy)
-        links[link] = made
-    altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
-    _check_closes(altered)
-    return altered
+    def alter(self, linkage: Linkage, random: Random) -> Linkage:
+        """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
+        deviating = self.links or tuple(linkage.links)
+        links = {}
+        for link, points in linkage.links.items():
+            scale = self.standard_deviation if link in deviating else 0.0
+            made = {}
+            for point, (x, y) in points.items():
+                drawn = scale * _draw_deviation(random), scale * _draw_deviation(random)
+                dx, dy = self.given.get(f'{link}.{point}', drawn)
+                made[point] = (x + dx, y + dy)
+            links[link] = made
+        altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
+        _check_closes(altered)
+        return altered
 
 
 def _draw_deviation(random: Random) -> float:

@@ -9,38 +9,34 @@
 """
 User-defined effects: modules that a scene names by their dotted names, ``my_package.my_effect``.
 
-Python finds them like any module, on ``PYTHONPATH`` or in a sourced workspace. They have the same
-contents as the effects of this package (see `linkage_ros.stages.effects.stage`), and
-
-``AFTER``
-    The effect of this package after which it acts, whether or not the scene names that one.
-    Several after the same one act in alphabetical order.
-``NEEDS``
-    Optional: the quantities that it starts from, of `QUANTITIES`; they are then computed. A
-    ``stage`` always starts from `velocity`.
+Python finds them like any module, on ``PYTHONPATH`` or in a sourced workspace. Such a module
+defines one class that derives from the bases of `linkage_ros.stages.effects.effect`, as the
+effects of this package do. Its ``after`` names the effect of this package after which it acts,
+whether or not the scene names that one; several after the same one act in alphabetical order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from importlib.util import find_spec
+from inspect import isabstract
 from pathlib import Path
 import sys
 from types import ModuleType
-from typing import Any
 
-from linkage_ros.description import declared_fields
+from linkage_ros.description import declared_fields, is_required
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
-from linkage_ros.stages.effects.stage import EFFECTS, NEEDS
-
-QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
-"""Quantities that an effect can request."""
-
-FUNCTIONS = ('alter', 'drive_stage', 'stage', 'sensor', 'writer')
-"""Functions of which it has at least one."""
+from linkage_ros.stages.effects.effect import (
+    BASES,
+    Effect,
+    EFFECTS,
+    MechanismEffect,
+    MessageEffect,
+    SensorEffect,
+)
+from linkage_ros.stages.plugin import load_class
 
 _LAST_FOR_SENSORS = 'dropout'
 _IDENTIFYING_DIGITS = 16
@@ -48,7 +44,7 @@ _ORDER = tuple(EFFECTS)
 
 
 @cache
-def user_module(name: str) -> ModuleType:
+def user_effect(name: str) -> type[Effect]:
     """
     Import a user-defined effect, and check it.
 
@@ -60,7 +56,7 @@ def user_module(name: str) -> ModuleType:
     Raises
     ------
     DefinitionError
-        If there is no such module, or it is not an effect; ``where`` is its name.
+        If there is no such module, or it has no effect; ``where`` is its name.
 
     """
     if not all(part.isidentifier() for part in name.split('.')):
@@ -77,8 +73,10 @@ def user_module(name: str) -> ModuleType:
         ) from None
     except (Exception, SystemExit) as error:  # noqa: BLE001 (a module of others may do anything)
         raise _failure(name, error) from None
-    _check_module(name, module)
-    return module
+    effect = _find_class(name, module)
+    _check_class(name, effect)
+    _check_order(name, effect)
+    return effect
 
 
 def found_in(name: str) -> str:
@@ -94,19 +92,6 @@ def found_in(name: str) -> str:
     return quote(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
 
 
-def user_needs(name: str) -> tuple[str, ...]:
-    """Return the quantities that a user-defined effect starts from, and those they start from."""
-    module = user_module(name)
-    own = (*(('velocity',) if hasattr(module, 'stage') else ()), *getattr(module, 'NEEDS', ()))
-    needs = {need for one in own for need in (*NEEDS.get(one, ()), one)}
-    return tuple(effect for effect in QUANTITIES if effect in needs)
-
-
-def with_user_effects(named: Iterable[str]) -> tuple[str, ...]:
-    """Return effects in the order in which they act."""
-    return tuple(sorted(named, key=_order_key))
-
-
 def effect_version(name: str) -> str:
     """
     Return which version of a user-defined effect a run uses.
@@ -114,19 +99,13 @@ def effect_version(name: str) -> str:
     It is the ``__version__`` of the module or its package, if any, and the first digits of the
     SHA-256 of the module's file.
     """
-    module = user_module(name)
+    module = sys.modules[user_effect(name).__module__]
     package = sys.modules[name.partition('.')[0]]
     version = getattr(module, '__version__', getattr(package, '__version__', ''))
     file = getattr(module, '__file__', None)
     code = sha256(Path(file).read_bytes()).hexdigest() if file else ''
     said = (str(version), code and f'sha256 {code[:_IDENTIFYING_DIGITS]}')
     return ', '.join(filter(None, said)) or 'unknown'
-
-
-def _order_key(name: str) -> tuple[int, str]:
-    if name in EFFECTS:
-        return _ORDER.index(name), ''
-    return _ORDER.index(user_module(name).AFTER), name
 
 
 def _failure(name: str, error: BaseException) -> DefinitionError:
@@ -137,58 +116,92 @@ def _failure(name: str, error: BaseException) -> DefinitionError:
     )
 
 
-def _check_module(name: str, module: ModuleType) -> None:
-    """Refuse a module that is not an effect."""
-    parameters: Any = getattr(module, 'PARAMETERS', None)
+def _find_class(name: str, module: ModuleType) -> type[Effect]:
+    """Return the effect that a module defines."""
+    defined = [
+        value
+        for key, value in vars(module).items()
+        if isinstance(value, type)
+        and issubclass(value, Effect)
+        and value.__module__ == name
+        and not key.startswith('_')
+    ]
+    if len(defined) == 1:
+        return defined[0]
+    bases = list_names([base.__name__ for base in BASES])
+    if not defined:
+        raise DefinitionError(name, 'defines no effect', f'derive a class from one of {bases}')
+    several = list_names([each.__name__ for each in defined], ' and ')
+    raise DefinitionError(
+        name, f'defines the effects {several}', 'leave one, and give each of the others a module'
+    )
+
+
+def _check_class(name: str, effect: type[Effect]) -> None:
+    """Refuse a class that is not whole."""
+    if isabstract(effect) or not issubclass(effect, BASES):
+        missing = list_names(sorted(effect.__abstractmethods__))
+        bases = list_names([base.__name__ for base in BASES])
+        raise DefinitionError(
+            name,
+            f'{effect.__name__} does nothing',
+            f'define {missing}' if missing else f'derive it from one of {bases}',
+        )
     try:
-        known = isinstance(parameters, type) and declared_fields(parameters) is not None
-    except (TypeError, KeyError):
+        known = '__dataclass_fields__' in vars(effect) and declared_fields(effect) is not None
+    except KeyError:
         known = False
     if not known:
         raise DefinitionError(
             name,
-            'has no PARAMETERS',
-            'name a frozen dataclass whose fields linkage_ros.description.parameters has made',
+            f'{effect.__name__} is not a dataclass of parameters',
+            'write @dataclass(frozen=True, slots=True) before it, and make its fields by the '
+            'functions of linkage_ros.description.parameters',
         )
-    own = [function for function in FUNCTIONS if hasattr(module, function)]
-    if not own:
-        raise DefinitionError(name, 'does nothing', f'define one of {list_names(FUNCTIONS)}')
-    topics = [key for key in ('TOPIC', 'MESSAGE', 'writer') if hasattr(module, key)]
-    if topics and len(topics) < 3:
+    if not issubclass(effect, MessageEffect):
+        return
+    if not effect.topic or not effect.message:
         raise DefinitionError(
             name,
-            f'has {list_names(topics, " and ")} alone',
-            'TOPIC, MESSAGE and writer(parameters, context) go together',
+            f'{effect.__name__} publishes a message without topic or type',
+            "write topic = '~/name' and message = 'package/msg/Type'",
         )
-    if topics and not str(module.TOPIC).startswith('~/'):
+    if not effect.topic.startswith('~/'):
         raise DefinitionError(
-            name, f'has the TOPIC {quote(module.TOPIC)}', "write one of the node's own: '~/name'"
+            name, f'has the topic {quote(effect.topic)}', "write one of the node's own: '~/name'"
         )
-    _check_order(name, module)
 
 
-def _check_order(name: str, module: ModuleType) -> None:
+def _check_order(name: str, effect: type[Effect]) -> None:
     """Refuse an effect that acts before one that it starts from, or after the last sensor."""
-    after = getattr(module, 'AFTER', None)
+    after, needs = effect.after, effect.needs
     if after not in EFFECTS:
         known = f'name one of {list_names(EFFECTS)}'
-        said = f'AFTER is {quote(after)}' if after is not None else 'does not say AFTER which'
+        said = f'after is {quote(after)}' if after else 'does not say after which'
         remedy = did_you_mean(after, EFFECTS, known) if isinstance(after, str) else known
         raise DefinitionError(name, f'{said}: that is not an effect', remedy)
-    needs = getattr(module, 'NEEDS', ())
     for need in needs:
-        if need not in QUANTITIES:
+        if need not in EFFECTS or not _is_quantity(need):
+            quantities = [each for each in EFFECTS if _is_quantity(each)]
             raise DefinitionError(
-                name, f'NEEDS {quote(need)}', f'name some of {list_names(QUANTITIES)}'
+                name, f'needs {quote(need)}', f'name some of {list_names(quantities)}'
             )
     last = max((_ORDER.index(need) for need in needs), default=0)
     if last > _ORDER.index(after):
         raise DefinitionError(
-            name, f'starts from {_ORDER[last]} and acts before it', f'set AFTER = {_ORDER[last]!r}'
+            name, f'starts from {_ORDER[last]} and acts before it', f'set after = {_ORDER[last]!r}'
         )
-    if hasattr(module, 'sensor') and _ORDER.index(after) > _ORDER.index(_LAST_FOR_SENSORS):
+    if issubclass(effect, SensorEffect) and _ORDER.index(after) > _ORDER.index(_LAST_FOR_SENSORS):
         raise DefinitionError(
             name,
-            f'AFTER is {after!r}, and delay is the last sensor',
-            f'set AFTER = {_LAST_FOR_SENSORS!r}',
+            f'after is {after!r}, and delay is the last sensor',
+            f'set after = {_LAST_FOR_SENSORS!r}',
         )
+
+
+def _is_quantity(name: str) -> bool:
+    """Return whether an effect computes a quantity, without any parameter that a scene gives."""
+    effect = load_class(EFFECTS[name])
+    return issubclass(effect, MechanismEffect) and not any(
+        is_required(entry) for entry, _ in declared_fields(effect)
+    )

@@ -27,7 +27,7 @@ from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import FileError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, MessageValues, POSITION
 from linkage_ros.replay import turning_joints
-from linkage_ros.stages.effects import effects_requiring, FORCE_EFFECTS, in_order
+from linkage_ros.stages.effects import effects_requiring, ForceEffect, in_order
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.budget import JointError, Knob, Setting
 from linkage_ros.tools.study.budget_text import ALL_TOGETHER
@@ -37,8 +37,6 @@ from linkage_ros.tools.study.prices import Feed, price_scenes, turn_crank, USUAL
 _MOST_TICKS, _MOST_TICKS_QUICK = 20_000, 2_000
 _SECONDS, _SECONDS_QUICK = 0.8, 0.2
 """Time to price one effect, in [s]."""
-
-FORCES = frozenset(FORCE_EFFECTS)
 
 
 class Difference(NamedTuple):
@@ -138,7 +136,9 @@ def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
 
 def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
     effects = {name: own for name, own in scene_linkage.effects.items() if name not in names}
-    has_forces = scene_linkage.drive[0] == 'torque' or not FORCES.isdisjoint(effects)
+    has_forces = scene_linkage.drive[0] == 'torque' or any(
+        each.needs_forces for each in effects.values()
+    )
     return replace(
         scene_linkage, effects=effects, loads=scene_linkage.loads if has_forces else None
     )
@@ -154,12 +154,14 @@ class _Variant(NamedTuple):
 
 def _list_variants(scene: Scene) -> Iterator[_Variant]:
     """Yield the scene without each effect, without each fault, and without all."""
-    named = {name for scene_linkage in scene.linkages for name in scene_linkage.effects}
+    effects = {name: use for linkage in scene.linkages for name, use in linkage.effects.items()}
+    named = effects.keys()
+    forces = tuple(name for name, use in effects.items() if isinstance(use, ForceEffect))
     for name in in_order(named):
         needed_by = effects_requiring(name, named)
         note = f'computed for {list_names(needed_by)} without it, too' if needed_by else ''
-        # Friction without a force effect acts on nothing, and is refused.
-        for others in ((), ('friction',)):
+        # Friction without an effect that needs forces acts on nothing, and is refused.
+        for others in ((), forces):
             less = leave_out(scene, frozenset({name, *others}))
             if _is_accepted(less):
                 note = f'together with {others[0]}' if others else note

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 from linkage_ros.description import parse_scene, SCENE_FILE, SceneLinkage
 from linkage_ros.kinematics import Closure
 from linkage_ros.stages.drives import TopicDrive, TopicParameters
-from linkage_ros.stages.effects import FORCE_EFFECTS, SensorReading
+from linkage_ros.stages.effects import ForceEffect, SensorReading
 from linkage_ros.tick import LinkagePipeline
 from linkage_ros.tools.view.report import link_poses
 import numpy as np
@@ -126,9 +126,11 @@ class Sensors:
 def _driven_by_hand(scene_linkage: SceneLinkage) -> SceneLinkage:
     """Return a linkage whose crank is moved from outside."""
     effects, loads = scene_linkage.effects, scene_linkage.loads
-    if not any(name in effects for name in FORCE_EFFECTS):
+    if not any(each.needs_forces for each in effects.values()):
         # They acted on the drive alone.
-        effects = {name: given for name, given in effects.items() if name != 'friction'}
+        effects = {
+            name: given for name, given in effects.items() if not isinstance(given, ForceEffect)
+        }
         loads = None
     drive = 'topic', TopicParameters()
     return replace(scene_linkage, drive=drive, effects=effects, loads=loads)

@@ -33,7 +33,6 @@ from linkage_ros.messages import (
     Rejection,
 )
 from linkage_ros.stages.drives import DRIVES
-from linkage_ros.stages.effects import PUBLISHED_WITH
 from linkage_ros.tick import LinkagePipeline, LinkageState, Pipeline
 
 FIRST_TICK = NANOSECONDS
@@ -167,7 +166,7 @@ class LinkageOutputs:
 
 def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
     """Return the fields that a linkage publishes."""
-    named = {also for effect in scene_linkage.effects for also in PUBLISHED_WITH.get(effect, ())}
+    named = {also for each in scene_linkage.effects.values() for also in each.publishes_with}
     named |= {'position', *scene_linkage.effects}
     return [field for field in _READ_AS if field in named]
 

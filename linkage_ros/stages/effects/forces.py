@@ -1,0 +1,157 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Effort and pin forces: what the drive exerts, and what the pins and sliders bear.
+
+`effort`: effort of the drive for the motion, by virtual work (inverse dynamics).
+
+With friction that grows with the forces in the joints it comes from these forces, by
+`linkage_ros.dynamics.reactions`; a linkage that jams has no effort.
+
+It covers the inertia of links and drive, gravity, springs and friction: see
+`linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
+from the drive; a topic's acceleration counts as 0 unless it is estimated.
+
+Under the torque drive, the effort that causes a motion is the commanded one. An input at rest
+shows no motion from which it follows: friction and stops bear a part. The drive then exerts its
+command. A brake, or the friction in a motor's gear, holds within a range; the drive exerts the
+effort in it that is nearest to the effort that the loads alone require.
+
+After backlash, a motor that moves within the play pushes nothing. Friction holds the crank, and
+the effort of that drive is for its own inertia only: drive_inertia·φ̈, with φ̈ of the motor.
+
+At a toggle neither rates nor efforts exist.
+
+`pin_forces`: forces between the links of a linkage in their pins and sliders.
+
+They are computed for the rigid linkage, by Newton's and Euler's equations of every link; see
+`linkage_ros.dynamics.reactions`. One message holds all forces of an instant, hence the type
+``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` per pin: these would
+be separate topics, to be matched by stamp, each with a frame that no node broadcasts. ``wrench``
+holds for each of ``joint_names`` the force (x, y) and the moment about z, in the frame of the
+ground; ``transforms`` and ``twist`` are empty. At a toggle no forces exist, and there is no
+message.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.kinematics import all_finite
+from linkage_ros.stages.drives import Context, CrankAtRest, CrankBehindPlay
+from linkage_ros.stages.effects.effect import MechanismEffect, MessageEffect
+from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stage, Writer
+
+
+@dataclass(frozen=True, slots=True)
+class EffortEffect(MechanismEffect):
+    """Effort of the drive, in JointState.effort of the input where that is published."""
+
+    needs = ('acceleration',)
+    needs_forces = True
+    is_compiled = True
+    gives = 'efforts'
+    without_inputs = (
+        'is the effort of the input joint, which is not published',
+        'set publish_input: true, or name pin_forces',
+    )
+
+    def stage(self, context: Context) -> Stage:
+        """Build the stage."""
+        efforts_of = context.mechanics.drive_efforts
+        if context.friction and context.friction.load_dependent_joint:
+            efforts_of = context.reactions.drive_efforts
+
+        def effort(motion: MechanismState) -> MechanismState:
+            velocity, acceleration = motion.velocity, motion.acceleration
+            if velocity is None or acceleration is None:
+                return motion
+            efforts = efforts_of(motion.position, velocity, acceleration, motion.given)
+            # Near a toggle efforts grow with the accelerations, and faster.
+            if not all_finite(efforts):
+                return motion
+            return motion._replace(efforts=efforts)
+
+        if 'backlash' in context.effects:
+            return _behind_play(effort, context)
+        return _at_rest(effort)
+
+
+@dataclass(frozen=True, slots=True)
+class PinForcesEffect(MechanismEffect, MessageEffect):
+    """Forces in pins and sliders, on ~/pin_forces."""
+
+    needs = ('acceleration',)
+    needs_forces = True
+    is_compiled = True
+    topic = '~/pin_forces'
+    message = 'sensor_msgs/msg/MultiDOFJointState'
+    of_forces = True
+
+    def stage(self, context: Context) -> Stage:
+        """Build the stage."""
+        solve = context.reactions.solve
+
+        def pin_forces(motion: MechanismState) -> MechanismState:
+            velocity, acceleration = motion.velocity, motion.acceleration
+            if velocity is None or acceleration is None:
+                return motion
+            reactions = solve(motion.position, velocity, acceleration, motion.given)
+            return motion if reactions is None else motion._replace(reactions=reactions)
+
+        return pin_forces
+
+    def writer(self, context: Context) -> Writer:
+        """Build the writer of the message; b'' where there are no forces."""
+        from linkage_ros.messages import joint_values  # local import: if published
+
+        write = joint_values.PlanarWrenchWriter(
+            [context.prefix + name for name in context.reactions.names]
+        ).write
+
+        def write_forces(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
+            return write(now, motion.reactions) if motion.reactions else b''
+
+        return write_forces
+
+
+def _at_rest(effort: Stage) -> Stage:
+    """Return the stage for drives that exert an effort, which an input at rest does not show."""
+
+    def effort_at_rest(motion: MechanismState) -> MechanismState:
+        required = effort(motion)
+        crank = motion.crank
+        if not isinstance(crank, CrankAtRest) or not crank.bearing or not motion.acceleration:
+            return required
+        # A linkage that jams requires none.
+        least, most = crank.bearing
+        (alone,) = required.efforts or (0.0,)
+        return required._replace(efforts=(min(max(alone, least), most),))
+
+    return effort_at_rest
+
+
+def _behind_play(effort: Stage, context: Context) -> Stage:
+    """Return the stage for drives with play: within it a motor bears its own inertia only."""
+    inertia = context.mechanics.loads.drive_inertia
+
+    def effort_behind_play(motion: MechanismState) -> MechanismState:
+        borne = effort(motion)
+        crank = motion.crank
+        # A user-defined effect between the two may have made another crank state, without play.
+        if not borne.efforts or not isinstance(crank, CrankBehindPlay) or not crank.free_motors:
+            return borne
+        return borne._replace(
+            efforts=tuple(
+                of_all if free is None else inertia * free
+                for of_all, free in zip(borne.efforts, crank.free_motors, strict=True)
+            )
+        )
+
+    return effort_behind_play
