@@ -17,7 +17,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description import check_new, check_output_name, TABLE_KINDS, Units
+from linkage_ros.description import check_kind, check_new, check_output_name, TABLE_KINDS, Units
 from linkage_ros.errors import decimal_comma, LinkageError, list_names
 from linkage_ros.kinematics import Linkage
 
@@ -78,11 +78,13 @@ def add_force(parser: argparse._ActionsContainer) -> None:
 
 
 def refuse_existing(arguments: argparse.Namespace) -> None:
-    """Raise if the user names something to write that exists, unless ``--force`` is given."""
+    """Raise if what the user names to write exists, without ``--force``, or cannot be written."""
     for name in ('output', 'picture', 'draw', 'page'):
         path = getattr(arguments, name, None)
         if isinstance(path, Path):
             check_new(path, force=getattr(arguments, 'force', False))
+            if path.suffix.lower() in TABLE_KINDS:
+                check_kind(path)
             for option in ('json', 'csv') if path.suffix.lower() in RESULTS else ():
                 if getattr(arguments, option, False):
                     remedy = 'leave it out: the suffix of the file selects its format'

@@ -22,7 +22,6 @@ from linkage_ros.cli.table import Table
 from linkage_ros.cli.terminal import print_tables, table_text
 from linkage_ros.description import (
     atomic_write,
-    check_kind,
     csv_of,
     FileTable,
     TABLE_KINDS,
@@ -37,15 +36,13 @@ class Result(NamedTuple):
     parts: Sequence[Table | str]  # Tables and lines, in the order in which they are shown
 
 
-def add_result(
-    parser: argparse._ActionsContainer, what: str = 'the result', *, output: bool = True
-) -> None:
+def add_result(parser: argparse._ActionsContainer, *, output: bool = True) -> None:
     """Declare ``--json``, ``--csv`` and, if ``output``, ``-o`` for `show_result`."""
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument('--json', action='store_true', help='print JSON, in SI units')
     shown.add_argument('--csv', action='store_true', help='print the first table as CSV')
     if output:
-        add_output(parser, RESULTS, f'{what} is printed')
+        add_output(parser, RESULTS, 'the result is printed')
 
 
 def show_result(
@@ -63,11 +60,10 @@ def show_result(
             show_parts(result.parts, units)
         return
     if suffix in TABLE_KINDS:
-        check_kind(file)
         write_tables(file, _file_tables(result, units))
     else:
         text = as_json(result) if suffix == '.json' else as_text(result, units)
-        atomic_write(file, f'{text}\n'.encode())
+        atomic_write(file, f'{text}\n'.encode('utf-8', 'backslashreplace'))
     print(file)
 
 

@@ -184,7 +184,7 @@ class _Workbook:
     """A workbook in Office Open XML (ECMA-376), sheet after sheet, without styles."""
 
     _MAIN = 'http://schemas.openxmlformats.org/spreadsheetml/2006/main'
-    _RELATIONS = 'http://schemas.openxmlformats.org/package/2006/relationships'
+    _PACKAGE = 'http://schemas.openxmlformats.org/package/2006'
     _OFFICE = 'http://schemas.openxmlformats.org/officeDocument/2006/relationships'
     _TYPE = 'application/vnd.openxmlformats-officedocument.spreadsheetml'
 
@@ -199,7 +199,7 @@ class _Workbook:
         name = re.sub(r"[][:*?/\\']", '_', escape_unprintable(name))[:28] or 'table'
         self._names.append(f'{name} {len(self._names) + 1}' if name in self._names else name)
         count = 0
-        sheet = self._entry(f'xl/worksheets/sheet{len(self._names)}.xml')
+        sheet = _dateless(f'xl/worksheets/sheet{len(self._names)}.xml')
         with self._zip.open(sheet, 'w', force_zip64=True) as entry:
 
             def write_rows(rows: Sequence[Row]) -> None:
@@ -218,53 +218,44 @@ class _Workbook:
 
     def write_contents(self) -> None:
         """Write what lists the sheets."""
-        numbered = [*enumerate(self._names, 1)]
-        self._write_relations('_rels/.rels', [('officeDocument', 'xl/workbook.xml')])
-        self._write_relations(
-            'xl/_rels/workbook.xml.rels',
-            [('worksheet', f'worksheets/sheet{number}.xml') for number, _ in numbered],
-        )
-        sheets = ''.join(
+        files = [f'worksheets/sheet{number}' for number, _ in enumerate(self._names, 1)]
+        listed = ''.join(
             f'<sheet name="{escape(name)}" sheetId="{number}" r:id="r{number}"/>'
-            for number, name in numbered
+            for number, name in enumerate(self._names, 1)
         )
-        self._write_entry(
-            'xl/workbook.xml',
-            f'<workbook xmlns="{self._MAIN}" xmlns:r="{self._OFFICE}">'
-            f'<sheets>{sheets}</sheets></workbook>',
-        )
-        parts = [('workbook', 'sheet.main')] + [
-            (f'worksheets/sheet{number}', 'worksheet') for number, _ in numbered
-        ]
         types = ''.join(
-            f'<Override PartName="/xl/{part}.xml" ContentType="{self._TYPE}.{what}+xml"/>'
-            for part, what in parts
+            f'<Override PartName="/xl/{file}.xml" ContentType="{self._TYPE}.{kind}+xml"/>'
+            for file, kind in [
+                ('workbook', 'sheet.main'),
+                *((file, 'worksheet') for file in files),
+            ]
         )
-        self._write_entry(
-            '[Content_Types].xml',
-            '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+        parts = {
+            '_rels/.rels': self._relations('officeDocument', ['xl/workbook']),
+            'xl/_rels/workbook.xml.rels': self._relations('worksheet', files),
+            'xl/workbook.xml': f'<workbook xmlns="{self._MAIN}" xmlns:r="{self._OFFICE}">'
+            f'<sheets>{listed}</sheets></workbook>',
+            '[Content_Types].xml': f'<Types xmlns="{self._PACKAGE}/content-types">'
             '<Default Extension="rels" '
             'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
             f'{types}</Types>',
-        )
+        }
+        for name, text in parts.items():
+            self._zip.writestr(_dateless(name), text)
 
-    def _write_relations(self, name: str, targets: Sequence[tuple[str, str]]) -> None:
-        parts = ''.join(
-            f'<Relationship Id="r{number}" Type="{self._OFFICE}/{kind}" Target="{target}"/>'
-            for number, (kind, target) in enumerate(targets, 1)
+    def _relations(self, kind: str, files: Sequence[str]) -> str:
+        listed = ''.join(
+            f'<Relationship Id="r{number}" Type="{self._OFFICE}/{kind}" Target="{file}.xml"/>'
+            for number, file in enumerate(files, 1)
         )
-        self._write_entry(
-            name, f'<Relationships xmlns="{self._RELATIONS}">{parts}</Relationships>'
-        )
+        return f'<Relationships xmlns="{self._PACKAGE}/relationships">{listed}</Relationships>'
 
-    def _write_entry(self, name: str, text: str) -> None:
-        self._zip.writestr(self._entry(name), text)
 
-    def _entry(self, name: str) -> ZipInfo:
-        """Return an entry without the time of day: the same table gives the same bytes."""
-        entry = ZipInfo(name)
-        entry.compress_type = ZIP_DEFLATED
-        return entry
+def _dateless(name: str) -> ZipInfo:
+    """Return an entry without the time of day: the same table gives the same bytes."""
+    entry = ZipInfo(name)
+    entry.compress_type = ZIP_DEFLATED
+    return entry
 
 
 @contextmanager

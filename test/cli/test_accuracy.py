@@ -11,11 +11,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 import json
 from pathlib import Path
 import re
-from subprocess import CompletedProcess
 from threading import Event
 from typing import Any
 
@@ -104,57 +102,6 @@ def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:
     assert run('demo', '--page', str(page), '--picture', str(picture)) == 0
     assert page.read_text('utf-8').startswith('<!doctype html>')
     assert picture.read_text('utf-8').startswith('<svg')
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'said'),
-    [
-        (['--only', 'error'], "--only error: is not a part to measure; did you mean 'errors'?"),
-        (['--only', 'x'], f'--only x: is not a part to measure; known: {", ".join(PARTS)}'),
-        (
-            ['--only', 'effects', '--set', 'effects={}'],
-            '--only effects: the scene has none, and no fault; leave it out',
-        ),
-        (['-o', 'x.yaml'], '-o: is the scene that meets a need; add --need 1e-3'),
-        (['--need', '1', '--only', 'effects'],
-         '--need: is for errors; write --only errors,effects'),
-    ],
-)  # fmt: skip
-def test_what_is_refused(arguments: list[str], said: str) -> None:
-    with pytest.raises(LinkageError) as caught:
-        run('demo', *arguments)
-    assert str(caught.value) == said
-
-
-SHORT_COUPLER = 'four_bar: {a: 0.12, b: 0.04, c: 0.08, d: 0.1}\n'
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'said'),
-    [
-        (['demo'], r'drive: topic has no own motion; .*--like sine'),
-        (['stuck.yaml'], 'moves the linkage nowhere where its loops close; see linkage check'),
-        (['nowhere.yaml'], r'nowhere.yaml: '),
-        (['demo', '--like', 'no_bag'], r'no_bag: '),
-        (['demo', '--horizon', '-1'], r'--horizon'),
-        (['demo', '--need', '0'], r'--need'),
-        (['demo', '--need', 'small'], r'--need'),
-    ],
-)
-def test_bad_input_is_one_line(
-    linkage: Callable[..., CompletedProcess[str]], tmp_path: Path, arguments: list[str], said: str
-) -> None:
-    (tmp_path / 'four.yaml').write_text(SHORT_COUPLER)
-    # The drive brings it where pin A is further from O4 than coupler and rocker reach.
-    (tmp_path / 'stuck.yaml').write_text(
-        'linkage: four.yaml\nrate: 100\ndrive: {sine: {mean: 3.14, amplitude: 1.0e-3, '
-        'frequency: 1.0}}\n'
-    )
-    answer = linkage('accuracy', *arguments, '--quick')
-    assert answer.returncode == 2, answer
-    (line,) = answer.stderr.splitlines()
-    assert line.startswith('linkage accuracy: ')
-    assert re.search(said, line), line
 
 
 def test_it_can_be_stopped_and_leaves_nothing(

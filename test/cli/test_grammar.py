@@ -215,43 +215,6 @@ def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path)
                 read(name)
 
 
-@pytest.mark.parametrize(
-    'typed',
-    [
-        ['solve', 'four_bar', '-o', 'x.xls'],
-        ['draw', 'four_bar', '-o', 'x.gif'],
-        ['synthesize', '--draw', 'x.gif'],
-        ['mjcf', 'four_bar', '-o', 'x.urdf'],
-        ['gallery', 'four_bar', '-o', 'x.txt'],
-        ['fmu', 'four_bar', '-o', 'x.txt'],
-        ['simulate', 'torque_crank', '-o', 'x.png'],
-    ],
-    ids=' '.join,
-)
-def test_no_file_is_written_under_a_suffix_of_something_else(
-    tmp_path: Path, typed: list[str]
-) -> None:
-    answer = linkage(tmp_path, *typed)
-    assert (answer.returncode, answer.stdout) == (2, '')
-    assert answer.stderr.startswith(f'linkage {typed[0]}: {typed[-1]}: ends in ')
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ('name', 'begin'),
-    [('x.csv', 'crank_joint [rad],'), ('x.JSON', '{\n'), ('x.txt', 'crank_joint')],
-)
-def test_the_suffix_says_the_format(tmp_path: Path, name: str, begin: str) -> None:
-    assert linkage(tmp_path, 'solve', 'four_bar', '--at', '40', '-o', name).returncode == 0
-    assert (tmp_path / name).read_text().startswith(begin)
-
-
-def test_a_format_beside_a_file_is_refused(tmp_path: Path) -> None:
-    answer = linkage(tmp_path, 'solve', 'four_bar', '--json', '-o', 'x.csv')
-    assert answer.returncode == 2
-    assert '--json: is for a printed result' in answer.stderr
-
-
 # Keys that are set.
 
 

@@ -20,7 +20,6 @@ from linkage_ros.errors import LinkageError
 import pytest
 
 from .recorded import Recorded, scene_file
-from ..support.commands import linkage
 
 OF_LINKAGES = {
     'check': '', 'solve': '', 'draw': '-o x.svg', 'animate': '-o x.svg', 'compile': '-o x.c',
@@ -135,58 +134,7 @@ def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
     assert f'is a {noun} file, not a' in line
 
 
-WRITTEN_WRONGLY = {
-    'links:\n\tground: {O: [0, 0]}\n': (2, 'has a tab; write spaces instead of tabs'),
-    'links:\n  ground:\n    O: [0, 0]\n   P: [1, 0]\n': (4, 'is not indented like'),
-    'links: {ground: {O: [0, 0]\njoints: {}\n': (2, ''),
-    'links:\n  ground: {O: [0, 0}\n': (2, 'has a [ that does not end'),
-    'links\n  ground: {}\n': (2, 'has a misplaced colon'),
-    'links: ground\n': (1, 'write links: {ground: {}}'),
-    'links:\njoints: {}\n': (1, 'is empty; write links: {…}'),
-    'links: {ground: {O: [0, 0, 0.5]}}\n': (1, 'a planar linkage has no z'),
-    'links: {ground: {O: [0,04, 0]}}\n': (1, 'a decimal has a point, not a comma'),
-}
-
-
-@pytest.mark.parametrize('text', WRITTEN_WRONGLY)
-def test_a_mistake_in_a_file_is_told_in_plain_words(tmp_path: Path, text: str) -> None:
-    file = tmp_path / 'l.yaml'
-    file.write_text(text)
-    line, words = WRITTEN_WRONGLY[text]
-    told = answer('check', str(file))
-    assert f'{file}:{line}: ' in told
-    assert words in told
-    assert 'token' not in told
-
-
 # Words that are typed.
-
-
-def typed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    """Return the one line for which typed words are refused."""
-    try:
-        return answer(*words)
-    except SystemExit:
-        (line,) = capsys.readouterr().err.splitlines()
-        return line
-
-
-@pytest.mark.parametrize(
-    ('line', 'words'),
-    [
-        ('synthesize', 'the task: is not given; name one of --pair'),
-        ('solve four_bar --at 40,5', 'a decimal has a point, not a comma'),
-        ('synthesize --pair 0 0 --pair 30 17 --pair 60 38,5', "'38,5' is not a number; a decimal"),
-        ('simulate demo -o x.csv --seconds 0,5', "'0,5' is not a number; a decimal has a point"),
-        ('solve four_bar --steps 4.5', "'4.5' is not a whole number"),
-        ('scene demo --set drive=topic', "write --set 'drive={topic: {}}'"),
-        ('scene demo --set effects=[velocity,effort]', "'effects={velocity: {}, effort: {}}'"),
-    ],
-)
-def test_what_is_typed_wrongly_is_told_in_plain_words(
-    capsys: pytest.CaptureFixture[str], line: str, words: str
-) -> None:
-    assert words in typed(capsys, *line.split())
 
 
 @pytest.mark.parametrize(
@@ -211,33 +159,3 @@ def test_a_large_number_is_written_short(capsys: pytest.CaptureFixture[str], at:
     module = import_module(module_of('solve'))
     module.run(parser_of('solve', module).parse_args(['four_bar', f'--at={at}']), Event())
     assert max(map(len, capsys.readouterr().out.split())) < 30
-
-
-@pytest.mark.parametrize(
-    ('text', 'words'),
-    [
-        ('four_bar: {a: 0.04, b: 0.72, c: 0.08, d: 0.1}', 'by 0.5 m or more'),
-        ('four_bar: {a: 0.04, b: 0.12, c: 0.58, d: 0.1}', 'by 0.32 m or more'),
-        ('units: mm\nfour_bar: {a: 40, b: 120, c: 80, d: 400}', 'by 160 mm or more'),
-    ],
-)
-def test_a_loop_that_never_closes_names_links_and_distance(
-    tmp_path: Path, text: str, words: str
-) -> None:
-    # The longest link of four, less the sum of the others.
-    file = tmp_path / 'l.yaml'
-    file.write_text(text)
-    told = answer('check', str(file))
-    assert f'coupler and rocker miss each other {words}' in told
-
-
-@pytest.mark.ros
-def test_run_answers_like_every_other_command(tmp_path: Path) -> None:
-    for command in ('run', 'simulate -o x.csv --seconds 1'):
-        name, *more = command.split()
-        done = linkage(tmp_path, name, 'nope.yaml', *more)
-        assert done.returncode == 2
-        assert done.stderr == (
-            f'linkage {name}: nope.yaml: cannot be read (No such file or directory); '
-            'name a file that can be read\n'
-        )

@@ -33,19 +33,6 @@ def test_an_argument_of_ros_without_its_value_is_refused(linkage: Run, tmp_path:
     assert 'Traceback' not in answer.stderr
 
 
-def test_help_names_every_command(linkage: Run) -> None:
-    answer = linkage('--help')
-    assert answer.returncode == 0
-    assert all(command in answer.stdout for command in ('run', 'demo', 'plot'))
-
-
-@pytest.mark.parametrize('command', ['run', 'demo', 'plot'])
-def test_every_command_explains_itself(linkage: Run, command: str) -> None:
-    answer = linkage(command, '--help')
-    assert answer.returncode == 0
-    assert answer.stdout.startswith(f'usage: linkage {command}')
-
-
 # A path that is no regular file is refused at once, by every command, in one line.
 
 
