@@ -71,7 +71,7 @@ def tables_json(tables: Iterable[Table]) -> dict[str, Any]:
     """Return the rows of tables as JSON holds them, by the keys of tables and columns."""
     return {
         table.key: [
-            {column.key: value for column, value in zip(table.declared, row, strict=True)}
+            {column.key: value for column, value in zip(table.typed_columns, row, strict=True)}
             for row in table.rows
         ]
         for table in tables
@@ -112,11 +112,11 @@ def _file_tables(result: Result, units: DisplayUnits) -> list[FileTable]:
     return [
         FileTable(
             table.key or 'facts',
-            [column.file_head(units) for column in table.declared],
+            [column.file_head(units) for column in table.typed_columns],
             [
                 [
                     column.cell(value, units)
-                    for column, value in zip(table.declared, row, strict=True)
+                    for column, value in zip(table.typed_columns, row, strict=True)
                 ]
                 for row in table.rows
             ],

@@ -81,13 +81,13 @@ class Table(NamedTuple):
         return [one if isinstance(one, str) else one.heading for one in self.columns]
 
     @property
-    def declared(self) -> list[Column]:
+    def typed_columns(self) -> list[Column]:
         """Return the columns."""
         return [Column(one) if isinstance(one, str) else one for one in self.columns]
 
     def as_texts(self, units: DisplayUnits = DEGREES) -> Table:
         """Return the table as text."""
-        columns = self.declared
+        columns = self.typed_columns
         return Table(
             self.title,
             [column.head(units) for column in columns],

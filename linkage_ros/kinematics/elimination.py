@@ -52,7 +52,7 @@ def subtract(one: Any, other: Any) -> Any:
     return -other if is_zero(one) else one if is_zero(other) else one - other
 
 
-class _Elimination(NamedTuple):
+class _RowOperation(NamedTuple):
     """A row operation: row ``row`` is subtracted ``factor`` times, or two rows are rotated."""
 
     row: int
@@ -84,7 +84,7 @@ class Elimination:
         self._rows = [
             {k: entry for k, entry in enumerate(row) if not is_zero(entry)} for row in matrix
         ]
-        self._operations: list[_Elimination] = []
+        self._operations: list[_RowOperation] = []
         self._pivots: list[tuple[int, int]] = []
         left = set(range(len(matrix)))
         for row, column in unit_pivots:
@@ -98,7 +98,7 @@ class Elimination:
                 a, b = self._rows[pivot][column], self._rows[other][column]
                 # Where both are 0 the pivot is 0 as well, and nothing is divided by it.
                 scale = 1.0 / (sqrt(a * a + b * b) + SMALLEST)
-                self._operate(_Elimination(pivot, other, a * scale, b * scale), column)
+                self._operate(_RowOperation(pivot, other, a * scale, b * scale), column)
             left.discard(pivot)
             self._pivots.append((pivot, column))
 
@@ -158,9 +158,9 @@ class Elimination:
         for other in sorted(left):
             entry = self._rows[other].get(column)
             if entry is not None:
-                self._operate(_Elimination(row, other, multiply(entry, pivot)), column)
+                self._operate(_RowOperation(row, other, multiply(entry, pivot)), column)
 
-    def _operate(self, operation: _Elimination, column: int) -> None:
+    def _operate(self, operation: _RowOperation, column: int) -> None:
         """Apply a row operation that makes a column 0 in the other row."""
         self._operations.append(operation)
         one, other = self._rows[operation.row], self._rows[operation.other]
