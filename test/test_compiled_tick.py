@@ -9,7 +9,6 @@
 """The usual tick, written as one function, does to the last bit what the plain steps do."""
 
 from dataclasses import replace
-import os
 from pathlib import Path
 import re
 
@@ -38,15 +37,6 @@ DRIVES = {
     'held': 'drive: {topic: {carry_forward: false}}',
     'turning': 'drive: {constant_rate: {rate: 40.0}}',
 }
-ALL = bool(os.environ.get('LINKAGE_TEST_ALL'))
-CASES = [
-    (file, effects, drive)
-    for index, file in enumerate(GALLERY)
-    for place, effects in enumerate(EFFECTS)
-    for number, drive in enumerate(DRIVES)
-    if ALL or number == (index + place) % len(DRIVES)
-]
-"""All of them; without the variable, so many that each pair of two is among them."""
 FORCES = ('{velocity: {}, effort: {}, backlash: {play: 0.01}}', '{pin_forces: {}}')
 
 
@@ -62,7 +52,8 @@ def ticks(work):
         now = BEGIN + index * MS
         if work.topic and index % 3 == 0 and not 200 < index < 230:
             angles = [0.04 * index + 0.3 * i for i in range(len(names))]
-            assert work.offer(write(now, angles, [40.0] * len(names)), now) is None
+            message = write(now, angles, [40.0] * len(names), [0.01 * index] * len(names))
+            assert work.offer(message, now) is None
         for topic in work.wrenches if index % 7 == 5 else ():
             assert topic.offer_wrench(wrench_stamped(index, 3 - index, 0.1 * index), now) is None
         yield work.tick(now)
@@ -125,7 +116,10 @@ def check(linkage, scene, looked=1):
                 assert look.motion.given == beside.motion.given
 
 
-@pytest.mark.parametrize(('file', 'effects', 'drive'), CASES)
+@pytest.mark.sample(100)
+@pytest.mark.parametrize('drive', DRIVES)
+@pytest.mark.parametrize('effects', EFFECTS)
+@pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_both_publish_the_same_bytes(file, effects, drive):
     text = file.read_bytes()
     if b'limits:' in text:  # else a motor that turns on would be refused
@@ -184,6 +178,18 @@ def test_both_bear_the_same_loads_that_change(effects, loads):
     plain = [not tick.states[0].is_compiled for tick in ticks(work)]
     # Beside the first one: a crank that is silent, and angles that pass half a turn.
     assert sum(plain) < 60
+
+
+@pytest.mark.parametrize('drive', ['carried', 'torque'])
+def test_both_have_the_same_friction_by_the_forces_in_joints(drive):
+    linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
+    driven = {**DRIVES, 'torque': 'drive: {torque: {start: 1.0, rate: 30}}'}[drive]
+    friction = (
+        '{joints: {A: {coefficient: 0.1, radius: 0.01}, O4: {coefficient: 0.2, radius: 0.02}}}'
+    )
+    effects = f'{{effort: {{}}, pin_forces: {{}}, friction: {friction}}}'
+    loads = 'loads: {gravity: [0, -9.81], efforts: {rocker_joint: {over_time: [[0, 0], [1, 2]]}}}'
+    check(linkage, f'{driven}\npublish_input: true\n{loads}\neffects: {effects}', looked=20)
 
 
 def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():

@@ -51,6 +51,8 @@ from linkage_ros.bag.reader import (
     topic_of as topic_of,
 )
 from linkage_ros.bag.recorder import (
+    DirectRecorder as DirectRecorder,
+    MessageSink as MessageSink,
     PLACE as PLACE,
     Recorder as Recorder,
     RecordingSummary as RecordingSummary,

@@ -18,12 +18,14 @@ space. However it ends, the bag states the outcome of all messages offered until
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
+import json
 from pathlib import Path
 import threading
 import time
+from typing import Protocol
 
 from linkage_ros.bag.metadata import BagSummary, RecordingStats
 from linkage_ros.bag.storage import FLUSH_AFTER
@@ -52,8 +54,46 @@ So a bound on the places is one on the bytes too, at most one message more for e
 offers. To count bytes, these threads would need a lock, and a tick would wait for it.
 """
 
+_FLUSHED_EVERY = 50_000
+
 OfferedMessage = tuple[int, int, int, bytes]
 """A message in the queue: topic, log time, publish time [ns] and its CDR bytes."""
+
+
+class MessageSink(Protocol):
+    """Takes the messages of a run: a recorder, or a memory of its last seconds."""
+
+    @property
+    def offer(self) -> Callable[[int, int, int, bytes], None]:
+        """Return what takes a message: topic, log time and publish time in [ns], CDR bytes."""
+
+
+class DirectRecorder:
+    """Writes each message at once, on the thread that offers it."""
+
+    def __init__(self, writer: BagWriter) -> None:
+        self._writer = writer
+        self._written = [0] * len(writer.topics)
+        self._unflushed = 0
+
+    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """Write a message; raise RecordingError if that fails."""
+        self._written[topic] += self._writer.write(topic, log_time, publish_time, data)
+        self._unflushed += 1
+        if self._unflushed == _FLUSHED_EVERY:
+            self._writer.flush()
+            self._unflushed = 0
+
+    @property
+    def message_counts(self) -> dict[str, int]:
+        """Return the number of messages written on each topic."""
+        names = (topic.name for topic in self._writer.topics)
+        return dict(zip(names, self._written, strict=True))
+
+    def close(self) -> None:
+        """Finish the bag."""
+        dropped = dict.fromkeys(self.message_counts, 0)
+        self._writer.close({'linkage_ros.dropped': json.dumps(dropped)})
 
 
 class ThreadCounter:

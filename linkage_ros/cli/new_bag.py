@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 import json
 import os
@@ -20,6 +21,7 @@ from linkage_ros.bag import (
     Bag,
     BagWriter,
     BEGUN,
+    DirectRecorder,
     FaultEvent,
     QosProfile,
     read_raw_metadata,
@@ -33,20 +35,35 @@ from linkage_ros.bag import (
     WITH_THE_RUN,
 )
 from linkage_ros.description import Scene
-from linkage_ros.messages import JOINT_STATE_TYPE, time_message
+from linkage_ros.messages import time_message
 from linkage_ros.replay import (
     Counterfactual,
+    CounterfactualTick,
     describe_topic,
     message_type,
     ReplayEvent,
     user_effects_here,
     versions_here,
 )
-from linkage_ros.tick import Pipeline
+from linkage_ros.tick import (
+    CRANK,
+    DIAGNOSTICS,
+    EXTRA,
+    FAULTS,
+    JOINT_STATES,
+    name_topics,
+    Pipeline,
+    RESETS,
+    RunTopic,
+    WITHHELD,
+)
 
-_FLUSHED_EVERY = 50_000
-_TIME = 'builtin_interfaces/msg/Time'
-_CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
+_EVENT_KEYS: dict[type[ReplayEvent], str] = {
+    SampleEvent: CRANK,
+    FaultEvent: FAULTS,
+    ResetEvent: RESETS,
+}
+"""Key of the topic of each event that is a message."""
 
 
 class ReplaySource(NamedTuple):
@@ -58,18 +75,12 @@ class ReplaySource(NamedTuple):
     crank_topic: str  # Topic of the crank samples
 
 
-class TopicNames(NamedTuple):
-    """Names of the topics written beside the samples, as the bag's run named them."""
-
-    joint_states: str
-    faults: str
-    withheld: str
-    resets: str
-    extras: tuple[str, ...]
+TopicNames = Mapping[RunTopic, str]
+"""Names of the topics of a new bag, as the source's run named them."""
 
 
 def names_for(source: ReplaySource, scene: Scene, counterfactual: Counterfactual) -> TopicNames:
-    """Return the names of the topics that a scene publishes."""
+    """Return the names of the topics that a scene publishes, in the order of the bag."""
     run = source.run
     known: dict[str, str] = {}
     if source.recorded is not None and not source.recorded.not_imported:
@@ -89,17 +100,13 @@ def names_for(source: ReplaySource, scene: Scene, counterfactual: Counterfactual
         own = source.recorded.joint_names if source.recorded is not None else ()
         if run.crank_topic != joint_states or scene.joint_names != own:
             joint_states = f'{node}/joint_states'
-
-    def resolve_key(key: str) -> str:
-        return pairs.get(key) or f'{node}{key[1:]}'
-
-    return TopicNames(
-        joint_states,
-        resolve_key('~/faults'),
-        resolve_key('~/withheld'),
-        resolve_key('~/resets'),
-        tuple(resolve_key(extra.topic) for extra in counterfactual.extras),
-    )
+    given = {JOINT_STATES: joint_states, CRANK: source.crank_topic}
+    left_out = {DIAGNOSTICS} if run.resets_topic else {DIAGNOSTICS, RESETS}
+    return {
+        topic: given.get(topic.key) or pairs.get(topic.name) or f'{node}{topic.name[1:]}'
+        for topic in counterfactual.topics
+        if topic.key not in left_out
+    }
 
 
 class ReplayBag:
@@ -119,29 +126,21 @@ class ReplayBag:
     ) -> None:
         bag = source.bag
         own = {topic.name: topic for topic in bag.topics}
-        topics = [
-            ('joint_states_topic', names.joint_states, JOINT_STATE_TYPE, QosProfile()),
-            ('crank_topic', source.crank_topic, JOINT_STATE_TYPE, own[source.crank_topic].qos),
-        ]
-        if source.run.resets_topic:
-            topics.append(('resets_topic', names.resets, _TIME, QosProfile()))
-        if scene.faults:
-            topics.append(('faults_topic', names.faults, 'std_msgs/msg/String', _CHANGES_QOS))
-        if counterfactual.suppresses_ticks:
-            topics.append(('withheld_topic', names.withheld, _TIME, QosProfile()))
         self._counterfactual = counterfactual
-        self._numbers = {key: index for index, (key, *_) in enumerate(topics)}
-        self._first_extra = len(topics)
-        named = {key: name for key, name, _, _ in topics}
-        described = [_describe_topic(bag, name, kind, qos) for _, name, kind, qos in topics]
-        described += [
-            _describe_topic(bag, name, extra.message, QosProfile())
-            for name, extra in zip(names.extras, counterfactual.extras, strict=True)
+        keys = [topic.key for topic in names]
+        self._handles = {key: keys.index(key) for key in keys}
+        described = [
+            _describe_topic(
+                bag,
+                name,
+                topic.type,
+                own[name].qos if topic.key == CRANK else topic.qos,
+            )
+            for topic, name in names.items()
         ]
         account = {
             'scene': scene.name,
-            **named,
-            'extra_topics': list(names.extras),
+            **name_topics(zip(keys, names.values(), strict=True)),
             BEGUN: WITH_THE_RUN,
             SEED: scene.seed,
             **({USER_EFFECTS: user_effects} if (user_effects := user_effects_here(scene)) else {}),
@@ -153,50 +152,33 @@ class ReplayBag:
         }
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
         files[RUN_FILE] = ('application/json', json.dumps(account).encode())
-        self._writer = BagWriter(folder, described, files)
-        self._written = [0] * len(described)
-        self._unflushed = 0
-        self._topics = described
+        self._recorder = DirectRecorder(BagWriter(folder, described, files))
 
     @property
     def message_counts(self) -> dict[str, int]:
         """Return the number of messages written on each topic."""
-        return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
+        return self._recorder.message_counts
 
     def write_event(self, event: ReplayEvent) -> None:
         """Write an event; raise RecordingError if it cannot be written."""
-        if isinstance(event, SampleEvent):
-            self._write_message(self._numbers['crank_topic'], *event)
-        elif isinstance(event, FaultEvent):
-            self._write_message(self._numbers['faults_topic'], *event)
-        elif isinstance(event, ResetEvent):
-            self._write_message(self._numbers['resets_topic'], *event)
-        else:
-            log_time, time, _, tick = event
-            if tick is None:
-                return
-            if tick.message:
-                self._write_message(
-                    self._numbers['joint_states_topic'], log_time, time, tick.message
-                )
-            for number, message in enumerate(tick.extras, self._first_extra):
-                if message:
-                    self._write_message(number, log_time, time, message)
-            if self._counterfactual.must_record(tick):
-                withheld = time_message(time)
-                self._write_message(self._numbers['withheld_topic'], log_time, time, withheld)
-
-    def _write_message(self, number: int, log_time: int, publish_time: int, data: bytes) -> None:
-        self._written[number] += self._writer.write(number, log_time, publish_time, data)
-        self._unflushed += 1
-        if self._unflushed == _FLUSHED_EVERY:
-            self._writer.flush()
-            self._unflushed = 0
+        offer, handles = self._recorder.offer, self._handles
+        if not isinstance(event, CounterfactualTick):
+            offer(handles[_EVENT_KEYS[type(event)]], *event)
+            return
+        log_time, time, _, tick = event
+        if tick is None:
+            return
+        if tick.message:
+            offer(handles[JOINT_STATES], log_time, time, tick.message)
+        for number, message in enumerate(tick.extras, handles.get(EXTRA, 0)):
+            if message:
+                offer(number, log_time, time, message)
+        if self._counterfactual.must_record(tick):
+            offer(handles[WITHHELD], log_time, time, time_message(time))
 
     def close(self) -> None:
         """Finish the bag."""
-        dropped = dict.fromkeys(self.message_counts, 0)
-        self._writer.close({'linkage_ros.dropped': json.dumps(dropped)})
+        self._recorder.close()
 
 
 def _describe_topic(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:

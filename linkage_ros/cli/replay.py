@@ -22,7 +22,7 @@ is not a failure.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -49,7 +49,7 @@ from linkage_ros.cli.bag_reading import (
     scene_of,
     unfinished_text,
 )
-from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
+from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table, table_of_rows
 from linkage_ros.description import load_scene, remove_bag, Scene
@@ -79,6 +79,7 @@ from linkage_ros.replay import (
     versions_here,
 )
 from linkage_ros.signals import heed_signals
+from linkage_ros.tick import EXTRA
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
@@ -337,9 +338,8 @@ def _replayed_with(
     names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
     kinds = {run.joint_states_topic: JOINT_STATE_TYPE}
-    kinds |= dict(
-        zip(names.extras, (extra.message for extra in counterfactual.extras), strict=True)
-    )
+    extras = {name: topic.type for topic, name in names.items() if topic.key == EXTRA}
+    kinds |= extras
     shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
     comparison = Comparison([(name, kinds[name]) for name in shared])
     own = own_joint_states(recorded) if recorded is not None else bool
@@ -358,7 +358,7 @@ def _replayed_with(
                 if isinstance(event, CounterfactualTick):
                     if event.tick is not None and event.tick.message:
                         published += 1
-                    then, now = _side_by_side(event, run, names, shared)
+                    then, now = _side_by_side(event, run, extras, shared)
                     if any(then) or any(now):
                         begin = begin or [event.time]
                         comparison.add_tick(TickPlace(comparison.ticks + 1, event.time), then, now)
@@ -409,13 +409,13 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
 
 
 def _side_by_side(
-    event: CounterfactualTick, run: RunMetadata, names: TopicNames, shared: list[str]
+    event: CounterfactualTick, run: RunMetadata, extras: Iterable[str], shared: list[str]
 ) -> tuple[list[bytes], list[bytes]]:
     """Return the messages of a tick, recorded and new, on each topic that both runs have."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
     now: dict[str, bytes] = {}
     if event.tick is not None:
-        now = dict(zip(names.extras, event.tick.extras, strict=False))
+        now = dict(zip(extras, event.tick.extras, strict=False))
         now[run.joint_states_topic] = event.tick.message
     return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
 

@@ -19,143 +19,211 @@ If q̈ follows from them, as q̈ = p − Σ T_k·|ψ'_k|·sign(q̇)/I, it is fou
 method finds the T_k from 0 on. Where there are none, the linkage jams (R. L. Norton, Design of
 Machinery, ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoretische Kinematik,
 1875).
+
+Both the balance and a Newton step are straight lines by an elimination of our own, so they have
+the same bits on every machine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import islice
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import chain
+from math import isfinite, sin
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from linkage_ros.kinematics import Elimination, make_vector, where
+from linkage_ros.kinematics.compiling import compile_line
 
-Array = NDArray[np.float64]
-
-_ROUNDS = 50
+_ROUNDS = 12
+_STEPS = 4
+"""Newton steps in a round."""
 _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
 Unknown = tuple[int, bool, float]
 """Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
 
-
-class LoadDependentFriction(NamedTuple):
-    """A joint with such friction, and the force in it; of a slider, the force is a real number."""
-
-    factor: float  # µ·ρ, in [m], or µ
-    lever: float  # |ψ'|, the rate of the joint at a rate of the input of 1
-    free: complex  # F₀, in [N]
-    by_acceleration: complex  # F₁, in [N] for a unit of q̈
-    by_frictions: tuple[complex, ...]  # P_k, in [N] for a unit of each T_k
+Rows = Callable[[Sequence[Any]], list[list[Any]]]
+"""Returns the rows of the linear system by its numbers that vary."""
 
 
-def solve_frictions(
-    joints: Sequence[LoadDependentFriction], pull: float, mobility: float = 0.0
-) -> list[float] | None:
+class FrictionSolver:
     """
-    Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
+    Finds the friction in joints by their forces.
 
-    ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how much q̈
-    falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
+    ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ. The linear system has ``size``
+    rows, and ``varying`` numbers that vary, from which ``rows_of`` makes the rows.
     """
-    found = [0.0] * len(joints)
-    places = range(len(joints))
-    free = [joint.free + pull * joint.by_acceleration for joint in joints]
-    more = [
-        [
-            by_friction - mobility * other.lever * joint.by_acceleration
-            for by_friction, other in zip(joint.by_frictions, joints, strict=True)
-        ]
-        for joint in joints
-    ]
-    sizes = [
-        _STAYS * joint.factor * (abs(joint.free) + abs(pull * joint.by_acceleration))
-        for joint in joints
-    ]
-    for _ in range(_ROUNDS):
-        missing, slopes = [], []
-        for i in places:
-            force = free[i] + sum(found[k] * more[i][k] for k in places)
-            size = abs(force)
-            along = joints[i].factor * force.conjugate() / size if size else 0j
-            missing.append(joints[i].factor * size - found[i])
-            slopes.append([(i == k) - (along * more[i][k]).real for k in places])
-        if all(abs(missing[i]) <= sizes[i] + _STAYS * abs(found[i]) for i in places):
-            return found
-        try:
-            steps = np.linalg.solve(slopes, missing).tolist()
-        except np.linalg.LinAlgError:
+
+    def __init__(
+        self, unknowns: Sequence[Unknown], rows_of: Rows, size: int, varying: int
+    ) -> None:
+        self._unknowns = unknowns
+        self._rows_of = rows_of
+        self._size = size
+        self._varying = varying
+        self._count = len(unknowns)
+        self._solve_sides = cache(self._compile_system)
+        # Of each joint x and y of F₀, F₁ and each P_k; |ψ'| of each; the pull and the mobility.
+        count = self._count
+        self._begin = _compile(self._begin_forces, 2 * count * (count + 2) + count + 2)
+        self._improve = _compile(self._improve_frictions, count * (3 + 2 * count))
+
+    def _compile_system(self, number: int, forces_only: bool) -> Callable[..., Any]:
+        """Compile the solutions for a number of right sides, or the forces in the joints alone."""
+
+        def solve(*numbers: Any) -> list[Any]:
+            varying = self._varying
+            elimination = Elimination(self._rows_of(numbers[:varying]), ())
+            if any(divisor == 0.0 for divisor in elimination.divisors):
+                return []
+            found = [elimination.solve(side) for side in _pieces(numbers[varying:], self._size)]
+            return self._joint_forces(found) if forces_only else [*chain(*found)]
+
+        return _compile(solve, self._varying + number * self._size)
+
+    def _solve(self, numbers: Sequence[float], forces_only: bool) -> Sequence[float] | None:
+        number = (len(numbers) - self._varying) // self._size
+        found = self._solve_sides(number, forces_only)(*numbers)
+        return found[0] if found and all(map(isfinite, found[0])) else None
+
+    def forces_in(self, *numbers: float) -> Sequence[float] | None:
+        """
+        Return the force in each joint, x and y, for right sides one after the other.
+
+        ``numbers`` are those of the system that vary, and then the right sides.
+        """
+        return self._solve(numbers, forces_only=True)
+
+    def _joint_forces(self, solutions: Sequence[Sequence[Any]]) -> list[Any]:
+        forces: list[Any] = []
+        for first, pin, _ in self._unknowns:
+            for one in solutions:
+                forces += (one[first], one[first + 1] if pin else 0.0)
+        return forces
+
+    def solve_pressed(self, *numbers: float) -> list[float] | None:
+        """
+        Return the solution of the system with such friction, and the friction in each joint.
+
+        The right sides in ``numbers`` are first without this friction, then of a unit of each.
+        """
+        flat = self._solve(numbers, forces_only=False)
+        if flat is None:
             return None
-        found = [now + step for now, step in zip(found, steps, strict=True)]
-    return None
+        free, *units = _pieces(flat, self._size)
+        nothing = [0.0] * len(free)
+        forces = self._joint_forces([free, nothing, *units])
+        found = self.solve_frictions(forces, [0.0] * self._count, 0.0)
+        if found is None:
+            return None
+        for friction, unit in zip(found, units, strict=True):
+            free = [force + friction * more for force, more in zip(free, unit, strict=True)]
+        return [*free, *found]
 
+    def friction_effort(
+        self, forces: Sequence[float], levers: Sequence[float], pull: float, mobility: float
+    ) -> float | None:
+        """
+        Return the friction effort at the input, in [N·m] or [N]; None if the linkage jams.
 
-def friction_effort(
-    unknowns: Sequence[Unknown],
-    forces: Sequence[float],
-    levers: Sequence[float],
-    pull: float,
-    mobility: float,
-) -> float | None:
-    """
-    Return the friction effort at the input, in [N·m] or [N]; None if the linkage jams.
+        The parameters are as in `solve_frictions`.
+        """
+        found = self.solve_frictions(forces, levers, pull, mobility)
+        if found is None:
+            return None
+        return sum([lever * friction for lever, friction in zip(levers, found, strict=True)])
 
-    ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each joint;
-    ``pull`` and ``mobility`` are as in `solve_frictions`.
-    """
-    count, numbers = len(unknowns), iter(forces)
-    joints = []
-    for (_, _, factor), lever in zip(unknowns, levers, strict=True):
-        free, by_pull, *others = [complex(*islice(numbers, 2)) for _ in range(count + 2)]
-        joints.append(LoadDependentFriction(factor, lever, free, by_pull, tuple(others)))
-    found = solve_frictions(joints, pull, mobility)
-    if found is None:
+    def solve_frictions(
+        self,
+        forces: Sequence[float],
+        levers: Sequence[float],
+        pull: float,
+        mobility: float = 0.0,
+    ) -> Sequence[float] | None:
+        """
+        Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
+
+        ``forces`` are as in `forces_in`, for F₀, F₁ and the P_k; ``levers`` are |ψ'| of each
+        joint. ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how
+        much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
+        """
+        count = self._count
+        (numbers,) = self._begin(*forces, *levers, pull, mobility)
+        sizes, moved = numbers[:count], numbers[count:]
+        found: Sequence[float] = (0.0,) * count
+        for _ in range(_ROUNDS):
+            improved = self._improve(*found, *moved)
+            if improved is None:
+                return None
+            (numbers,) = improved
+            found, missing = numbers[:count], numbers[count:]
+            for friction, left, size in zip(found, missing, sizes, strict=True):
+                # Not a number: no force is that great.
+                if not abs(left) <= size + _STAYS * abs(friction):
+                    break
+            else:
+                return found
         return None
-    return sum(joint.lever * friction for joint, friction in zip(joints, found, strict=True))
+
+    def _begin_forces(self, *numbers: Any) -> list[Any]:
+        """Return what is small beside each friction, and each force without and by frictions."""
+        count = self._count
+        begin = 2 * count * (count + 2)
+        *levers, pull, mobility = numbers[begin:]
+        sizes: list[Any] = []
+        forces: list[Any] = []
+        pieces = _pieces(numbers[:begin], 2 * (count + 2))
+        for (_, _, factor), piece in zip(self._unknowns, pieces, strict=True):
+            x, y, by_x, by_y, *units = piece
+            size = abs(make_vector(x, y)) + abs(make_vector(pull * by_x, pull * by_y))
+            sizes.append(_STAYS * factor * size)
+            forces += (x + pull * by_x, y + pull * by_y)
+            for k, lever in enumerate(levers):
+                falls = mobility * lever
+                forces += (units[2 * k] - falls * by_x, units[2 * k + 1] - falls * by_y)
+        return [*sizes, *forces]
+
+    def _improve_frictions(self, *numbers: Any) -> list[Any]:
+        """Return frictions after some Newton steps, and what of each is missing then."""
+        count = self._count
+        found, forces = [*numbers[:count]], numbers[count:]
+        for _ in range(_STEPS):
+            missing, slopes = self._missing(found, forces)
+            elimination = Elimination(slopes, ())
+            if any(divisor == 0.0 for divisor in elimination.divisors):
+                return []
+            steps = elimination.solve(missing)
+            found = [now + step for now, step in zip(found, steps, strict=True)]
+        missing, _ = self._missing(found, forces)
+        return [*found, *missing]
+
+    def _missing(
+        self, found: Sequence[Any], forces: Sequence[Any]
+    ) -> tuple[list[Any], list[list[Any]]]:
+        """Return what is missing of each friction, and how it falls with each of them."""
+        count = self._count
+        missing, slopes = [], []
+        for i, piece in enumerate(_pieces(forces, 2 * (count + 1))):
+            _, _, factor = self._unknowns[i]
+            x, y, *units = piece
+            for k, friction in enumerate(found):
+                x, y = x + friction * units[2 * k], y + friction * units[2 * k + 1]
+            size = abs(make_vector(x, y))
+            along = factor / where(size > 0.0, size, 1.0)
+            missing.append(factor * size - found[i])
+            falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
+            slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
+        return missing, slopes
 
 
-def solve_pressed(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
-    """
-    Return the solution of a linear system with such friction, and the friction in each joint.
-
-    ``sides`` are the right sides: first without this friction, then of a unit of each.
-    """
-    solutions = _solve_sides(matrix, sides)
-    if solutions is None:
-        return None
-    free, *units = solutions
-    joints = []
-    for first, pin, factor in unknowns:
-        by_frictions = tuple(_joint_force(unit, first, pin) for unit in units)
-        joints.append(
-            LoadDependentFriction(factor, 0.0, _joint_force(free, first, pin), 0j, by_frictions)
-        )
-    found = solve_frictions(joints, 0.0)
-    if found is None:
-        return None
-    for friction, unit in zip(found, units, strict=True):
-        free = [force + friction * more for force, more in zip(free, unit, strict=True)]
-    return [*free, *found]
+def _pieces(numbers: Sequence[Any], size: int) -> list[list[Any]]:
+    """Return numbers in pieces of one size."""
+    return [list(piece) for piece in zip(*[iter(numbers)] * size, strict=True)]
 
 
-def forces_in(unknowns: Sequence[Unknown], matrix: Array, *sides: float) -> list[float] | None:
-    """Return the force in each joint, x and y, for right sides one after the other."""
-    solutions = _solve_sides(matrix, sides)
-    if solutions is None:
-        return None
-    forces = [_joint_force(each, first, pin) for first, pin, _ in unknowns for each in solutions]
-    return [part for force in forces for part in (force.real, force.imag)]
-
-
-def _solve_sides(matrix: Array, sides: Sequence[float]) -> list[list[float]] | None:
-    """Return the solutions of a linear system for right sides one after the other, or None."""
-    try:
-        found = np.linalg.solve(matrix, np.reshape(sides, (-1, len(matrix))).T).T
-    except np.linalg.LinAlgError:
-        return None
-    return found.tolist() if np.isfinite(found).all() else None
-
-
-def _joint_force(solution: Sequence[float], first: int, pin: bool) -> complex:
-    return complex(solution[first], solution[first + 1] if pin else 0.0)
+def _compile(function: Callable[..., Sequence[Any]], count: int) -> Callable[..., Any]:
+    """Return a function of some numbers as straight-line code."""
+    # Numbers without a pattern, so that no decision is made by chance.
+    return compile_line(function, [0.1 * sin(1.0 + 1.7 * i * i) for i in range(count)])

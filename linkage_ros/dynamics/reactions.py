@@ -29,7 +29,7 @@ stretch of a link moves the linkage, to first order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from math import isfinite
 from typing import NamedTuple, TYPE_CHECKING
@@ -62,6 +62,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import JointCoordinate, LoadedPoint
+    from linkage_ros.dynamics.load_dependent_friction import FrictionSolver
 
 Array = NDArray[np.float64]
 
@@ -143,10 +144,24 @@ class JointMatrix:
                 )
             else:
                 self._fill_moment(self._joint_sides(given.child, given.parent), column)
+        self._where, self.varying_count = where, len(where)
         self._fill = partial(_fill_matrix, self._matrix, np.array(where, dtype=np.intp))
 
     def matrix_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
         """Return the matrix at coordinates and places, in the ground frame in [m]."""
+        matrix: Array = call(self._fill, *self.varying_at(coordinates, places))
+        return matrix
+
+    def rows_of(self, varying: Sequence[float]) -> list[list[float]]:
+        """Return the rows of the matrix by its numbers that vary."""
+        rows: list[list[float]] = self._matrix.tolist()
+        for place, value in zip(self._where, varying, strict=True):
+            row, column = divmod(place, self.size)
+            rows[row][column] = value
+        return rows
+
+    def varying_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> list[float]:
+        """Return the numbers of the matrix that vary, at coordinates and places as above."""
         values: list[float] = []
         for place, center, factor in self._pins:
             lever = places[place] - places[center]
@@ -157,8 +172,7 @@ class JointMatrix:
                 lever = (places[place] - places[center]) / self._scale
                 moment = lever.real * force.imag - lever.imag * force.real
                 values += (sign * force.real, sign * force.imag, sign * moment)
-        matrix: Array = call(self._fill, *values)
-        return matrix
+        return values
 
     def _plan_pins(
         self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
@@ -286,18 +300,6 @@ class Reactions:
         self._load_dependent = tuple(
             joint for joint in mechanics.friction_joints if joint.friction.coefficient
         )
-        self._solve_system: Callable[..., list[float] | None] = _solve_linear
-        if self._load_dependent:
-            from linkage_ros.dynamics import (
-                load_dependent_friction,  # local import: only with it
-            )
-
-            unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
-            self._solve_system = partial(load_dependent_friction.solve_pressed, unknowns)
-            self._forces_in = partial(load_dependent_friction.forces_in, unknowns)
-            self._solve_friction_effort = partial(
-                load_dependent_friction.friction_effort, unknowns
-            )
         self._published = tuple(
             (rows.get(joint.child, -1), rows.get(joint.parent, -1))
             if isinstance(joint, RevoluteJoint)
@@ -385,7 +387,18 @@ class Reactions:
         if not found:
             return None
         forces, levers = found
-        return self._solve_friction_effort(forces, levers, pull, mobility)
+        return self._frictions.friction_effort(forces, levers, pull, mobility)
+
+    @cached_property
+    def _frictions(self) -> FrictionSolver:
+        """Return the solver of the friction that grows with the forces."""
+        from linkage_ros.dynamics.load_dependent_friction import (
+            FrictionSolver,  # local import: only with it
+        )
+
+        unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
+        matrix = self._matrix
+        return FrictionSolver(unknowns, matrix.rows_of, matrix.size, matrix.varying_count)
 
     @cached_property
     def _compiled_motion(self) -> Compiled:
@@ -410,7 +423,7 @@ class Reactions:
         more, _ = self._right_sides(position, velocity, pulled, places, given)
         by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
         columns = [*sides[:size], *by_pull, *sides[size:]]
-        forces = call(self._forces_in, self._matrix.matrix_at(x, places), *columns)
+        forces = call(self._frictions.forces_in, *self._matrix.varying_at(x, places), *columns)
         if not has_result(forces):
             return []
         v = velocity.state.coordinates
@@ -485,7 +498,12 @@ class Reactions:
             return None
         x, places = position.state.coordinates, self._follower.places(position)
         sides, resistances = self._right_sides(position, velocity, acceleration, places, given)
-        forces = call(self._solve_system, self._matrix.matrix_at(x, places), *sides)
+        if self._load_dependent:
+            forces = call(
+                self._frictions.solve_pressed, *self._matrix.varying_at(x, places), *sides
+            )
+        else:
+            forces = call(_solve_linear, self._matrix.matrix_at(x, places), *sides)
         if not has_result(forces):
             return None
         v = velocity.state.coordinates

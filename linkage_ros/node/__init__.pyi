@@ -15,6 +15,7 @@ from linkage_ros.node.diagnostics import (
 )
 from linkage_ros.node.node import LinkageNode as LinkageNode
 from linkage_ros.node.parameters import LINKAGE_NODE as LINKAGE_NODE
+from linkage_ros.node.qos import recorded_qos as recorded_qos
 from linkage_ros.node.real_time import (
     leave_out_shared_memory as leave_out_shared_memory,
     stay_on_this_machine as stay_on_this_machine,

@@ -23,6 +23,7 @@ from time import monotonic
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from linkage_ros.bag import Recorder
 from linkage_ros.errors import list_names
 from linkage_ros.kinematics import Closure, describe_ranges, Position, Status
 from linkage_ros.messages import head_of, NANOSECONDS, Rejection
@@ -149,7 +150,8 @@ class DiagnosticsSummary:
     window_end: CountsSnapshot
     recording_failure: str  # Reason why a wanted recording does not run; '' otherwise
     limits: Mapping[str, float]  # Warning threshold for each attribute of `Nearness`; 0 for never
-    # Memory of the last seconds; None when a bag is recorded continuously.
+    # Recorder of a bag, and memory of the last seconds; one of them at most.
+    recorder: Recorder | None = None
     snapshots: RunSnapshots | None = None
     # Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
     clock_silence: float = 0.0
@@ -394,7 +396,7 @@ class DiagnosticsSummary:
             return self._memory_status(self.snapshots)
         level, message = OK, 'Not recording'
         values: dict[str, object] = {}
-        recorder = self.loop.recorder
+        recorder = self.recorder
         if recorder is not None:
             level, message = OK, 'Recording'
             topics = recorder.read_counts()

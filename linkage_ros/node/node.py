@@ -24,13 +24,11 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.bag import Topic
 from linkage_ros.description import load_scene, Scene, scene_notes
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.node import pacing
-from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import (
     chatter_count,
     CLOCK_PATIENCE,
@@ -41,7 +39,12 @@ from linkage_ros.node.diagnostics import (
     Warnings,
 )
 from linkage_ros.node.pacing import ClockGuard
-from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE, nearness_limits
+from linkage_ros.node.parameters import (
+    declare_parameters,
+    LINKAGE_NODE,
+    nearness_limits,
+    SET_BEFORE_CONFIGURATION,
+)
 from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
@@ -185,13 +188,11 @@ class LinkageNode(LifecycleNode):
                 )
             scene = load_scene(file, [each for each in self.get_parameter('set').value if each])
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
-            self._scene_topics.connect(pipeline)
+            self._scene_topics.connect(scene, pipeline)
             for closure in pipeline.closures:
                 # Computed here, so that the first tick does not wait: the branch of an iterated
                 # linkage is followed at this point.
                 _ = closure.singular_inputs
-            if scene.robot_description:
-                self._scene_topics.publish_description(scene, pipeline)
             self._scene_topics.publish_scene(scene, pipeline, self._joint_states.topic_name)
         except LinkageError as error:
             self._scene_topics.disconnect()
@@ -267,6 +268,7 @@ class LinkageNode(LifecycleNode):
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
         self.end_run()
+        self.scene = None
         self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
 
@@ -312,21 +314,12 @@ class LinkageNode(LifecycleNode):
         assert self.loop is not None
         directory = self.get_parameter('runs_directory').value
         return self.recording.start(
-            self.scene, self.loop, directory, self._bag_topics, self._scene_topics.description
+            self.scene,
+            self.loop,
+            directory,
+            partial(self._scene_topics.describe_topics, self._joint_states, self._diagnostics),
+            self._scene_topics.description,
         )
-
-    def _bag_topics(self) -> list[tuple[str, Topic]]:
-        """Describe the recorded topics, in the order of their handles."""
-        assert self.loop is not None
-        handles, states = self.loop.topics, self._joint_states
-        joint_states = bag_topic(states.topic_name, JointState, states.qos_profile)
-        diagnostics = bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)
-        topics = {
-            handles.joint_states: ('joint_states_topic', joint_states),
-            handles.diagnostics: ('diagnostics_topic', diagnostics),
-            **self._scene_topics.describe_topics(handles),
-        }
-        return [topics[handle] for handle in sorted(topics)]
 
     # Services.
 
@@ -361,12 +354,10 @@ class LinkageNode(LifecycleNode):
     ) -> Trigger.Response:
         if self.loop is None or not self.loop.is_running:
             return _fill_response(response, False, 'not active: nothing to record')
-        if self.recording.has_ended(self.loop):
+        if self.recording.has_ended:
             self.recording.stop(self.loop)
         if self.loop.recorder is not None:
-            return _fill_response(
-                response, False, f'already {self.recording.describe_state(self.loop)}'
-            )
+            return _fill_response(response, False, f'already {self.recording.state_text}')
         line = self._start_recording()
         return _fill_response(response, self.loop.recorder is not None, line)
 
@@ -396,6 +387,12 @@ class LinkageNode(LifecycleNode):
         simulated = self.get_parameter('use_sim_time').value
         running = self.loop is not None and self.loop.is_running
         for parameter in parameters:
+            if parameter.name in SET_BEFORE_CONFIGURATION and self.scene is not None:
+                return SetParametersResult(
+                    successful=False,
+                    reason=f'{parameter.name} cannot change while the node is configured; '
+                    'deactivate it and clean it up first',
+                )
             if parameter.name == 'use_sim_time' and parameter.value != simulated and running:
                 return SetParametersResult(
                     successful=False,
@@ -489,6 +486,7 @@ class LinkageNode(LifecycleNode):
             window_start=self._last_counts,
             window_end=now,
             recording_failure=self.recording.failure,
+            recorder=self.recording.recorder,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
             system=self._real_time.in_force | self._middleware,

@@ -24,6 +24,9 @@ from rclpy.parameter import Parameter
 _PERIOD = 0.1, 3600.0
 """Bounds of a period, in [s]."""
 
+_ANY_TIME = 'may be changed at any time'
+_UNCONFIGURED = 'may be changed while the node is unconfigured'
+
 
 class NodeParameter(NamedTuple):
     """A parameter of a node."""
@@ -32,7 +35,7 @@ class NodeParameter(NamedTuple):
     default: Any  # Default
     meaning: str  # Meaning with its unit, for the descriptor and ``--help``
     bounds: tuple[float, float] | None = None  # Least and greatest value; None for no bounds
-    changeable: bool = False  # Whether it may be changed while the node runs
+    changeable: str = ''  # When it may be changed, as a remark; '' for never
 
 
 _LIMITS = tuple(
@@ -41,7 +44,7 @@ _LIMITS = tuple(
         default,
         f'{meaning}, below which the diagnostics warn; 0: never',
         (0.0, highest),
-        changeable=True,
+        changeable=_ANY_TIME,
     )
     for measure, default, highest, meaning in (
         ('transmission_angle', 0.0, pi / 2, 'Transmission angle [rad]'),
@@ -51,13 +54,19 @@ _LIMITS = tuple(
 )
 
 LINKAGE_NODE = (
-    NodeParameter('scene', '', 'Scene file or linkage file, or the name of a shipped one'),
+    NodeParameter(
+        'scene',
+        '',
+        'Scene file or linkage file, or the name of a shipped one',
+        changeable=_UNCONFIGURED,
+    ),
     NodeParameter(
         'set',
         # Not empty: rclpy cannot tell the type of an empty list, nor read one from a file. And one
         # parameter without a value makes it answer a request for all with none.
         [''],
         "Keys of the scene to set, as rate=500; '': none",
+        changeable=_UNCONFIGURED,
     ),
     NodeParameter('runs_directory', '', "Folder of the bags; '' for the scene's own"),
     NodeParameter('autostart', True, 'Whether the node configures and activates itself'),
@@ -67,18 +76,26 @@ LINKAGE_NODE = (
     ),
     NodeParameter('lock_memory', False, 'Whether the memory of the process is locked in RAM'),
     NodeParameter(
-        'diagnostics_period', 1.0, 'Time between two diagnostics [s]', _PERIOD, changeable=True
+        'diagnostics_period',
+        1.0,
+        'Time between two diagnostics [s]',
+        _PERIOD,
+        changeable=_ANY_TIME,
     ),
     NodeParameter(
         'warning_period',
         5.0,
         'Least time between two warnings of one kind [s]',
         _PERIOD,
-        changeable=True,
+        changeable=_ANY_TIME,
     ),
     *_LIMITS,
 )
 """The parameters of the linkage node."""
+
+SET_BEFORE_CONFIGURATION = frozenset(
+    parameter.name for parameter in LINKAGE_NODE if parameter.changeable == _UNCONFIGURED
+)
 
 
 def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
@@ -88,8 +105,7 @@ def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
         if name in given and given[name].type_ is Parameter.Type.NOT_SET:
             del given[name]  # an empty list in a file
         descriptor = ParameterDescriptor(description=meaning, read_only=not changeable)
-        if changeable:
-            descriptor.additional_constraints = 'may be changed at any time'
+        descriptor.additional_constraints = changeable
         if bounds is not None:
             low, high = bounds
             if isinstance(default, float):
@@ -142,7 +158,7 @@ def _help_lines(
         if bounds is not None:
             facts.append(f'{bounds[0]:g} to {bounds[1]:g}')
         if changeable:
-            facts.append('may be changed at any time')
+            facts.append(changeable)
         head = f'  {name}'.ljust(width)
         yield fill('; '.join(facts), 96, initial_indent=head, subsequent_indent=' ' * width)
     yield f'\nexample:\n  {command} --ros-args {example}'

@@ -16,7 +16,6 @@ from datetime import datetime
 from functools import partial
 from os.path import lexists
 from pathlib import Path
-from typing import Any, cast
 
 from linkage_ros.bag import (
     BagWriter,
@@ -31,20 +30,16 @@ from linkage_ros.bag import (
     Topic,
     TopicCounts,
     WITH_THE_RUN,
-    WRENCH_TOPICS,
 )
 from linkage_ros.description import RecordParameters, Scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.replay import EXTRA, scene_files, to_attachments
-from linkage_ros.tick import TickLoop
+from linkage_ros.replay import scene_files, to_attachments
+from linkage_ros.tick import DESCRIPTION, TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 """Recording settings for a service call if the scene has none."""
 
-
-DESCRIPTION = 'description_topic'
-"""Key of the robot model's topic."""
 
 Answer = Callable[[bool, str], None]
 """Takes whether the call succeeded, and the outcome as one line."""
@@ -62,6 +57,8 @@ class RunRecording:
         self.failure = ''
         """Reason why a recording is incomplete or could not be started; '' otherwise."""
         self._last_state: tuple[RecordingError, bool] | None = None
+        self.recorder: Recorder | None = None
+        """Recorder of the bag; None when nothing is recorded, or only kept in memory."""
         self.snapshots: RunSnapshots | None = None
         """The memory; None when a bag is recorded continuously."""
 
@@ -89,13 +86,16 @@ class RunRecording:
         def new_bag(whole: bool) -> BagWriter:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _new_folder(runs, record.name, scene.name)
-            files = _make_attachments(scene, described, begun, folder)
+            names = [(key, topic.name) for key, topic in described]
+            files = scene_files(scene, names, begun, folder)
             opening = [
                 (index, description)
                 for index, (key, _) in enumerate(described)
                 if key == DESCRIPTION
             ]
-            return BagWriter(folder, [t for _, t in described], files, storage, opening)
+            return BagWriter(
+                folder, [t for _, t in described], to_attachments(files), storage, opening
+            )
 
         try:
             # The client of a service does not know the working directory of this process.
@@ -109,25 +109,29 @@ class RunRecording:
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure
-        loop.recorder = Recorder(writer, capacity=record.queue, flush_period=storage.flush_period)
+        loop.recorder = self.recorder = Recorder(
+            writer, capacity=record.queue, flush_period=storage.flush_period
+        )
         line = f'recording to {writer.folder}'
         if record.name and writer.folder.name != record.name:
             line += f': {record.name} exists already'
         self._logger.info(line)
         return line
 
-    def describe_state(self, loop: TickLoop) -> str:
+    @property
+    def state_text(self) -> str:
         """Return the state of the recording as text; '' for none."""
         if self.snapshots is not None:
             return str(self.snapshots)
-        if loop.recorder is None:
+        if self.recorder is None:
             return ''
-        waits = '' if loop.recorder.is_recording else f'; {loop.recorder.failure}'
-        return f'recording to {loop.recorder.folder}{waits}'
+        waits = '' if self.recorder.is_recording else f'; {self.recorder.failure}'
+        return f'recording to {self.recorder.folder}{waits}'
 
-    def has_ended(self, loop: TickLoop) -> bool:
+    @property
+    def has_ended(self) -> bool:
         """Return whether a bag has failed for good and is not reported on yet."""
-        return self.snapshots is None and loop.recorder is not None and loop.recorder.has_ended
+        return self.recorder is not None and self.recorder.has_ended
 
     def begin_snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """Begin to write the memory to a bag; as `RunSnapshots.begin_snapshot`."""
@@ -153,12 +157,13 @@ class RunRecording:
 
     def check_failure(self, loop: TickLoop) -> bool:
         """Log that the recording has failed, or goes on again; return whether it logged."""
-        recorder = loop.recorder
+        if self.snapshots is not None:
+            if has_failed := self.snapshots.memory.failure is not None:
+                self.stop(loop)
+            return has_failed
+        recorder = self.recorder
         if recorder is None or recorder.failure is None:
             return False
-        if self.snapshots is not None:
-            self.stop(loop)
-            return True
         state = recorder.failure, recorder.is_recording
         if state == self._last_state:
             return False
@@ -172,11 +177,11 @@ class RunRecording:
 
     def stop(self, loop: TickLoop) -> tuple[bool, str]:
         """Close the bag or end the memory; return whether it is complete, and one line of text."""
-        if loop.recorder is None:
-            return False, 'not recording'
-        recorder, loop.recorder = loop.recorder, None
+        recorder, self.recorder, loop.recorder = self.recorder, None, None
         if self.snapshots is not None:
             return self._end_memory(self.snapshots)
+        if recorder is None:
+            return False, 'not recording'
         summary = recorder.stop()
         self.ended_bags.append(summary)
         failure = summary.failure or losses_text(summary.folder, summary.topics)
@@ -198,8 +203,7 @@ class RunRecording:
     ) -> str:
         memory = SnapshotMemory(topics, storage.snapshot_seconds, storage.snapshot_bytes)
         self.snapshots = RunSnapshots(memory, new_bag)
-        # The tick sees a recorder: it only uses `offer`.
-        loop.recorder = cast('Recorder', memory)
+        loop.recorder = memory
         line = str(self.snapshots)
         self._logger.info(line)
         return line
@@ -215,20 +219,6 @@ class RunRecording:
         else:
             self._logger.info(str(summary))
         return not summary.failure, str(summary)
-
-
-def _make_attachments(
-    scene: Scene,
-    topics: Sequence[tuple[str, Topic]],
-    begun: str,
-    folder: Path,
-) -> dict[str, tuple[str, bytes]]:
-    several = {EXTRA, WRENCH_TOPICS}
-    named: dict[str, Any] = {key: topic.name for key, topic in topics if key not in several}
-    named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    if wrenches := [topic.name for key, topic in topics if key == WRENCH_TOPICS]:
-        named[WRENCH_TOPICS] = wrenches
-    return to_attachments(scene_files(scene, named, begun, folder))
 
 
 def _new_folder(directory: Path, name: str, scene: str) -> Path:

@@ -14,19 +14,37 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag import Topic, WRENCH_TOPICS
+from linkage_ros.bag import QosProfile, Topic, WRENCH_TOPICS
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import text_message
-from linkage_ros.node.bag_topics import bag_topic
-from linkage_ros.node.run_recording import DESCRIPTION
-from linkage_ros.replay import announced_text, change_text, EXTRA, message_type, scene_files
-from linkage_ros.tick import Pipeline, RecordedTopics, TakeMessage
+from linkage_ros.node.qos import offered_qos, recorded_qos
+from linkage_ros.replay import (
+    announced_text,
+    change_text,
+    describe_topic,
+    message_type,
+    scene_files,
+)
+from linkage_ros.tick import (
+    CRANK,
+    DESCRIPTION,
+    DIAGNOSTICS,
+    EXTRA,
+    FAULTS,
+    FAULTS_QOS,
+    JOINT_STATES,
+    LATCHED_QOS,
+    list_run_topics,
+    Pipeline,
+    RunTopic,
+    SENSOR_QOS,
+    TakeMessage,
+)
 from linkage_ros.workbench import find_tool
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -38,20 +56,16 @@ if TYPE_CHECKING:
 
 SCENE_TOPIC = '~/scene'
 
-CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Sensor data QoS with a deeper queue: even at a slow tick every sample gets into the bag."""
+CRANK_QOS = offered_qos(SENSOR_QOS)
+OUTPUT_QOS = offered_qos(QosProfile())
 
-OUTPUT_QOS = QoSProfile(depth=10)
-"""Reliable and volatile, as robot_state_publisher and RViz expect."""
+CHANGES_QOS = offered_qos(FAULTS_QOS)
 
-_DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As robot_state_publisher and RViz expect of a robot model, whenever they start."""
-
-SCENE_QOS = _DESCRIPTION_QOS
+SCENE_QOS = offered_qos(LATCHED_QOS)
 """A page that is opened later has to know the linkage."""
 
-CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""A late subscriber has to know which faults are on."""
+_TAKEN = (CRANK, WRENCH_TOPICS)
+"""Keys of the topics whose messages a tick takes."""
 
 Inject = Callable[[str, SetBool.Request, SetBool.Response], SetBool.Response]
 
@@ -67,66 +81,60 @@ class SceneTopics:
         self._node = node
         self._on_inject = on_inject
         self._fault_kinds: dict[str, str] = {}
-        self._change_publisher: Publisher | None = None
-        self._description: Publisher | None = None
         self.description = b''
         """Serialized message with the robot model; empty if the scene asks for none."""
+        self._topics: list[RunTopic] = []
+        self._endpoints: dict[RunTopic, Any] = {}
         self._scene_publisher: Publisher | None = None
         self._injectors: list[Any] = []
-        self.extras: list[Publisher] = []
-        """Publishers of the pipeline's auxiliary topics."""
-        self._crank_name = ''
-        self.crank: Subscription | None = None
-        """Subscription to the drives' topic; None without one."""
-        self.wrenches: list[Subscription] = []
-        """Subscriptions to the topics of wrenches on links."""
 
-    def connect(self, pipeline: Pipeline) -> None:
+    def connect(self, scene: Scene, pipeline: Pipeline) -> None:
         """
         Create what the scene asks for, and nothing else.
 
-        LinkageError if the package of a message is not installed, or the topic of a wrench is
-        taken.
+        LinkageError if the package of a message is not installed, the topic of a wrench is taken,
+        or the published joints do not determine the pose of every link of the robot model.
         """
         self.disconnect()
-        node, overridable = self._node, QoSOverridingOptions.with_default_policies()
-        for extra in pipeline.extras:
-            self.extras.append(
-                node.create_publisher(
-                    message_type(extra.message, f'effects.{extra.effect}'),
-                    extra.topic,
-                    OUTPUT_QOS,
-                    qos_overriding_options=overridable,
-                )
-            )
-        self._crank_name = pipeline.topic
-        if pipeline.topic:
-            self.crank = node.create_subscription(
-                JointState,
-                pipeline.topic,
+        self._topics = list_run_topics(pipeline, has_description=scene.robot_description)
+        self._check_wrenches(pipeline)
+        for topic in self._topics:
+            if topic.key in {*_TAKEN, EXTRA, FAULTS, DESCRIPTION}:
+                self._endpoints[topic] = self._create_endpoint(topic)
+        for publisher in self._with_key(DESCRIPTION):
+            model = find_tool('robot_description').scene_urdf(scene, pipeline.closures).decode()
+            self.description = text_message(model)
+            publisher.publish(self.description)
+        for name, fault in pipeline.injection.faults.items() if pipeline.injection else ():
+            self._fault_kinds[name] = fault.kind
+            serve = partial(self._on_inject, name)
+            self._injectors.append(self._node.create_service(SetBool, f'~/inject/{name}', serve))
+
+    def _create_endpoint(self, topic: RunTopic) -> Any:
+        """Create the publisher of a topic, or the subscription whose messages the tick takes."""
+        message = message_type(topic.type, topic.asked_by)
+        qos, overridable = offered_qos(topic.qos), QoSOverridingOptions.with_default_policies()
+        if topic.key in _TAKEN:
+            return self._node.create_subscription(
+                message,
+                topic.name,
                 never_called,
-                CRANK_QOS,
+                qos,
                 callback_group=TakenByTick(),
                 qos_overriding_options=overridable,
             )
-        if pipeline.injection is not None:
-            self._change_publisher = node.create_publisher(
-                message_type('std_msgs/msg/String', 'faults'), '~/faults', CHANGES_QOS
-            )
-            for name, fault in pipeline.injection.faults.items():
-                self._fault_kinds[name] = fault.kind
-                serve = partial(self._on_inject, name)
-                self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
-        if pipeline.wrenches:
-            self._connect_wrenches(pipeline, overridable)
+        options = overridable if topic.key == EXTRA else None
+        return self._node.create_publisher(
+            message, topic.name, qos, qos_overriding_options=options
+        )
 
-    def _connect_wrenches(self, pipeline: Pipeline, overridable: QoSOverridingOptions) -> None:
-        """Subscribe to the topics of wrenches, unless the node has other messages there."""
+    def _check_wrenches(self, pipeline: Pipeline) -> None:
+        """Raise LinkageError if the node has other messages on a topic with a wrench."""
         node = self._node
-        kind = message_type('geometry_msgs/msg/WrenchStamped', 'loads.wrenches')
         others: list[Any] = [*node.publishers, *node.subscriptions]
+        names = [topic.name for topic in self._topics if topic.key != WRENCH_TOPICS]
         taken = {each.topic_name for each in others}
-        taken |= {node.resolve_topic_name(name) for name in (SCENE_TOPIC, 'robot_description')}
+        taken |= set(map(node.resolve_topic_name, (*names, SCENE_TOPIC, 'robot_description')))
         for wrench in pipeline.wrenches:
             name = node.resolve_topic_name(wrench.topic)
             if name in taken:
@@ -136,30 +144,25 @@ class SceneTopics:
                     'write or remap another',
                 )
             taken.add(name)
-            self.wrenches.append(
-                node.create_subscription(
-                    kind,
-                    wrench.topic,
-                    never_called,
-                    CRANK_QOS,
-                    callback_group=TakenByTick(),
-                    qos_overriding_options=overridable,
-                )
-            )
 
-    def publish_description(self, scene: Scene, pipeline: Pipeline) -> None:
-        """
-        Publish the linkages as a robot model, once, with transient-local durability.
+    def _with_key(self, key: str) -> list[Any]:
+        """Return the endpoints of the topics with this key."""
+        return [endpoint for topic, endpoint in self._endpoints.items() if topic.key == key]
 
-        LinkageError if the published joints do not determine the pose of every link.
-        """
-        text_type = message_type('std_msgs/msg/String', 'robot_description')
-        model = find_tool('robot_description').scene_urdf(scene, pipeline.closures).decode()
-        self._description = self._node.create_publisher(
-            text_type, 'robot_description', _DESCRIPTION_QOS
-        )
-        self.description = text_message(model)
-        self._description.publish(self.description)
+    @property
+    def extras(self) -> list[Publisher]:
+        """Return the publishers of the pipeline's auxiliary topics."""
+        return self._with_key(EXTRA)
+
+    @property
+    def wrenches(self) -> list[Subscription]:
+        """Return the subscriptions to the topics of wrenches on links."""
+        return self._with_key(WRENCH_TOPICS)
+
+    @property
+    def crank(self) -> Subscription | None:
+        """Return the subscription to the drives' topic; None without one."""
+        return next(iter(self._with_key(CRANK)), None)
 
     def publish_scene(self, scene: Scene, pipeline: Pipeline, joint_states: str) -> None:
         """
@@ -168,11 +171,11 @@ class SceneTopics:
         A page on another machine so knows the linkage, the topics and the faults; ``joint_states``
         is the resolved name of their topic.
         """
-        topics = {'joint_states_topic': joint_states}
-        if self.crank is not None:
-            topics['crank_topic'] = self.crank_topic
-        if self._change_publisher is not None:
-            topics['faults_topic'] = self._change_publisher.topic_name
+        topics = [(JOINT_STATES, joint_states)] + [
+            (topic.key, endpoint.topic_name)
+            for topic, endpoint in self._endpoints.items()
+            if topic.key in {CRANK, FAULTS}
+        ]
         text_type = message_type('std_msgs/msg/String', '~/scene')
         self._scene_publisher = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
         files = scene_files(scene, topics, '')
@@ -180,23 +183,15 @@ class SceneTopics:
 
     def disconnect(self) -> None:
         """Remove all topics and services."""
-        for publisher in (
-            *self.extras,
-            self._change_publisher,
-            self._description,
-            self._scene_publisher,
-        ):
-            if publisher is not None:
-                self._node.destroy_publisher(publisher)
+        for endpoint in (*self._endpoints.values(), self._scene_publisher):
+            if isinstance(endpoint, Subscription):
+                self._node.destroy_subscription(endpoint)
+            elif endpoint is not None:
+                self._node.destroy_publisher(endpoint)
         for service in self._injectors:
             self._node.destroy_service(service)
-        for subscription in (*self.wrenches, self.crank):
-            if subscription is not None:
-                self._node.destroy_subscription(subscription)
-        self.wrenches = []
-        self.extras, self._injectors, self._fault_kinds = [], [], {}
-        self._change_publisher = self._description = self._scene_publisher = self.crank = None
-        self.description = b''
+        self._endpoints, self._injectors, self._fault_kinds = {}, [], {}
+        self._scene_publisher, self.description = None, b''
 
     @property
     def crank_topic(self) -> str:
@@ -207,9 +202,8 @@ class SceneTopics:
     def crank_publishers(self) -> list[TopicEndpointInfo]:
         """Return the publishers on that topic."""
         # With the name before remapping: rclpy remaps its argument again.
-        if self.crank is None:
-            return []
-        return self._node.get_publishers_info_by_topic(self._crank_name)
+        names = [topic.name for topic in self._topics if topic.key == CRANK]
+        return [info for name in names for info in self._node.get_publishers_info_by_topic(name)]
 
     @property
     def take_sample(self) -> TakeMessage | None:
@@ -225,40 +219,26 @@ class SceneTopics:
 
     def publish_change(self, change: FaultChange) -> bytes:
         """Publish the begin or end of a fault; return the serialized message."""
-        assert self._change_publisher is not None
         message = text_message(change_text(change, self._fault_kinds[change.name]))
-        self._change_publisher.handle.publish_raw(message)
+        self._with_key(FAULTS)[0].handle.publish_raw(message)
         return message
 
-    def describe_topics(self, handles: RecordedTopics) -> dict[int, tuple[str, Topic]]:
-        """Describe the topics for a bag, by their handles."""
-        node, topics = self._node, {}
-        if handles.crank is not None:
-            publishers = self.crank_publishers
-            qos = publishers[0].qos_profile if publishers else CRANK_QOS
-            topics[handles.crank] = 'crank_topic', bag_topic(self.crank_topic, JointState, qos)
-        for handle, wrench in zip(handles.wrenches, self.wrenches, strict=True):
-            described = bag_topic(wrench.topic_name, wrench.msg_type, CRANK_QOS)
-            topics[handle] = WRENCH_TOPICS, described
-        if handles.faults is not None and (changes := self._change_publisher) is not None:
-            described = bag_topic(changes.topic_name, changes.msg_type, CHANGES_QOS)
-            topics[handles.faults] = 'faults_topic', described
-        # Recorded for the replay only; not published on the graph.
-        time_type = message_type('builtin_interfaces/msg/Time', 'record')
-        withheld, resets = (
-            bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
-            for name in ('withheld', 'resets')
-        )
-        if handles.suppressed is not None:
-            topics[handles.suppressed] = 'withheld_topic', withheld
-        for handle, extra in zip(handles.extras, self.extras, strict=True):
-            described = bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile)
-            topics[handle] = EXTRA, described
-        topics[handles.resets] = 'resets_topic', resets
-        if (model := self._description) is not None:
-            described = bag_topic(model.topic_name, model.msg_type, _DESCRIPTION_QOS)
-            topics[handles.description] = DESCRIPTION, described
-        return topics
+    def describe_topics(
+        self, joint_states: Publisher, diagnostics: Publisher
+    ) -> list[tuple[str, Topic]]:
+        """Describe the topics of the run for a bag, in the order of their handles."""
+        own = {JOINT_STATES: joint_states, DIAGNOSTICS: diagnostics}
+        described = []
+        for topic in self._topics:
+            endpoint = own.get(topic.key) or self._endpoints.get(topic)
+            name, qos = f'{self._node.get_fully_qualified_name()}{topic.name[1:]}', topic.qos
+            if endpoint is not None:
+                name, qos = endpoint.topic_name, recorded_qos(endpoint.qos_profile)
+            if topic.key == CRANK and (publishers := self.crank_publishers):
+                qos = recorded_qos(publishers[0].qos_profile)
+            message = message_type(topic.type, topic.asked_by)
+            described.append((topic.key, describe_topic(name, message, qos)))
+        return described
 
 
 class TakenByTick(CallbackGroup):

@@ -37,7 +37,6 @@ from linkage_ros.replay.replay import (
     versions_here as versions_here,
 )
 from linkage_ros.replay.run_files import (
-    EXTRA as EXTRA,
     scene_files as scene_files,
     to_attachments as to_attachments,
 )

@@ -48,7 +48,7 @@ from linkage_ros.messages import (
     TIME_END,
 )
 from linkage_ros.replay.replay import change_text, read_change
-from linkage_ros.tick import Pipeline, Tick
+from linkage_ros.tick import list_run_topics, Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Injection
@@ -117,8 +117,8 @@ class Counterfactual:
         self._injection = self._make_injection()
         self._pipeline = Pipeline(scene, None, self._injection)
         self._closures = self._pipeline.closures
-        self.extras = self._pipeline.extras
-        """Auxiliary topics of the scene."""
+        self.topics = list_run_topics(self._pipeline)
+        """Topics that a run of the scene records."""
         self.suppresses_ticks = self._pipeline.suppresses_ticks
         """Whether ticks without a message may matter to a replay."""
         self._last_event_time = self._last_written = (

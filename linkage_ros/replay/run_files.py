@@ -10,38 +10,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import json
 import os
 from pathlib import Path
 import platform
-from typing import Any
 
 from linkage_ros import __version__
 from linkage_ros.bag import BEGUN, RUN_FILE, SEED, USER_EFFECTS
 from linkage_ros.description import Scene
 from linkage_ros.replay.replay import user_effects_here
-
-EXTRA = 'extra'
-"""Key of the auxiliary topics, of which there may be several."""
+from linkage_ros.tick import name_topics
 
 
 def scene_files(
     scene: Scene,
-    topics: Mapping[str, Any],
+    topics: Iterable[tuple[str, str]],
     begun: str,
     bag: Path | None = None,
 ) -> dict[str, bytes]:
     """
     Return a scene as files: its own, and the run's account of itself.
 
-    ``topics`` are the names of the topics by their keys in the account, ``begun`` is the beginning
-    of the bag, and ``bag`` is the folder of the bag that gets the files, if any.
+    ``topics`` are the keys of the topics in the account and their names, ``begun`` is the
+    beginning of the bag, and ``bag`` is the folder of the bag that gets the files, if any.
     """
     run = {
         'scene': scene.name,
         **_scene_folder(scene, bag),
-        **topics,
+        **name_topics(topics),
         BEGUN: begun,
         SEED: scene.seed,
         **({USER_EFFECTS: own} if (own := user_effects_here(scene)) else {}),

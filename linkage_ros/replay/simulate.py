@@ -17,21 +17,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-import json
 from math import floor
 from pathlib import Path
-from typing import Any, cast, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-from linkage_ros.bag import BagWriter, QosProfile, Recorder, Topic, WITH_THE_RUN
+from linkage_ros.bag import BagWriter, DirectRecorder, WITH_THE_RUN
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages import JOINT_STATE_TYPE, text_message
+from linkage_ros.messages import text_message
 from linkage_ros.replay.replay import change_text
-from linkage_ros.replay.run_files import EXTRA, scene_files, to_attachments
+from linkage_ros.replay.run_files import scene_files, to_attachments
 from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.signals import heed_signals
 from linkage_ros.stages.drives import describe_chatter
-from linkage_ros.tick import Pipeline, TickLoop
+from linkage_ros.tick import list_run_topics, Pipeline, TickLoop
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultChange
@@ -42,10 +41,7 @@ BEGIN = 1_000_000_000
 MOST_TICKS = 100_000_000
 
 _NODE = '/linkage_node'
-_LATCHED = QosProfile(depth=100, durability='transient_local')
-_TIME = 'builtin_interfaces/msg/Time'
 _ASKED_EVERY = 50
-_FLUSHED_EVERY = 50_000
 
 
 def check_simulated(scene: Scene, seconds: float) -> int:
@@ -114,73 +110,30 @@ def simulate_run(
         [ignore_message] * len(first.extras),
         change_message,
     )
-    topics = _bag_topics(loop, first)
-    named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
-    named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    files = scene_files(scene, named, WITH_THE_RUN, folder)
+    table = list_run_topics(first)
+    topics = [
+        describe_topic(_resolve(topic.name), message_type(topic.type, 'scene'), topic.qos)
+        for topic in table
+    ]
+    names = [(row.key, topic.name) for row, topic in zip(table, topics, strict=True)]
+    files = scene_files(scene, names, WITH_THE_RUN, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heed_signals():
-        writer = BagWriter(folder, [topic for _, topic in topics], to_attachments(files))
-        recording = _Recording(writer, len(topics))
-        loop.recorder = cast('Recorder', recording)
+        writer = BagWriter(folder, topics, to_attachments(files))
+        loop.recorder = recorder = DirectRecorder(writer)
         try:
             for index, now in enumerate(tick_times(scene, ticks)):
                 if not index % _ASKED_EVERY and not keep_going(index):
                     break
                 loop.tick_at(now)
         finally:
-            counts = dict(zip((topic.name for _, topic in topics), recording.written, strict=True))
-            writer.close({'linkage_ros.dropped': json.dumps(dict.fromkeys(counts, 0))})
+            recorder.close()
     for linkage in loop.pipeline.linkages:
         if linkage.drive.chatter_count:
             warn(describe_chatter(linkage.drive.chatter_count))
-    return counts
+    return recorder.message_counts
 
 
-class _Recording:
-    """Writes each message at once; a tick sees a recorder."""
-
-    def __init__(self, writer: BagWriter, topics: int) -> None:
-        self._writer = writer
-        self._unflushed = 0
-        self.written = [0] * topics
-
-    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """Write a message; raise RecordingError if that fails."""
-        self.written[topic] += self._writer.write(topic, log_time, publish_time, data)
-        self._unflushed += 1
-        if self._unflushed == _FLUSHED_EVERY:
-            self._writer.flush()
-            self._unflushed = 0
-
-
-def _bag_topics(loop: TickLoop, pipeline: Pipeline) -> list[tuple[str, Topic]]:
-    """Return the topics of the bag, in the order of their handles, each with its key."""
-    handles = loop.topics
-    found = {
-        handles.joint_states: (
-            'joint_states_topic',
-            '/joint_states',
-            JOINT_STATE_TYPE,
-            QosProfile(),
-        ),
-        handles.diagnostics: (
-            'diagnostics_topic',
-            '/diagnostics',
-            'diagnostic_msgs/msg/DiagnosticArray',
-            QosProfile(),
-        ),
-        handles.resets: ('resets_topic', f'{_NODE}/resets', _TIME, QosProfile()),
-    }
-    if handles.crank is not None:
-        found[handles.crank] = 'crank_topic', f'/{pipeline.topic}', JOINT_STATE_TYPE, QosProfile()
-    if handles.faults is not None:
-        found[handles.faults] = 'faults_topic', f'{_NODE}/faults', 'std_msgs/msg/String', _LATCHED
-    if handles.suppressed is not None:
-        found[handles.suppressed] = 'withheld_topic', f'{_NODE}/withheld', _TIME, QosProfile()
-    for handle, extra in zip(handles.extras, pipeline.extras, strict=True):
-        found[handle] = EXTRA, extra.topic.replace('~', _NODE, 1), extra.message, QosProfile()
-    return [
-        (key, describe_topic(name, message_type(kind, 'scene'), qos))
-        for _, (key, name, kind, qos) in sorted(found.items())
-    ]
+def _resolve(name: str) -> str:
+    """Return a name as the node resolves it, without a namespace and without remapping."""
+    return f'/{name}'.replace('//', '/').replace('/~', _NODE)

@@ -10,12 +10,28 @@ from linkage_ros.tick.interpreted_tick import InterpretedTick as InterpretedTick
 from linkage_ros.tick.linkage_pipeline import LinkagePipeline as LinkagePipeline
 from linkage_ros.tick.linkage_state import LinkageState as LinkageState
 from linkage_ros.tick.pipeline import Pipeline as Pipeline
+from linkage_ros.tick.run_topics import (
+    CRANK as CRANK,
+    DESCRIPTION as DESCRIPTION,
+    DIAGNOSTICS as DIAGNOSTICS,
+    EXTRA as EXTRA,
+    FAULTS as FAULTS,
+    FAULTS_QOS as FAULTS_QOS,
+    find_handles as find_handles,
+    JOINT_STATES as JOINT_STATES,
+    LATCHED_QOS as LATCHED_QOS,
+    list_run_topics as list_run_topics,
+    name_topics as name_topics,
+    RESETS as RESETS,
+    RunTopic as RunTopic,
+    SENSOR_QOS as SENSOR_QOS,
+    WITHHELD as WITHHELD,
+)
 from linkage_ros.tick.sample_router import SampleRouter as SampleRouter
 from linkage_ros.tick.tick_loop import (
     Counts as Counts,
     DurationHistogram as DurationHistogram,
     Pace as Pace,
-    RecordedTopics as RecordedTopics,
     Stall as Stall,
     TakeMessage as TakeMessage,
     TickLoop as TickLoop,

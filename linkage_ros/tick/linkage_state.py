@@ -71,7 +71,7 @@ class LinkageState:
 
     @property
     def reactions(self) -> tuple[Reaction, ...]:
-        """Forces in pins and sliders; empty where no message holds them, or there are none."""
+        """Return the forces in pins and sliders; empty where there are none or none are needed."""
         if self.is_compiled:
             return self._reactions
         return self.motion.reactions if self.motion is not None else ()

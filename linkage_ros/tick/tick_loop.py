@@ -18,18 +18,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-import itertools
 from threading import Event, Thread
 from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag import Recorder
+from linkage_ros.bag import MessageSink
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Position, Status
 from linkage_ros.messages import Rejection, time_message
 from linkage_ros.tick.interpreted_tick import Tick
 from linkage_ros.tick.linkage_state import LinkageState
 from linkage_ros.tick.pipeline import Pipeline
+from linkage_ros.tick.run_topics import find_handles, list_run_topics
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultChange, Injection
@@ -81,42 +81,6 @@ def _upper_edge(index: int) -> int:
     if shift <= 0:
         return index
     return ((index - (shift << _STEPS) + 1) << shift) - 1
-
-
-class RecordedTopics(NamedTuple):
-    """
-    Handles of the topics that a run records: their numbers in the bag; None for absent topics.
-
-    Only this type numbers them. The tick offers messages to the recorder by handle, and the
-    topics of the bag are described by handle.
-    """
-
-    # Published by every run.
-    joint_states: int
-    diagnostics: int
-    crank: int | None  # The topic of the drives
-    wrenches: tuple[int, ...]  # The topics of the wrenches on links
-    faults: int | None  # Begin and end of faults
-    suppressed: int | None  # Ticks without a message that a replay must know of
-    extras: tuple[int, ...]  # The auxiliary topics of the pipeline
-    resets: int  # Resets, at which the pipeline is built again
-    description: int  # The robot model. No tick publishes it.
-
-
-def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
-    """Return the handles of the topics that a run of a pipeline records."""
-    handles = itertools.count()
-    return RecordedTopics(
-        joint_states=next(handles),
-        diagnostics=next(handles),
-        crank=next(handles) if pipeline.topic else None,
-        wrenches=tuple(next(handles) for _ in pipeline.wrenches),
-        faults=next(handles) if pipeline.injection is not None else None,
-        suppressed=next(handles) if pipeline.suppresses_ticks else None,
-        extras=tuple(next(handles) for _ in pipeline.extras),
-        resets=next(handles),
-        description=next(handles),
-    )
 
 
 class Stall(NamedTuple):
@@ -227,13 +191,13 @@ class TickLoop:
         self._pipeline = build()
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
-        self.topics = recorded_topics(self._pipeline)
+        self.topics = find_handles(list_run_topics(self._pipeline))
         """Handles under which the tick offers messages to the recorder."""
         self._publish_extras = tuple(zip(self.topics.extras, publish_extras, strict=True))
         self._stopping = Event()
         self._thread: Thread | None = None
         self.counts = Counts(wrenches=tuple(WrenchCounts() for _ in take_wrenches))
-        self.recorder: Recorder | None = None
+        self.recorder: MessageSink | None = None
         self.reset_requested = False
         self.had_several_publishers = False
         """Whether the drives' topic ever had several publishers, each with its own numbers."""

@@ -70,23 +70,64 @@ def write_scene(folder):
     return write
 
 
-@pytest.fixture
-def start(graph, folder):
-    """Return a function that starts a node; what still runs at the end is killed."""
+@pytest.fixture(scope='module')
+def kept():
+    """Hold the process that the tests of a module share, which is set up again for each."""
     nodes = []
+    yield nodes
+    kill_all(nodes)
+
+
+def kill_all(nodes):
+    while nodes:
+        nodes.pop().kill()
+
+
+@pytest.fixture(autouse=True)
+def no_twin(request, kept):
+    """End the shared process where a test may start a node in another way."""
+    if 'start' not in request.fixturenames:
+        kill_all(kept)
+
+
+@pytest.fixture
+def start(request, graph, folder, kept):
+    """
+    Return a function that starts a node; what still runs at the end is killed.
+
+    A node without arguments is the module's own process, set up again, unless the module has
+    REAL_STARTS.
+    """
+    nodes, shared = [], []
 
     def start(scene, *arguments, ready='ticking', **popen):
-        node = NodeProcess(
-            graph.domain,
-            folder,
-            *('-p', f'scene:={scene}', '-p', 'diagnostics_period:=0.2', *arguments),
-            **popen,
-        )
+        is_usual = not arguments and not popen and ready == 'ticking' and not shared
+        if is_usual and not getattr(request.module, 'REAL_STARTS', False):
+            if kept and kept[0].process.poll() is None:
+                kept[0].set_up(graph, scene)
+            else:
+                kept[:] = [start_process(scene)]
+                kept[0].graph = graph
+            kept[0].wait_for_log(ready)
+            shared[:] = kept
+            return kept[0]
+        if not shared:
+            kill_all(kept)
+        node = start_process(scene, *arguments, **popen)
         nodes.append(node)
         if ready:
             node.wait_for_log(ready)
         return node
 
+    def start_process(scene, *arguments, **popen):
+        return NodeProcess(
+            graph.domain,
+            folder,
+            *('-p', f'scene:={scene}', '-p', 'diagnostics_period:=0.2', *arguments),
+            **popen,
+        )
+
     yield start
-    for node in nodes:
-        node.kill()
+    kill_all(nodes)
+    for node in shared:
+        node.clean_up()

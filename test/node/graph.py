@@ -23,6 +23,10 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -159,6 +163,9 @@ class NodeProcess:
         **popen: Any,
     ) -> None:
         self._log = folder / f'node_{time.monotonic_ns()}.log'
+        self._log_begin = 0
+        self.graph: Graph | None = None
+        """Where the process is one that tests share: the graph of the test that it runs for."""
         command = [sys.executable, *program, '--ros-args', *arguments]
         environment = os.environ | {
             'ROS_DOMAIN_ID': str(domain),
@@ -173,14 +180,46 @@ class NodeProcess:
 
     @property
     def log(self) -> str:
-        return self._log.read_text()
+        begin = self._log_begin
+        return self._log.read_bytes()[begin:].decode()
 
     def wait_for_log(self, text: str) -> None:
         wait_for(lambda: text in self.log or self.process.poll() is not None, f'{text!r}')
         assert text in self.log, self.log
 
+    def set_up(self, graph: Graph, scene: Path) -> None:
+        """Give a node that is unconfigured a scene, and let it tick."""
+        self.graph = graph
+        self._log_begin = self._log.stat().st_size
+        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=str(scene))
+        change = SetParameters.Request(parameters=[ParameterMessage(name='scene', value=value)])
+        (result,) = graph.call(SetParameters, '/linkage_node/set_parameters', change).results
+        assert result.successful, result.reason
+        self._change_state(Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
+
+    def clean_up(self) -> int:
+        """Leave a node that tests share unconfigured for the next one, or end it; return 0."""
+        try:
+            if self.graph is not None and self.process.poll() is None:
+                self._change_state(Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP)
+            code = self.process.poll() or 0
+        except AssertionError:
+            self.graph = None
+            code = self.end()
+        self.graph = None
+        return code
+
+    def _change_state(self, *transitions: int) -> None:
+        assert self.graph is not None
+        for transition in transitions:
+            request = ChangeState.Request(transition=Transition(id=transition))
+            answer = self.graph.call(ChangeState, '/linkage_node/change_state', request)
+            assert answer.success, self.log
+
     def end(self, number: int = signal.SIGINT) -> int:
-        """Send a signal, and return the exit code."""
+        """Send a signal, and return the exit code; one that tests share is only cleaned up."""
+        if self.graph is not None and number == signal.SIGINT:
+            return self.clean_up()
         self.process.send_signal(number)
         try:
             return self.process.wait(PATIENCE)

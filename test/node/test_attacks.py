@@ -18,6 +18,8 @@ from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 
+REAL_STARTS = True
+
 
 def test_floods_and_storms_end_nothing_and_every_message_is_accounted_for():
     tried, findings = attack(12.0, 7)

@@ -20,6 +20,8 @@ import pytest
 
 from ..support.scenes import LONG_COUPLER
 
+REAL_STARTS = True
+
 CONFIGURATION = 2
 
 FILES = {

@@ -10,8 +10,9 @@
 
 import re
 
-from linkage_ros.bag import INFINITE
-from linkage_ros.node import bag_topic
+from linkage_ros.bag import INFINITE, QosProfile
+from linkage_ros.node import recorded_qos
+from linkage_ros.replay import describe_topic
 from rclpy.duration import Duration
 from rclpy.qos import (
     LivelinessPolicy,
@@ -27,7 +28,7 @@ def test_what_a_type_needs_follows_by_full_name():
     # As rosbag2_cpp's LocalMessageDefinitionSource, which keeps them in a std::set.
     needed = re.findall(
         r'^MSG: (.+)$',
-        bag_topic('/a', MultiDOFJointState, QoSProfile(depth=1)).definition,
+        describe_topic('/a', MultiDOFJointState, QosProfile()).definition,
         re.MULTILINE,
     )
     assert needed == [
@@ -39,14 +40,12 @@ def test_what_a_type_needs_follows_by_full_name():
         'std_msgs/Header',
         'builtin_interfaces/Time',
     ]
-    trajectory = bag_topic('/b', JointTrajectory, QoSProfile(depth=1)).definition
+    trajectory = describe_topic('/b', JointTrajectory, QosProfile()).definition
     assert trajectory.index('MSG: std_msgs/Header') < trajectory.index('MSG: trajectory_msgs/')
 
 
 def test_every_policy_of_a_publisher_is_kept():
-    qos = bag_topic(
-        '/a',
-        JointTrajectory,
+    qos = recorded_qos(
         QoSProfile(
             depth=7,
             reliability=ReliabilityPolicy.BEST_EFFORT,
@@ -56,7 +55,7 @@ def test_every_policy_of_a_publisher_is_kept():
             liveliness_lease_duration=Duration(seconds=1),
             avoid_ros_namespace_conventions=True,
         ),
-    ).qos
+    )
     assert (qos.depth, qos.reliability) == (7, 'best_effort')
     assert (qos.deadline, qos.lifespan) == (20_000_000, 2 * 10**9)
     assert (qos.liveliness, qos.liveliness_lease_duration) == ('manual_by_topic', 10**9)
@@ -64,6 +63,6 @@ def test_every_policy_of_a_publisher_is_kept():
 
 
 def test_what_a_publisher_leaves_open_has_no_limit():
-    qos = bag_topic('/a', JointTrajectory, qos_profile_sensor_data).qos
+    qos = recorded_qos(qos_profile_sensor_data)
     assert {qos.deadline, qos.lifespan, qos.liveliness_lease_duration} == {INFINITE}
     assert qos.liveliness == 'automatic'

@@ -121,6 +121,34 @@ def test_a_bad_scene_cannot_be_configured(write_scene, start, change, state):
     assert 'Traceback' not in node.log
 
 
+def test_an_unconfigured_node_takes_another_scene(graph, write_scene, start, change, turn):
+    """Whichever scene it is set up with is the one that it runs."""
+    node = start(write_scene('absent', 'rtae: 100'), *BY_HAND, ready='')
+    assert not change(Transition.TRANSITION_CONFIGURE)
+
+    def give(scene):
+        changed = parameter('scene', string_value=str(scene))
+        request = SetParameters.Request(parameters=[changed])
+        (result,) = graph.call(SetParameters, f'{NODE}/set_parameters', request).results
+        return result.reason
+
+    names = {}
+    for linkage in ('four_bar', 'inverted_slider_crank'):
+        assert give(write_scene(f'now_{linkage}', 'rate: 100', linkage)) == ''
+        assert change(Transition.TRANSITION_CONFIGURE)
+        assert 'cannot change while the node is configured' in give('other.yaml')
+        assert change(Transition.TRANSITION_ACTIVATE)
+        assert 'cannot change while the node is configured' in give('other.yaml')
+        names[linkage] = [*turn()[-1].name]
+        assert change(Transition.TRANSITION_DEACTIVATE)
+        assert change(Transition.TRANSITION_CLEANUP)
+    assert names == {
+        'four_bar': ['coupler_joint', 'rocker_joint'],
+        'inverted_slider_crank': ['rod_joint', 'rod_slide'],
+    }
+    assert node.end() == 0
+
+
 def test_what_is_not_possible_is_refused(write_scene, start, change, state, trigger):
     node = start(write_scene('refused', 'rate: 100'), *BY_HAND, ready='')
     for transition in ('ACTIVATE', 'DEACTIVATE', 'CLEANUP', 'ACTIVE_SHUTDOWN'):

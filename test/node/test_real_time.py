@@ -32,6 +32,8 @@ ALL = ['-p', 'thread_priority:=42', '-p', 'lock_memory:=true', '-p', f'cpu_affin
 PR_CAPBSET_DROP, CAP_IPC_LOCK, CAP_SYS_NICE = 24, 14, 23
 ASKS = """
 import ctypes, os
+
+REAL_STARTS = True
 os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(42))
 os._exit(ctypes.CDLL(None).mlockall(3) != 0)
 """

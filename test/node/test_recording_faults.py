@@ -24,6 +24,8 @@ from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 
+REAL_STARTS = True
+
 OK, WARN, ERROR = b'\0', b'\1', b'\2'
 COUNTS = ('Received', 'Recorded', 'Dropped', 'Waiting')
 INCOMPLETE = 1

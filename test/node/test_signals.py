@@ -20,6 +20,8 @@ import yaml
 
 from .graph import crank, wait_for
 
+REAL_STARTS = True
+
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 # The node, on a middleware that never shuts down: it keeps the interpreter's lock meanwhile, or

@@ -20,11 +20,11 @@ from types import SimpleNamespace
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag import BagWriter
+from linkage_ros.bag import BagWriter, QosProfile
 from linkage_ros.description import load_scene
-from linkage_ros.node import bag_topic, RunRecording
+from linkage_ros.node import RunRecording
+from linkage_ros.replay import describe_topic
 import pytest
-from rclpy.qos import QoSProfile
 from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -32,6 +32,8 @@ from std_srvs.srv import Trigger
 
 from .graph import crank, NS, wait_for
 from ..support.commands import linkage
+
+REAL_STARTS = True
 
 OK, ERROR = b'\0', b'\2'
 INCOMPLETE = 1
@@ -389,7 +391,7 @@ def test_a_run_that_ends_waits_for_its_snapshot_and_answers(tmp_path, write_scen
     loop = SimpleNamespace(is_running=False, recorder=None, pipeline=SimpleNamespace(linkages=()))
     recording = RunRecording(SimpleNamespace(info=lambda _: None, error=lambda _: None))
     scene = load_scene(str(write_scene('ends', scene_text(tmp_path, 30))))
-    states = bag_topic('/joint_states', JointState, QoSProfile(depth=10))
+    states = describe_topic('/joint_states', JointState, QosProfile())
     recording.start(scene, loop, '', lambda: [('joint_states_topic', states)])
     answers, woken = [], Event()
 

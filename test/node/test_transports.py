@@ -44,6 +44,8 @@ rclpy.init()
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.signals import stop_on_signals
 from rclpy.executors import SingleThreadedExecutor
+
+REAL_STARTS = True
 stop = stop_on_signals()
 node = LinkageNode()
 executor = SingleThreadedExecutor()

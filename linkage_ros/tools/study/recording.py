@@ -31,8 +31,7 @@ from typing import Any, NamedTuple
 from linkage_ros.bag import BagSummary, BagWriter, FLUSH_AFTER, Recorder, Storage, Topic
 from linkage_ros.description import LEAST_FLUSH_PERIOD, Scene
 from linkage_ros.errors import RecordingError
-from linkage_ros.messages import JOINT_STATE_TYPE
-from linkage_ros.tick import Pipeline
+from linkage_ros.tick import find_handles, list_run_topics, Pipeline
 from linkage_ros.tools.study.budget import Price, RecordingLoss
 from linkage_ros.tools.study.measuring import alternate_order, Progress, spread_of
 from linkage_ros.tools.study.prices import Feed, turn_crank, USUAL_RATE
@@ -115,11 +114,14 @@ def _record_run(
 ) -> _RecordedRun:
     """Tick in real time, at the scene's rate up to 1 kHz, and record it as the node does."""
     period = 1e9 / min(scene.rate or USUAL_RATE, USUAL_RATE)
-    crank = 1 if pipeline.topic else 0
+    topics = list_run_topics(pipeline)
+    handles = find_handles(topics)
     passing = []
     with _as_in_the_node():
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
-        writer = _WatchedWriter(folder, _recorded_topics(pipeline), files, storage)
+        # Their definitions and their names on the graph cost nothing after the start.
+        empty = [Topic(f'/{topic.name}', topic.type, '', '') for topic in topics]
+        writer = _WatchedWriter(folder, empty, files, storage)
         recorder = Recorder(writer, flush_period=storage.flush_period)
         offer = recorder.offer
         begin = monotonic_ns()
@@ -131,11 +133,11 @@ def _record_run(
                 pipeline.offer(sample, now)
             tick = pipeline.tick(now)
             before = monotonic_ns()
-            if sample:
-                offer(0, now, now, sample)
+            if sample and handles.crank is not None:
+                offer(handles.crank, now, now, sample)
             if tick.message:
-                offer(crank, now, now, tick.message)
-                for topic, extra in enumerate(tick.extras, crank + 1):
+                offer(handles.joint_states, now, now, tick.message)
+                for topic, extra in zip(handles.extras, tick.extras, strict=False):
                     if extra:
                         offer(topic, now, now, extra)
             passing.append(monotonic_ns() - before)
@@ -157,14 +159,6 @@ def _record_run(
         max(flush.stake for flush in writer.flushes) * 1e-9,
         sum(topic.dropped for topic in summary.topics),
     )
-
-
-def _recorded_topics(pipeline: Pipeline) -> list[Topic]:
-    """Return the topics the node would record, without diagnostics and message definitions."""
-    names = [(pipeline.topic, JOINT_STATE_TYPE)] if pipeline.topic else []
-    names.append(('/joint_states', JOINT_STATE_TYPE))
-    names += [(extra.topic.replace('~', '/node'), extra.message) for extra in pipeline.extras]
-    return [Topic(name, kind, '', '') for name, kind in names]
 
 
 @contextmanager

@@ -21,17 +21,16 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.bag import BagWriter, read_bag, Storage, UNFINISHED_DATA
+from linkage_ros.bag import BagWriter, QosProfile, read_bag, Storage, UNFINISHED_DATA
 from linkage_ros.cli.main import main
 from linkage_ros.description import load_scene
 from linkage_ros.messages import text_message
-from linkage_ros.node import bag_topic, RunRecording
-from linkage_ros.replay import change_text, EXTRA, message_type
-from linkage_ros.tick import Pipeline, TickLoop
+from linkage_ros.node import RunRecording
+from linkage_ros.replay import change_text, describe_topic, message_type
+from linkage_ros.tick import list_run_topics, Pipeline, TickLoop
 from linkage_ros.tools.study import turn_crank
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
 from .agreement import assert_agreement, of_kind, read
@@ -72,31 +71,16 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
         return text_message(change_text(change, scene.faults[change.name].kind))
 
     def topics():
-        described = [
-            ('joint_states_topic', '/joint_states', JOINT_STATE, QoSProfile(depth=10)),
-            (
-                'diagnostics_topic',
-                '/diagnostics',
-                'diagnostic_msgs/msg/DiagnosticArray',
-                QoSProfile(depth=1),
-            ),
-        ]
-        if pipeline.topic:
-            best_effort = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-            described.append(('crank_topic', '/crank_states', JOINT_STATE, best_effort))
-        if pipeline.injection is not None:
-            latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-            described.append(('faults_topic', '/node/faults', 'std_msgs/msg/String', latched))
-        time = 'builtin_interfaces/msg/Time'
-        if pipeline.suppresses_ticks:
-            described.append(('withheld_topic', '/node/withheld', time, QoSProfile(depth=10)))
-        for extra in pipeline.extras:
-            name = extra.topic.replace('~', '/node')
-            described.append((EXTRA, name, extra.message, QoSProfile(depth=10)))
-        described.append(('resets_topic', '/node/resets', time, QoSProfile(depth=10)))
         return [
-            (key, bag_topic(name, message_type(kind, 'scene'), qos))
-            for key, name, kind, qos in described
+            (
+                topic.key,
+                describe_topic(
+                    f'/{topic.name}'.replace('//', '/').replace('~', 'node'),
+                    message_type(topic.type, 'scene'),
+                    topic.qos,
+                ),
+            )
+            for topic in list_run_topics(pipeline)
         ]
 
     loop = TickLoop(
@@ -215,7 +199,7 @@ def anything(kind: str, random: Random) -> Any:
 def test_messages_of_all_types_with_anything_in_them(tmp_path):
     random = Random(7)
     topics = [
-        bag_topic(f'/topic_{index}', message_type(kind, 'test'), QoSProfile(depth=index + 1))
+        describe_topic(f'/topic_{index}', message_type(kind, 'test'), QosProfile(depth=index + 1))
         for index, kind in enumerate(KINDS)
     ]
     writer = BagWriter(tmp_path / 'bag', topics, {'ä b.bin': ('', bytes(range(256)))})

@@ -6,23 +6,25 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Describe topics of the ROS graph for a bag."""
+"""Quality of service, as rclpy's profiles and as a bag holds it."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from linkage_ros.bag import INFINITE, QosProfile, Topic
-from linkage_ros.replay import describe_topic
-from rclpy.qos import QoSProfile
+from linkage_ros.bag import INFINITE, QosProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 
-def bag_topic(name: str, message_class: Any, qos: QoSProfile) -> Topic:
-    """Describe a topic for a bag, as `describe_topic` does, with the QoS of a publisher."""
-    return describe_topic(name, message_class, _recorded_qos(qos))
+def offered_qos(qos: QosProfile) -> QoSProfile:
+    """Return the profile of rclpy for a topic of the node."""
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+    )
 
 
-def _recorded_qos(profile: QoSProfile) -> QosProfile:
+def recorded_qos(profile: QoSProfile) -> QosProfile:
+    """Return a profile of rclpy as a bag holds it."""
     return QosProfile(
         history=profile.history.name.lower(),
         depth=profile.depth,
