@@ -12,7 +12,6 @@ from dataclasses import replace
 from math import inf, isfinite, nan
 
 from hypothesis import given, strategies as st
-from linkage_ros.kinematics import Status
 from linkage_ros.stages.drives import Context, CrankState
 from linkage_ros.stages.effects import (
     AccelerationEffect,
@@ -68,13 +67,6 @@ def test_a_crank_at_a_constant_rate_still_has_it(angle, rate):
     assert list(two) == pytest.approx([4.0 * value for value in one], rel=1e-12, abs=1e-300)
 
 
-def test_at_a_toggle_there_is_none():
-    motion = moved(STRETCHED_AT_0, 0.0, 1.0)
-    assert motion.position.status is Status.TOGGLE
-    assert len(motion.position.joints) == 2
-    assert motion.velocity is motion.acceleration is None
-
-
 @given(st.floats(-17.0, -1.0))
 def test_next_to_a_toggle_it_is_finite_or_none(exponent):
     angle = EVERY_OTHER.input_ranges[0].highest - 10.0**exponent
@@ -94,11 +86,6 @@ def test_what_is_no_number_is_left_out(value):
     stage = AccelerationEffect().stage(context)
     motion = MechanismState(CRANK, POSITION, VELOCITY, None, (), (), ())
     assert stage(motion) == motion
-
-
-def test_the_rest_of_the_motion_is_passed_on():
-    motion = moved(ANGLES, 1.0, 2.0)
-    assert motion[:3] == (CRANK, POSITION, VELOCITY)
 
 
 def test_the_message_is_the_motion_at_one_point():

@@ -36,13 +36,6 @@ def test_that_of_a_slide_is_in_metres():
     assert sensor(BEGIN, reading(BEGIN, 1.0, 0.125)).joints == (1.0, 0.126)
 
 
-def test_the_rest_of_the_reading_is_passed_on():
-    sensor = BiasEffect({'rocker_joint': 0.25}).sensor(context())
-    rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
-    assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0, **rest)) == reading(BEGIN, 1.0, 2.25, **rest)
-    assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0)) == reading(BEGIN, 1.0, 2.25)
-
-
 def test_a_scene_publishes_biased_joints_and_true_rates():
     ideal = published('')
     for i, off in zip(ideal, published('bias: {joints: {coupler_joint: 0.5}}'), strict=True):

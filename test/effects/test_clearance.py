@@ -16,7 +16,7 @@ from linkage_ros.stages.effects import ClearanceEffect
 import pytest
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, moved, SINGULAR
+from .loaded import context, GRAVITY, moved
 from ..support.messages import read_joint_state
 from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
@@ -141,11 +141,6 @@ def test_a_force_that_is_rounding_leans_nothing():
     assert names[0] == 'O2'
     assert stage(before._replace(reactions=tiny)).deflection == (0.0, 0.0)
     assert stage(before).deflection != (0.0, 0.0)
-
-
-def test_at_a_toggle_nothing_leans():
-    within = context(linkage_of(SINGULAR))
-    assert shift(within, (0.0, 1.0, 0.0), {'A': 1e-5}) == ()
 
 
 def test_it_is_added_to_what_the_links_yield_and_the_rest_is_passed_on():

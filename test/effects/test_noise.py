@@ -176,33 +176,9 @@ def test_the_kinds_of_noise_of_a_joint_go_their_own_ways():
     assert likely(products**2 / N, 1)
 
 
-def test_ticks_without_rates_draw_as_those_with():
-    one = {'rocker_joint': JointNoise(white=0.01, walk=0.3, rate_white=1.0)}
-    always = noisy(one, REGULAR[:100])
-    toggles = noisy(one, REGULAR[:100], rates=lambda now: () if now // MS % 3 == 0 else (0.0, 0.0))
-    assert values(always) == values(toggles)
-    assert sum(read.rates == () for read in toggles) in {33, 34}
-    for full, found in zip(always, toggles, strict=True):
-        assert found.rates in {(), full.rates}
-
-
-def test_the_seed_decides():
-    one = {'rocker_joint': JointNoise(white=0.01, walk=0.3, rate_white=1.0)}
-    assert noisy(one, REGULAR[:50]) == noisy(one, REGULAR[:50])
-    first, other = noisy(one, REGULAR[:50]), noisy(one, REGULAR[:50], seed='other')
-    assert all(a.joints[1] != b.joints[1] for a, b in zip(first, other, strict=True))
-
-
 def test_that_of_a_slide_is_in_metres():
     found = noisy({'rod_slide': JointNoise(white=1e-5)}, loop=SLIDE)
     assert_white(values(found), 1e-5)
-
-
-def test_the_rest_of_the_reading_is_passed_on():
-    sensor = NoiseEffect({'rocker_joint': JointNoise(white=1.0)}).sensor(context())
-    rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
-    found = sensor(BEGIN, reading(BEGIN + 5, 1.0, 2.0, **rest))
-    assert found == reading(BEGIN + 5, 1.0, found.joints[1], **rest)
 
 
 def test_a_scene_has_the_noise_that_it_names_and_no_other():
@@ -213,5 +189,3 @@ def test_a_scene_has_the_noise_that_it_names_and_no_other():
     steps = [after - before for before, after in pairwise(errors)][::2]
     assert likely(squares(steps, sqrt(2 * 0.01**2 + 0.1**2 * 0.001)), len(steps))
     assert [read.joints[0] for read in first] == [read.joints[0] for read in ideal]
-    assert published(text, 200) == first
-    assert published(text, 200, seed=1) != first

@@ -13,7 +13,7 @@ from cmath import rect
 from hypothesis import given, strategies as st
 from linkage_ros.description import parse_scene
 from linkage_ros.kinematics import Status
-from linkage_ros.stages.effects import MechanismState, PinForcesEffect, SensorReading
+from linkage_ros.stages.effects import PinForcesEffect, SensorReading
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -67,15 +67,6 @@ def test_where_the_balance_has_no_solution_there_are_none():
     within = context(FOUR_BAR)
     vars(within)['reactions'] = type('Singular', (), {'solve': lambda *_: None})()
     assert moved(within, (1.0, 1.0, 1.0), {'pin_forces': ()}).reactions == ()
-
-
-def test_the_rest_of_the_motion_is_passed_on():
-    within = context(FOUR_BAR)
-    before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(deflection=(0.5, 0.5))
-    found = PinForcesEffect().stage(within)(before)
-    assert found == before._replace(reactions=found.reactions)
-    assert isinstance(found, MechanismState)
-    assert len(found.reactions) == 4
 
 
 def pipeline(effects, linkages=b'linkage: l.yaml'):

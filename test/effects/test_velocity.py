@@ -11,7 +11,6 @@
 from math import isfinite, remainder, tau
 
 from hypothesis import given, strategies as st
-from linkage_ros.kinematics import Status
 from linkage_ros.stages.drives import Context, CrankState
 from linkage_ros.stages.effects import MechanismState, VelocityEffect
 import pytest
@@ -53,13 +52,6 @@ def test_a_crank_at_rest_has_joints_at_rest(angle):
     assert all(rate == 0.0 for rate in moved(ANGLES, angle, 0.0).velocity.joints)
 
 
-def test_at_a_toggle_there_is_none():
-    motion = moved(STRETCHED_AT_0, 0.0, 1.0)
-    assert motion.position.status is Status.TOGGLE
-    assert len(motion.position.joints) == 2
-    assert motion.velocity is None
-
-
 @given(st.floats(-17.0, -1.0))
 def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
     limit = EVERY_OTHER.input_ranges[0].highest
@@ -67,10 +59,3 @@ def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
     if EVERY_OTHER.position(angle).joints:
         found = moved(EVERY_OTHER, angle, 1e10).velocity
         assert found is None or all(map(isfinite, found.joints))
-
-
-def test_the_rest_of_the_motion_is_passed_on():
-    position = ANGLES.position(1.0)
-    motion = moved(ANGLES, 1.0, 2.0)
-    assert motion[:2] == (CrankState((1.0,), (2.0,), (0.0,), 0), position)
-    assert motion.velocity == ANGLES.velocity(position, 2.0)
