@@ -32,12 +32,13 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema reference effects docs lint format
+.PHONY: help demo test test_all bench accuracy topologies synthesis round_trips gallery schema reference effects docs lint format
 .PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 sets the duration)'
-	@echo 'make test      lint, then all tests'
+	@echo 'make test      lint, then the tests, with a sample of the cases of the longest'
+	@echo 'make test_all  the same with all cases, as before a release (three times as long)'
 	@echo 'make bench     measure ticks, latency and kinematics against other implementations'
 	@echo 'make timing    measure ticks with changing subscribers and under load, into docs/timing (35 min)'
 	@echo 'make accuracy  test the kinematics on 11 million cases, then run topologies (35 min)'
@@ -134,6 +135,9 @@ test: $(STAMP)
 	  $(PYTEST) -o cache_dir=$${failed%/v/cache/lastfailed} --last-failed || status=$$?; \
 	done; \
 	exit $$status
+
+test_all:
+	@LINKAGE_TEST_ALL=1 $(MAKE) --no-print-directory test
 
 # What it prints comes at its end, as a whole.
 test_nodes: $(STAMP)

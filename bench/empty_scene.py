@@ -38,7 +38,7 @@ def measure_empty_scene(rounds: int, ticks: int) -> Table:
     """Measure ticks of the empty scene and of hand-written code in turn, and return the table."""
     empty, moving = _pipeline(''), _pipeline('effects: {velocity: {}}')
     by_hand = _by_hand(0.04, 0.12, 0.08, 0.1)
-    (look,) = empty.tick(BEGIN).full_states
+    (look,) = empty.tick(BEGIN).states
     joints = JointStateReader(empty.linkages[0].scene_linkage.joint_names).read(by_hand(BEGIN))
     if isinstance(joints, Rejection) or look.reading is None:
         raise MeasurementError('empty scene: publishes nothing')

@@ -18,7 +18,7 @@ from pathlib import Path
 import time
 
 from bench import ROOT
-from linkage_ros.cli import terminal
+from linkage_ros import cli
 from linkage_ros.tools.study import alternate_order, describe_machine, spread_of
 from linkage_ros.tools.view.pages import table_lines
 
@@ -31,18 +31,14 @@ class Table:
     head: Sequence[str]
     rows: list[Sequence[str]] = field(default_factory=list)
 
-    def for_terminal(self) -> terminal.TerminalTable:
-        """Return the table for the terminal, with numbers aligned to the right."""
+    def aligned(self) -> cli.Table:
+        """Return the table with numbers aligned to the right."""
         name, *values = self.head
-        return terminal.TerminalTable(
-            self.title, [name, *(f'>{value}' for value in values)], self.rows
-        )
+        return cli.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
 
     def markdown(self) -> str:
         """Return the table as Markdown."""
-        numbers = [False, *[True] * (len(self.head) - 1)]
-        lines = table_lines(self.head, self.rows, numbers)
-        return '\n'.join([f'## {self.title}', '', *lines, ''])
+        return '\n'.join([f'## {self.title}', '', *table_lines(self.aligned()), ''])
 
 
 def say(line: str) -> None:
@@ -52,7 +48,7 @@ def say(line: str) -> None:
 
 def show(table: Table) -> None:
     """Print a table, and an empty line after it."""
-    terminal.print_tables(table.for_terminal())
+    cli.print_tables(table.aligned())
     say('')
 
 

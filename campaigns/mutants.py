@@ -58,9 +58,9 @@ COPIED = (
 )
 LONGEST_TEST = 180.0
 """Time for one test, in [s]: a mutant that loops fails it."""
-KINEMATICS = 'kinematics', 'test_pipeline.py', 'solvers', 'drives/test_limits.py'
+KINEMATICS = 'kinematics', 'test_pipeline.py', 'drives/test_limits.py'
 DYNAMICS = 'dynamics', 'drives', 'effects/test_effort.py', 'effects/test_pin_forces.py'
-TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py', 'solvers'
+TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py'
 BAG = ('bag',)
 TESTS: dict[str, Sequence[str]] = {
     'kinematics/closure': KINEMATICS,

@@ -21,6 +21,7 @@ from pathlib import Path
 import sys
 from typing import NamedTuple
 
+from linkage_ros.cli import Table
 from linkage_ros.description import LINKAGE_FILE, load_scene, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import list_names
 from linkage_ros.resources import shipped_path
@@ -28,6 +29,7 @@ from linkage_ros.stages.effects import NEEDS, PUBLISHED_WITH
 from linkage_ros.tools.study import (
     Budget,
     budget_svg,
+    budget_table,
     closing_lines,
     compare_hard_cases,
     compare_runs,
@@ -35,7 +37,6 @@ from linkage_ros.tools.study import (
     DISTANCES,
     error_text,
     HardCase,
-    heads_of,
     lead_lines,
     leave_out,
     measure_budget,
@@ -43,7 +44,6 @@ from linkage_ros.tools.study import (
     price_scenes,
     price_text,
     Progress,
-    rows_of,
     tick_price,
     turn_crank,
 )
@@ -153,7 +153,8 @@ def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:
     yield ''
     yield f'![Error against cost of {shown.scene}](accuracy/{picture})'
     yield ''
-    yield from table(heads_of(budget), rows_of(budget))
+    made = budget_table(budget)
+    yield from table(made.heads, made.rows)
     yield ''
     yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])
     yield ''
@@ -195,11 +196,7 @@ def _worst(case: HardCase) -> str:
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Return a table of text as Markdown."""
-    return table_lines(
-        [head.lstrip('>') for head in heads],
-        [[escaped(cell) for cell in row] for row in rows],
-        [head.startswith('>') for head in heads],
-    )
+    return table_lines(Table('', heads, [[escaped(cell) for cell in row] for row in rows]))
 
 
 def escaped(text: str) -> str:

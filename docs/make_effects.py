@@ -23,7 +23,7 @@ import re
 import sys
 from typing import NamedTuple
 
-from linkage_ros.cli import parameters_of, REGISTRIES, table_of
+from linkage_ros.cli import parameters_of, REGISTRIES, Table, table_of
 from linkage_ros.description import first_docstring_line, parameter_rows, parse_scene
 from linkage_ros.dynamics import AppliedLoads
 from linkage_ros.errors import FileError
@@ -211,21 +211,23 @@ def parameters(kind: str, name: str) -> str:
     _, heads, rows = table_of(kind, name)
     if len(heads) == 1:
         return 'It has no parameters.'
-    return '\n'.join(markdown.table_lines(heads, [(f'`{row[0]}`', *row[1:]) for row in rows]))
+    return '\n'.join(
+        markdown.table_lines(Table('', heads, [(f'`{row[0]}`', *row[1:]) for row in rows]))
+    )
 
 
 def loads() -> str:
     """Return the table of parameters of the loads on joints and points."""
     heads = 'parameter', 'unit', 'default', 'values', 'meaning'
     rows = [(f'`{key}`', *more) for key, *more in parameter_rows(AppliedLoads)]
-    return '\n'.join(markdown.table_lines(heads, rows))
+    return '\n'.join(markdown.table_lines(Table('', heads, rows)))
 
 
 def refused() -> str:
     """Return the table of refused scenes with their errors."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
     rows = [(each['what'], f'`{_error_of(**each)}`') for each in scenes]
-    return '\n'.join(markdown.table_lines(('scene', 'error'), rows))
+    return '\n'.join(markdown.table_lines(Table('', ('scene', 'error'), rows)))
 
 
 _MADE = {

@@ -25,14 +25,22 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.cli import COMMANDS, EXIT_CODES, module_of, parser_of, REGISTRIES, table_of
+from linkage_ros.cli import (
+    COMMANDS,
+    EXIT_CODES,
+    module_of,
+    parser_of,
+    REGISTRIES,
+    Table,
+    table_of,
+)
 from linkage_ros.description import linkage_schema, scene_schema
 from linkage_ros.tools.view.pages import table_lines
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table; the cells are Markdown."""
-    return '\n'.join(table_lines(heads, rows)) + '\n'
+    return '\n'.join(table_lines(Table('', heads, [*rows]))) + '\n'
 
 
 def plain(text: str) -> str:
@@ -104,7 +112,7 @@ def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
 
 
 def parameters(kind: str) -> str:
-    """Return all drives, effects, faults or solvers with their parameters."""
+    """Return all drives, effects or faults with their parameters."""
     return '\n'.join(part for name in REGISTRIES[kind] for part in _one(kind, name))
 
 
@@ -119,7 +127,7 @@ def _one(kind: str, name: str) -> Iterator[str]:
     yield table(parameters_.columns, rows)
 
 
-_ELSEWHERE = ('drive', 'effects', 'solver')
+_ELSEWHERE = ('drive', 'effects')
 """Keys whose keys are in the reference of parameters."""
 
 _NAMED = 'NAME'
@@ -215,7 +223,6 @@ MADE: Mapping[str, Callable[[], str]] = {
     'drives': lambda: parameters('drive'),
     'effects': lambda: parameters('effect'),
     'faults': lambda: parameters('fault'),
-    'solvers': lambda: parameters('solver'),
     'scene keys': scene_keys,
     'linkage keys': linkage_keys,
 }

@@ -167,7 +167,7 @@ ticks[0].message[:12].hex(' ')  # the bytes that the node would publish, header 
 # sensors.
 
 # %%
-looks = [tick.full_states[0] for tick in ticks]
+looks = [tick.states[0] for tick in ticks]
 column = pipeline.closures[0].joint_names.index('rocker_joint')
 true = np.array([look.position['rocker_joint'] for look in looks])
 read = np.array([look.reading.joints[column] for look in looks])

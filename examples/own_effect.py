@@ -21,6 +21,6 @@ effects: {mine.dead_zone: {width: 0.05}}
 pipeline = lr.Pipeline(lr.load_scene('scene.yaml'))
 rocker = pipeline.closures[0].joint_names.index('rocker_joint')
 for milliseconds in range(0, 1000, 100):
-    (linkage,) = pipeline.tick(milliseconds * 1_000_000).full_states
+    (linkage,) = pipeline.tick(milliseconds * 1_000_000).states
     true = linkage.position['rocker_joint']
     print(f'{milliseconds:4} ms: true {true:.4f}, read {linkage.reading.joints[rocker]:.4f} rad')

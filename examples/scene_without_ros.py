@@ -15,7 +15,7 @@ joints = pipeline.closures[0].joint_names
 period = 1_000_000  # ns
 for tick_number in range(5):
     tick = pipeline.tick(tick_number * period)
-    (linkage,) = tick.full_states
+    (linkage,) = tick.states
     print(f'{tick_number} ms, a message of {len(tick.message)} bytes')
     for joint, reading in zip(joints, linkage.reading.joints):
         print(f'  {joint}: read {reading:.6f}, true {linkage.position[joint]:.6f}')

@@ -47,7 +47,8 @@ from linkage_ros.kinematics.linkage import (
 )
 from linkage_ros.kinematics.results import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
-from linkage_ros.tick.pipeline import Pipeline as Pipeline, Tick as Tick
+from linkage_ros.tick.interpreted_tick import Tick as Tick
+from linkage_ros.tick.pipeline import Pipeline as Pipeline
 from linkage_ros.replay.replay import recorded_scene as recorded_scene
 from linkage_ros.description.linkage_file import load as load
 from linkage_ros.description.scene_file import load_scene as load_scene

@@ -6,8 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""For all tests: how Hypothesis judges examples, a browser, and which files run first."""
+"""For all tests: how many run and in which order, how Hypothesis judges examples, a browser."""
 
+from collections import defaultdict
 from collections.abc import Iterator
 import gc
 from math import inf
@@ -18,9 +19,15 @@ from linkage_ros.cli import terminal
 import pytest
 
 from .browser import chromium
+from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
 
 # A property is not judged by the duration of an example.
-settings.register_profile('unhurried', deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    'unhurried',
+    deadline=None,
+    max_examples=EXAMPLES,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile('unhurried')
 
 
@@ -37,10 +44,27 @@ def browser() -> Iterator[Any]:
         yield started
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the files with slow tests first: xdist hands out files in this order, one a worker."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Take a sample, and put slow files first: xdist hands out files in this order."""
+    if not TAKES_ALL and not any('::' in argument for argument in config.args):
+        _leave_a_sample(config, items)
     slow = {item.path for item in items if item.get_closest_marker('slow')}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def _leave_a_sample(config: pytest.Config, items: list[pytest.Item]) -> None:
+    tests = defaultdict(list)
+    for item in items:
+        if mark := item.get_closest_marker('sample'):
+            tests[item.nodeid.partition('[')[0], mark.args].append(item)
+    left_out = set()
+    for (_, (count,)), cases in tests.items():
+        values = [case.callspec.indices if hasattr(case, 'callspec') else {} for case in cases]
+        chosen = choose_covering(values, count)
+        left_out |= {item for index, item in enumerate(cases) if index not in chosen}
+    if left_out:
+        config.hook.pytest_deselected(items=[*left_out])
+        items[:] = [item for item in items if item not in left_out]
 
 
 def pytest_collection_finish() -> None:

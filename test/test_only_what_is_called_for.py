@@ -19,7 +19,6 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
@@ -88,11 +87,7 @@ DRIVE_SCENES = {
     'chirp': 'chirp: {amplitude: 1.0, start_frequency: 1.0, end_frequency: 5.0, seconds: 10.0}',
     'torque': 'torque: {}',
 }
-SOLVER_SCENES = {
-    'closed_form': 'solver: closed_form',
-    'newton': 'solver: {newton: {tolerance: 1.0e-9}}',
-    'table': 'solver: {table: {tolerance: 1.0e-3}}',
-}
+
 
 # Run in a process of its own: build the scene, and print the imported modules, the topics that the
 # tick then published, and the files it passed through.
@@ -156,16 +151,14 @@ class Look:
         assert 'rclpy' not in self.modules
 
 
-# The closed form is in every scene; it is named in the registry itself.
-OTHER_SOLVERS = {name: module for name, module in SOLVERS.items() if name != 'closed_form'}
 COMMON = {'description', 'kinematics', 'messages'}
 FAULTS_MODULE = 'linkage_ros.stages.faults'
-OPTIONAL = {'dynamics', 'solvers', 'tools'}
+OPTIONAL = {'dynamics', 'tools'}
 """Packages of which nothing is in a tick, unless the scene asks for it."""
 
 
 def of_registry(names, modules):
-    """Return which effects, drives or solvers have their module among some."""
+    """Return which effects or drives have their module among some."""
     return {name for name, module in names.items() if module in modules}
 
 
@@ -187,12 +180,11 @@ def test_everything_has_its_scene():
     assert set(SCENES) == set(EFFECTS)
     assert set(FAULT_SCENES) == set(FAULTS)
     assert {*DRIVE_SCENES, 'bag'} == set(DRIVES)
-    assert set(SOLVER_SCENES) == set(SOLVERS)
 
 
 def test_an_empty_scene_has_nothing(bare):
     for found in (bare.modules, bare.passed):
-        assert not of_registry(EFFECTS | OTHER_SOLVERS, found)
+        assert not of_registry(EFFECTS, found)
         assert FAULTS_MODULE not in found
         assert of_registry(DRIVES, found) == {'constant_rate'}
     assert not packages(bare.passed) & OPTIONAL
@@ -218,14 +210,6 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     assert of_registry(DRIVES, look.modules) == {'constant_rate'}
     assert FAULTS_MODULE not in look.modules
     assert ('numpy' in look.modules) == expected.numpy
-
-
-@pytest.mark.parametrize('solver', SOLVER_SCENES)
-def test_a_scene_with_one_solver_has_no_other(tmp_path, solver):
-    look = Look(tmp_path, BARE + SOLVER_SCENES[solver])
-    for found in (look.modules, look.passed):
-        assert of_registry(OTHER_SOLVERS, found) == {solver} - {'closed_form'}
-    assert ('numpy' in look.modules) == (solver == 'table')
 
 
 @pytest.mark.parametrize('drive', DRIVE_SCENES)

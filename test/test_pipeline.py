@@ -18,7 +18,6 @@ import sys
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Status
 from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.tick import LinkageState
 import pytest
 
 from .support.messages import read_joint_state as read, STORE
@@ -143,7 +142,8 @@ def test_before_the_first_sample_and_after_the_last_there_is_silence():
 
 
 def assert_silent(tick):
-    assert tick.full_states == (LinkageState(None, None, None, None),)
+    (state,) = tick.states
+    assert [state.crank, state.position, state.motion, state.reading] == [None] * 4
     assert (tick.message, tick.extras) == (b'', ())
 
 
@@ -158,7 +158,8 @@ def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap
     stuck = pipeline(linkage=linkage)
     stuck.offer(CRANK.write(BEGIN, [angle], [1.0]), BEGIN)
     tick = stuck.tick(BEGIN)
-    ((_, position, motion, reading),) = tick.full_states
+    (state,) = tick.states
+    position, motion, reading = state.position, state.motion, state.reading
     assert position.status is status
     assert position.gap == pytest.approx(gap)
     assert motion is reading is None
@@ -169,7 +170,7 @@ def test_at_a_toggle_positions_are_published_and_rates_are_not():
     toggle = pipeline(linkage=b'four_bar: {a: 1, b: 1, c: 1, d: 3}')
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
     tick = toggle.tick(BEGIN)
-    assert tick.full_states[0].position.status is Status.TOGGLE
+    assert tick.states[0].position.status is Status.TOGGLE
     assert len(read(tick.message).position) == 2
     assert len(read(tick.message).velocity) == 0
 
@@ -208,7 +209,7 @@ def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
         (point,) = written.points
         assert list(point.positions) == list(read(tick.message).position)
         assert list(point.velocities) == list(read(tick.message).velocity)
-        assert tuple(point.accelerations) == tick.full_states[0].motion.acceleration.joints
+        assert tuple(point.accelerations) == tick.states[0].motion.acceleration.joints
         assert len(point.accelerations) == 2
 
 
@@ -217,7 +218,7 @@ def test_at_a_toggle_a_trajectory_has_positions_only():
     toggle = pipeline(scene, linkage)
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
     tick = toggle.tick(BEGIN)
-    assert tick.full_states[0].position.status is Status.TOGGLE
+    assert tick.states[0].position.status is Status.TOGGLE
     (point,) = read_motion(tick.extras[0]).points
     assert len(point.positions) == 2
     assert len(point.velocities) == len(point.accelerations) == 0
@@ -240,11 +241,11 @@ def test_two_inputs_come_out_of_one_message_in_any_order():
         writer = JointStateWriter(names)
         five_bar = pipeline(b'effects: {acceleration: {}}', TWO_CRANKS)
         assert five_bar.offer(CRANK.write(BEGIN, [0.3], [1.0]), BEGIN) is Rejection.MISSING
-        assert five_bar.tick(BEGIN).full_states[0].position is None
+        assert five_bar.tick(BEGIN).states[0].position is None
         rates = [10.0 * value for value in values]
         assert five_bar.offer(writer.write(BEGIN, values, rates), BEGIN) is None
         tick = five_bar.tick(BEGIN + 10 * MS)
-        motion = tick.full_states[0].motion
+        motion = tick.states[0].motion
         assert motion.crank.rates == (3.0, 20.0)
         assert motion.crank.angles == pytest.approx((0.33, 2.2))
         assert closes(read(tick.message).position, 0.33, 2.2)
@@ -274,7 +275,8 @@ def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
         each.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
     for message, reason in bad:
         assert disturbed.offer(message, BEGIN) is reason
-        assert disturbed.tick(BEGIN).full_states == clean.tick(BEGIN).full_states
+        (one,), (other,) = (work.tick(BEGIN).states for work in (disturbed, clean))
+        assert (one.crank, one.motion, one.reading) == (other.crank, other.motion, other.reading)
         assert disturbed.tick(BEGIN).message == clean.tick(BEGIN).message
 
 

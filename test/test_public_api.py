@@ -22,7 +22,6 @@ import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
 from linkage_ros.resources import shipped_path
-from linkage_ros.solvers import TableClosure
 import pytest
 
 PACKAGE = Path(lr.__file__).parent
@@ -107,7 +106,6 @@ def test_positions_are_equal_whoever_has_found_them():
         (FOUR_BAR, '<Closure four_bar: 1 input, 2 joints>'),
         (FIVE_BAR, '<Closure five_bar: 2 inputs, 2 joints>'),
         (lr.Closure(FOUR_BAR.linkage), '<Closure: 1 input, 2 joints>'),
-        (TableClosure(FOUR_BAR.linkage, knots=64), '<TableClosure: 1 input, 2 joints>'),
         (lr.load_scene('two_fingers'), '<Scene two_fingers: 2 linkages, 500 Hz>'),
         (POSITION, '<Position closed: coupler_joint -0.346042, rocker_joint 1.00103>'),
         (OPEN, '<Position open by 0.0619 m>'),

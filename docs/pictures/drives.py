@@ -162,9 +162,7 @@ def _span_of_potential(scene: Scene) -> float:
     creeping = {**scene, 'drive': {'constant_rate': {'rate': tau}}, 'effects': {'effort': {}}}
     moving = run(creeping, 1.0)
     potential = moving.pipeline.linkages[0].context.mechanics.potential_energy
-    values = [
-        potential(state.position) for state in moving.full_states if state.position is not None
-    ]
+    values = [potential(state.position) for state in moving.states if state.position is not None]
     return max(values) - min(values)
 
 

@@ -48,7 +48,7 @@ class Run(NamedTuple):
 
     pipeline: Pipeline
     times: Values
-    full_states: list[LinkageState]
+    states: list[LinkageState]
 
     def position(self, joint: str) -> Values:
         """Return the published positions of a joint, in [rad] or [m]; nan without a message."""
@@ -70,16 +70,16 @@ class Run(NamedTuple):
         """Return the stamps of the published messages, in [s] since the first tick."""
         return np.array(
             [nan if state.reading is None else (state.reading.stamp - START) * 1e-9
-             for state in self.full_states]
+             for state in self.states]
         )  # fmt: skip
 
     def crank(self) -> Values:
         """Return the crank by the drive: rows of angles, rates and accelerations."""
         return np.array(
             [
-                (nan, nan, nan) if crank is None else
-                (crank.angles[0], crank.rates[0], crank.accelerations[0])
-                for crank, _, _, _ in self.full_states
+                (nan, nan, nan) if state.crank is None else
+                (state.crank.angles[0], state.crank.rates[0], state.crank.accelerations[0])
+                for state in self.states
             ]
         ).T  # fmt: skip
 
@@ -87,7 +87,7 @@ class Run(NamedTuple):
         """Return the force in a pin, in [N]: a row of x and a row of y."""
         names = self.pipeline.linkages[0].context.reactions.names
         place = names.index(pin)
-        motions = [state.motion for state in self.full_states]
+        motions = [state.motion for state in self.states]
         return np.array([m.reactions[place][:2] for m in motions if m is not None]).T
 
     def energy(self) -> Values:
@@ -95,15 +95,15 @@ class Run(NamedTuple):
         energy = self.pipeline.linkages[0].context.mechanics.total_energy
         return np.array(
             [
-                energy(position, *crank.rates)
-                for crank, position, _, _ in self.full_states
-                if crank is not None and position is not None
+                energy(state.position, *state.crank.rates)
+                for state in self.states
+                if state.crank is not None and state.position is not None
             ]
         )
 
     def _read(self, joint: str, values: Callable[[SensorReading], Sequence[float]]) -> Values:
         place = self.pipeline.linkages[0].scene_linkage.joint_names.index(joint)
-        read = [state.reading and values(state.reading) for state in self.full_states]
+        read = [state.reading and values(state.reading) for state in self.states]
         return np.array([each[place] if each else nan for each in read])
 
 
@@ -124,7 +124,7 @@ def run(
         listens = bool(pipeline.topic)
         due = [*messages(samples), *_commands(commands)] if listens else []
         times = ticks(scene, seconds)
-        full_states = []
+        states = []
         last = START
         for time in times:
             now = START + time
@@ -136,8 +136,8 @@ def run(
             last = now
             while due and due[0][0] <= START + time:
                 pipeline.offer(due.pop(0)[1], now)
-            full_states.append(pipeline.tick(now).full_states[0])
-    return Run(pipeline, np.array(times) * 1e-9, full_states)
+            states.append(pipeline.tick(now).states[0])
+    return Run(pipeline, np.array(times) * 1e-9, states)
 
 
 def extra_messages(scene: Scene, message_type: str, seconds: float) -> list[bytes]:

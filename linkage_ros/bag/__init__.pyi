@@ -35,7 +35,6 @@ from linkage_ros.bag.metadata import (
     UNFINISHED_DATA as UNFINISHED_DATA,
     write_metadata as write_metadata,
 )
-from linkage_ros.bag.order import LogTimeOrder as LogTimeOrder, WINDOW as WINDOW
 from linkage_ros.bag.other_formats import (
     is_bag_name as is_bag_name,
     MOST_UNPACKED as MOST_UNPACKED,
@@ -68,7 +67,6 @@ from linkage_ros.bag.recover import (
 )
 from linkage_ros.bag.run_events import (
     BEGUN as BEGUN,
-    CHOSEN as CHOSEN,
     Event as Event,
     FaultEvent as FaultEvent,
     MID_RUN as MID_RUN,

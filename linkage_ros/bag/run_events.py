@@ -22,9 +22,6 @@ from linkage_ros.errors import BagError
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
 """Key for the beginning of the bag, and its values."""
 
-CHOSEN = 'solver'
-"""Key for the chosen solvers, if the scene asks for an accuracy."""
-
 USER_EFFECTS = 'effects'
 """Key for the modules of user-defined effects."""
 
@@ -117,11 +114,8 @@ class RunMetadata(NamedTuple):
     wrenches: tuple[str, ...] = ()  # Names of the topics with wrenches, in the order of the scene
     begun: str = ''  # When the bag was begun, as in `MID_RUN`; '' if it does not say
     versions: Mapping[str, str] = {}  # Versions of the software of the run, by name
-    # Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
-    solvers: Mapping[str, Any] = {}
     user_effects: Mapping[str, str] = {}  # Modules of the user-defined effects, by name
-    # Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
-    seed: int = 0
+    seed: int = 0  # Seed of all random numbers
 
 
 class RunFiles(Protocol):
@@ -151,14 +145,13 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
     }
     missing = {'scene', 'joint_states_topic'} - set(texts)
     wrong = (account.keys() & {*_TEXTS, BEGUN}) - set(texts)
-    solvers = account.get(CHOSEN, {})
     modules = account.get(USER_EFFECTS)
     if not isinstance(modules, dict):
         modules = {}
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras) and _are_names(wrenches)
     seed = account.get(SEED, 0)
-    if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
+    if missing or wrong or not named or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
     # Only displayed; the name of a file may contain any character.
     if not texts['scene'].isprintable():
@@ -169,7 +162,6 @@ def read_run_metadata(bag: RunFiles) -> RunMetadata:
         wrenches=tuple(wrenches),
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
-        solvers=solvers,
         user_effects={name: str(module) for name, module in modules.items()},
         seed=seed,
     )
@@ -212,7 +204,6 @@ def recorded_events(
     wrenches = {topic: index for index, topic in enumerate(run.wrenches)}
     others |= set(wrenches)
     open_tick: tuple[int, int, list[bytes]] | None = None  # may get further messages
-    withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
         output = outputs.get(topic)
         if shared and output == 0 and not is_own(data):
@@ -229,8 +220,6 @@ def recorded_events(
             log, time, made = open_tick
             yield TickEvent(log, time, tuple(made))
             open_tick = None
-        # In older bags, two linkages that suppress one tick record it twice.
-        again, withheld = withheld == (log_time, publish_time), None
         if taken:
             yield SampleEvent(log_time, publish_time, data)
         if output is not None:
@@ -243,9 +232,7 @@ def recorded_events(
         elif topic == run.resets_topic:
             yield ResetEvent(log_time, publish_time, data)
         elif topic == run.withheld_topic:
-            withheld = log_time, publish_time
-            if not again:
-                yield TickEvent(log_time, publish_time, (b'',) * len(outputs))
+            yield TickEvent(log_time, publish_time, (b'',) * len(outputs))
     if open_tick is not None:
         log, time, made = open_tick
         yield TickEvent(log, time, tuple(made))

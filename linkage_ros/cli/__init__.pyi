@@ -14,15 +14,17 @@ from linkage_ros.cli.arguments import (
     add_radians as add_radians,
     add_set as add_set,
     angle_text as angle_text,
-    AngleUnit as AngleUnit,
     bounded_number as bounded_number,
     DEGREES as DEGREES,
+    DisplayUnits as DisplayUnits,
+    finite_or_none as finite_or_none,
     fixed_text as fixed_text,
     LINKAGES as LINKAGES,
     output_or as output_or,
     output_path as output_path,
     PICTURES as PICTURES,
     read_inputs as read_inputs,
+    RESULTS as RESULTS,
     SCENE_HELP as SCENE_HELP,
 )
 from linkage_ros.cli.bag_reading import (
@@ -52,10 +54,21 @@ from linkage_ros.cli.replay import (
     deviations_account as deviations_account,
     joints_table as joints_table,
 )
+from linkage_ros.cli.result import (
+    add_result as add_result,
+    Result as Result,
+    show_result as show_result,
+)
 from linkage_ros.cli.scene import (
     parameters_of as parameters_of,
     REGISTRIES as REGISTRIES,
     table_of as table_of,
+)
+from linkage_ros.cli.table import (
+    Column as Column,
+    facts_table as facts_table,
+    Table as Table,
+    table_of_rows as table_of_rows,
 )
 from linkage_ros.cli.terminal import (
     FIRST_LINE as FIRST_LINE,
@@ -65,5 +78,4 @@ from linkage_ros.cli.terminal import (
     ProgressCallback as ProgressCallback,
     show_progress as show_progress,
     table_text as table_text,
-    TerminalTable as TerminalTable,
 )

@@ -17,12 +17,15 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description import check_new, check_output_name
+from linkage_ros.description import check_new, check_output_name, TABLE_KINDS, Units
 from linkage_ros.errors import decimal_comma, LinkageError, list_names
 from linkage_ros.kinematics import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
 """Suffixes of the pictures that matplotlib writes."""
+
+RESULTS = (*TABLE_KINDS, '.json', '.txt')
+"""Suffixes of the files that a result is written to."""
 
 LINKAGES = ('.yaml', '.yml')
 """Suffixes of linkage and scene files."""
@@ -80,6 +83,10 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
         path = getattr(arguments, name, None)
         if isinstance(path, Path):
             check_new(path, force=getattr(arguments, 'force', False))
+            for option in ('json', 'csv') if path.suffix.lower() in RESULTS else ():
+                if getattr(arguments, option, False):
+                    remedy = 'leave it out: the suffix of the file selects its format'
+                    raise LinkageError(f'--{option}', 'is for a printed result', remedy)
             bag = getattr(arguments, 'bag', None)
             if bag is not None and bag.resolve().is_relative_to(path.resolve()):
                 raise LinkageError(path, 'is the bag that is read', 'name another with -o')
@@ -112,7 +119,7 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar='KEY=VALUE',
         help='set a key of the scene, as --set rate=500 or --set drive.sine.amplitude=0.3, or '
-        'of one of its linkages, as --set linkages.left.accuracy=1e-6; VALUE is YAML; quote a '
+        'of one of its linkages, as --set linkages.left.prefix=left_; VALUE is YAML; quote a '
         'part with a dot that the scene does not have yet, as '
         '--set \'loads.forces."coupler.P"={direction: [1, 0], constant: 5}\'; may be repeated',
     )
@@ -168,7 +175,7 @@ def bounded_number(least: float, most: float, kind: type[float] = float) -> Call
 
 
 def read_inputs(
-    linkage: Linkage, typed: Sequence[float], option: str, *, in_degrees: bool = True
+    linkage: Linkage, typed: Sequence[float], option: str, units: DisplayUnits
 ) -> tuple[float, ...]:
     """
     Return the typed values of the inputs, in [rad] and [m].
@@ -184,8 +191,7 @@ def read_inputs(
             + decimal_comma(','.join(f'{value:g}' for value in typed)),
         )
     return tuple(
-        radians(value) if in_degrees and not driven.slider else value
-        for value, driven in zip(typed, given, strict=True)
+        units.to_si(value, driven.unit) for value, driven in zip(typed, given, strict=True)
     )
 
 
@@ -206,19 +212,41 @@ def fixed_text(value: float, digits: int) -> str:
     return written.lstrip('-') if float(written) == 0.0 else written
 
 
-class AngleUnit(NamedTuple):
-    """The unit, ``°`` or ``rad``, of angles that a person types and reads; files hold radians."""
+class DisplayUnits(NamedTuple):
+    """The units that a person types and reads: of angles ``°`` or ``rad``, and of lengths."""
 
-    name: str
+    angle: str
+    file: Units = Units()  # Those of the linkage file
 
     @property
     def in_degrees(self) -> bool:
         """Return whether angles are in degrees."""
-        return self is DEGREES
+        return self.angle == '°'
 
-    def convert(self, angle: float) -> float:
-        """Return an angle in [rad], or its rate, in this unit."""
-        return degrees(angle) if self.in_degrees else angle
+    @property
+    def length(self) -> str:
+        """Return the unit of lengths."""
+        return self.file.length
+
+    def of_file(self, file: Units) -> DisplayUnits:
+        """Return these units with the lengths of a linkage file."""
+        return self._replace(file=file)
+
+    def name_unit(self, unit: str) -> str:
+        """Return the name of a unit of SI here: ``°/s`` for ``rad/s``."""
+        return self.file.file_unit(unit).replace('deg', 'rad').replace('rad', self.angle)
+
+    def convert(self, value: float, unit: str = 'rad') -> float:
+        """Return a value in SI in the unit that is shown."""
+        if unit.startswith('rad'):
+            return degrees(value) if self.in_degrees else value
+        return self.file.to_file_unit(value, unit)
+
+    def to_si(self, typed: float, unit: str) -> float:
+        """Return a typed value, or its rate, in SI."""
+        if unit.startswith('rad'):
+            return self.to_radians(typed)
+        return self.file.to_si(typed, unit)
 
     def to_radians(self, typed: float) -> float:
         """Return a typed angle in [rad]."""
@@ -234,16 +262,21 @@ class AngleUnit(NamedTuple):
         """Return an angle in [rad] as text; ``digits`` are the decimals of degrees."""
         return angle_text(angle, digits) if self.in_degrees else f'{angle + 0.0:.6g} rad'
 
+    def format_length(self, value: float, form: str = '.6g') -> str:
+        """Return a length in [m] as text with its unit."""
+        return f'{self.convert(value, "m") + 0.0:{form}} {self.length}'
+
     def value_text(self, value: float, turning: bool) -> str:
         """Return the value of an input or a joint, in [rad] if it turns, else in [m]."""
-        return self.format_angle(value) if turning else f'{value + 0.0:.6g} m'
+        return self.format_angle(value) if turning else self.format_length(value)
 
 
-DEGREES, RADIANS = AngleUnit('°'), AngleUnit('rad')
+DEGREES: DisplayUnits = DisplayUnits('°')
+RADIANS: DisplayUnits = DisplayUnits('rad')
 
 
 def add_radians(parser: argparse.ArgumentParser, what: str = 'show angles') -> None:
-    """Declare ``--radians``; the attribute ``angles`` is then an `AngleUnit`."""
+    """Declare ``--radians``; the attribute ``angles`` is then a `DisplayUnits`."""
     parser.add_argument(
         '--radians',
         dest='angles',

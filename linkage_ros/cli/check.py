@@ -13,14 +13,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-import json
 from math import ceil, tau
 import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli.arguments import add_file, add_radians, AngleUnit, finite_or_none
-from linkage_ros.cli.terminal import print_tables, ProgressCallback, show_progress, TerminalTable
+from linkage_ros.cli.arguments import add_file, add_radians, DisplayUnits, finite_or_none
+from linkage_ros.cli.result import add_result, Result, show_result
+from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
+from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.description import linkage_content, linkage_notes, read_closure
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
@@ -65,7 +66,7 @@ EXAMPLE = 'linkage check jansen_leg'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
-    parser.add_argument('--json', action='store_true', help='the same as JSON, in SI units')
+    add_result(parser)
     parser.add_argument(
         '--branches',
         action='store_true',
@@ -85,10 +86,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         account = {'file': arguments.file, **linkage_json(closure, advance)}
         if arguments.branches:
             account['branches'] = list(_list_branches(closure))
-    if arguments.json:
-        print(json.dumps(account, indent=1, allow_nan=False))
-    else:
-        print_tables(*linkage_tables(account, arguments.angles))
+    units = arguments.angles.of_file(content.units)
+    show_result(Result(account, [*_linkage_tables(account, units)]), arguments, units)
     return 0
 
 
@@ -354,120 +353,116 @@ def _assembly_text(dyad: Dyad, side: str) -> str:
 # The same as tables.
 
 
-def linkage_tables(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[TerminalTable]:
+def _join(values: Sequence[Any], _units: DisplayUnits) -> str:
+    return ', '.join(map(str, values))
+
+
+def _lengths_text(lengths: Sequence[float], units: DisplayUnits, form: str = '.6g') -> str:
+    return ', '.join(f'{units.convert(length, "m"):{form}}' for length in lengths)
+
+
+def _margin_text(margin: float, units: DisplayUnits) -> str:
+    return f'{units.convert(margin, "m"):+.4g}' if margin else '0'
+
+
+_GROUP, _LINKS = Column('>', 'group'), Column('links', 'links', form=_join)
+_ORDER = (
+    Column('>', 'number'),
+    Column('group', 'kind'),
+    _LINKS,
+    Column('how', 'method'),
+    Column('assembly', 'assembly'),
+)
+
+
+def _linkage_tables(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[Table]:
     """Yield the tables that describe a linkage."""
-    yield TerminalTable(account['file'], ('', ''), list(_linkage_facts(account, angles)))
-    yield _order_table(account)
-    yield from map(_assemblies_table, account['other_assemblies'])
-    for table in (
-        _four_bars_table(account),
-        _transmission_table(account, angles),
-        _conditioning_table(account, angles),
-    ):
-        if table.rows:
-            yield table
-    if 'branches' in account:
-        yield _branches_table(account, angles)
-
-
-def _order_table(account: Mapping[str, Any]) -> TerminalTable:
-    heads = ('>', 'group', 'links', 'how', 'assembly')
-    rows = [
-        (
-            str(number),
-            group['kind'],
-            ', '.join(group['links']),
-            group['method'],
-            group['assembly'],
-        )
-        for number, group in enumerate(account['groups'], 1)
-    ]
-    return TerminalTable('Solved in this order', heads, rows)
-
-
-def _four_bars_table(account: Mapping[str, Any]) -> TerminalTable:
-    heads = ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name')
-    rows = [
-        (
-            str(bar['group']),
-            ', '.join(bar['links']),
-            ', '.join(f'{length:.6g}' for length in bar['lengths_m']),
-            f'{bar["grashof_margin_m"]:+.4g}' if bar['grashof_margin_m'] else '0',
-            bar['barker'],
-            bar['name'],
-        )
-        for bar in account['four_bars']
-    ]
-    title = 'Four-bars: input, coupler, output and the frame that they are seen from'
-    return TerminalTable(title, heads, rows)
-
-
-def _transmission_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
-    turning = account['inputs'][0]['unit'] == 'rad'
-    heads = ('>', 'links', '>least', 'at', '>greatest', 'at')
-    rows = [
-        (
-            str(one['group']),
-            ', '.join(one['links']),
-            *(
-                cell
-                for extreme in (one['least'], one['greatest'])
-                for cell in (
-                    ''
-                    if extreme['angle_rad'] is None
-                    else angles.format_angle(extreme['angle_rad'], 2),
-                    _inputs_text(extreme['inputs'], turning, angles),
-                )
-            ),
-        )
-        for one in account['transmission_angles']
-    ]
-    return TerminalTable('Transmission angles over the range, acute', heads, rows)
-
-
-def _conditioning_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
-    turning = account['inputs'][0]['unit'] == 'rad'
-    heads = ('>', 'links', '>least', 'at')
-    rows = [
-        (
-            str(one['group']),
-            ', '.join(one['links']),
-            f'{one["least"]["conditioning"]:.4f}',
-            _inputs_text(one['least']['inputs'], turning, angles),
-        )
-        for one in account['conditioning']
-    ]
-    return TerminalTable('Conditioning over the range, of iterated links', heads, rows)
-
-
-def _branches_table(account: Mapping[str, Any], angles: AngleUnit) -> TerminalTable:
-    given = account['inputs'][0]
-    rows = []
-    for one in account['branches']:
-        cranks, joints = (
-            [angles.value_text(one[end], unit == 'rad') for end in ends]
-            for ends, unit in (
-                (('input_low', 'input_high'), given['unit']),
-                (('low', 'high'), one['unit']),
-            )
-        )
-        way = 'rises' if one['rises'] else 'falls'
-        by = ', '.join(sorted({name for name in one['limited_by'] if name}))
-        rows.append((one['joint'], str(one['branch']), *cranks, *joints, way, by))
-    heads = (
-        'joint',
-        '>branch',
-        f'>{given["joint"]} from',
-        '>to',
-        '>joint from',
-        '>to',
-        '',
-        'limits of',
+    yield facts_table(account['file'], _linkage_facts(account, units))
+    groups = [{'number': number, **one} for number, one in enumerate(account['groups'], 1)]
+    yield table_of_rows('Solved in this order', 'groups', _ORDER, groups)
+    input_units = [given['unit'] for given in account['inputs']]
+    yield from (
+        _assemblies_table(group, input_units, units) for group in account['other_assemblies']
     )
-    return TerminalTable('Branches: between their ends a joint moves one way', heads, rows)
+    found = [_four_bars_table(account, units), *_extremes_tables(account)]
+    if 'branches' in account:
+        found.append(_branches_table(account))
+    yield from (table for table in found if table.rows or table.key == 'branches')
 
 
-def _linkage_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
+def _four_bars_table(account: Mapping[str, Any], units: DisplayUnits) -> Table:
+    columns = (
+        _GROUP,
+        _LINKS,
+        Column(f'lengths [{units.length}]', 'lengths_m', form=_lengths_text),
+        Column(f'>Grashof margin [{units.length}]', 'grashof_margin_m', 'm', _margin_text),
+        Column('Barker', 'barker'),
+        Column('name', 'name'),
+    )
+    title = 'Four-bars: input, coupler, output and the frame that they are seen from'
+    return table_of_rows(title, 'four_bars', columns, account['four_bars'])
+
+
+def _extremes_tables(account: Mapping[str, Any]) -> Iterator[Table]:
+    """Yield the tables of transmission angles and conditioning over the range."""
+    turning = account['inputs'][0]['unit'] == 'rad'
+
+    def places(inputs: Sequence[float], units: DisplayUnits) -> str:
+        return _inputs_text(inputs, turning, units)
+
+    def angle(value: float | None, units: DisplayUnits) -> str:
+        return '' if value is None else units.format_angle(value, 2)
+
+    found = (
+        ('Transmission angles over the range, acute', 'transmission_angles', 'angle_rad',
+         ('least', 'greatest'), 'rad', angle),
+        ('Conditioning over the range, of iterated links', 'conditioning', 'conditioning',
+         ('least',), '', '.4f'),
+    )  # fmt: skip
+    for title, key, value, ends, unit, form in found:
+        columns = [_GROUP, _LINKS]
+        for end in ends:
+            columns += [
+                Column(f'>{end}', end, unit, form),
+                Column('at', f'{end}_at', form=places),
+            ]
+        rows = [
+            {**one} | {end: one[end][value] for end in ends}
+            | {f'{end}_at': one[end]['inputs'] for end in ends}
+            for one in account[key]
+        ]  # fmt: skip
+        yield table_of_rows(title, key, columns, rows)
+
+
+def _branches_table(account: Mapping[str, Any]) -> Table:
+    given = account['inputs'][0]
+
+    def input_text(value: float, units: DisplayUnits) -> str:
+        return units.value_text(value, given['unit'] == 'rad')
+
+    def joint_text(value: tuple[float, str], units: DisplayUnits) -> str:
+        return units.value_text(value[0], value[1] == 'rad')
+
+    columns = (
+        Column('joint', 'joint'),
+        Column('>branch', 'branch'),
+        Column(f'>{given["joint"]} from', 'input_low', given['unit'], input_text),
+        Column('>to', 'input_high', given['unit'], input_text),
+        Column('>joint from', 'low', form=joint_text),
+        Column('>to', 'high', form=joint_text),
+        Column('', 'rises', form=lambda rises, _: 'rises' if rises else 'falls'),
+        Column('limits of', 'limited_by', form=_join),
+    )
+    rows = [
+        {**one} | {end: (one[end], one['unit']) for end in ('low', 'high')}
+        | {'limited_by': sorted({name for name in one['limited_by'] if name})}
+        for one in account['branches']
+    ]  # fmt: skip
+    title = 'Branches: between their ends a joint moves one way'
+    return table_of_rows(title, 'branches', columns, rows)
+
+
+def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     blocks, inputs = account['slot_blocks'], account['inputs']
     beside = f' and {blocks} block(s) in slots' if blocks else ''
     yield 'moving links', f'{account["moving_links"]}{beside}'
@@ -477,29 +472,30 @@ def _linkage_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tu
     yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
     for given in inputs:
         driven = (
-            f'slide of {given["slider"]} [m]'
+            f'slide of {given["slider"]} [{units.length}]'
             if given['slider']
             else f'angle of {given["child"]} to {given["parent"]}'
         )
         yield 'input', f'{given["joint"]}: {driven}'
     for limits in account['limits']:
-        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, angles)}'
-    yield from _reach_facts(account, angles)
+        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
+    yield from _reach_facts(account, units)
     worst = account['worst_residual']
     if worst is None:
         yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
         return
     place = ', '.join(
-        angles.value_text(value, given['unit'] == 'rad')
+        units.value_text(value, given['unit'] == 'rad')
         for value, given in zip(worst['inputs'], inputs, strict=True)
     )
+    residual = units.format_length(worst['residual_m'], '.1e')
     yield (
         'worst residual',
-        f'{worst["residual_m"]:.1e} m, of {worst["positions"]} positions, at {place}',
+        f'{residual}, of {worst["positions"]} positions, at {place}',
     )
 
 
-def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tuple[str, str]]:
+def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     if account['ranges'] is None:
         yield 'range', 'not a single one: it depends on every input'
         if account['unwrapped']:
@@ -512,7 +508,7 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
             each = '; each turn has different poses' if turning and not interval['turns'] else ''
             followed = any(interval['limited']) or not each
             ends = '' if followed else ', and was not followed farther'
-            yield 'range', f'{_range_text(interval, turning, angles)}{each}{ends}'
+            yield 'range', f'{_range_text(interval, turning, units)}{each}{ends}'
         elif turns > 1:
             count = 'two' if turns == 2 else str(turns)
             yield 'range', f'every angle; the motion repeats after {count} turns'
@@ -525,7 +521,7 @@ def _reach_facts(account: Mapping[str, Any], angles: AngleUnit) -> Iterator[tupl
             if one['status'] == status.value
         )
         places = [
-            angles.value_text(value, turning) + (' beyond the limits' if beyond else '')
+            units.value_text(value, turning) + (' beyond the limits' if beyond else '')
             for beyond, value in found
         ]
         if places or status is not Status.INDETERMINATE:
@@ -541,11 +537,11 @@ def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: 
     return 0.0 if abs(value) < _SAME else value
 
 
-def _limits_text(limits: Mapping[str, Any], angles: AngleUnit) -> str:
+def _limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
     turning = limits['unit'] == 'rad'
     texts = []
     low, high = (
-        '' if limits[end] is None else angles.value_text(limits[end], turning)
+        '' if limits[end] is None else units.value_text(limits[end], turning)
         for end in ('low', 'high')
     )
     if low or high:
@@ -553,16 +549,17 @@ def _limits_text(limits: Mapping[str, Any], angles: AngleUnit) -> str:
             f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
         )
     if limits['velocity'] is not None:
-        velocity = angles.convert(limits['velocity']) if turning else limits['velocity']
-        texts.append(f'at most {velocity:.6g} {angles.name if turning else "m"}/s')
+        rate = f'{limits["unit"]}/s'
+        velocity = units.convert(limits['velocity'], rate)
+        texts.append(f'at most {velocity:.6g} {units.name_unit(rate)}')
     if limits['effort'] is not None:
         texts.append(f'at most {limits["effort"]:.6g} {"N·m" if turning else "N"}')
     return ', '.join(texts)
 
 
-def _range_text(interval: Mapping[str, Any], turning: bool, angles: AngleUnit) -> str:
+def _range_text(interval: Mapping[str, Any], turning: bool, units: DisplayUnits) -> str:
     """Return a range; if limits end it, with their names."""
-    low, high = (angles.value_text(interval[end], turning) for end in ('low', 'high'))
+    low, high = (units.value_text(interval[end], turning) for end in ('low', 'high'))
     if interval['limited_by'] == [None, None]:
         return f'{low} to {high}'
     ends = [
@@ -574,26 +571,34 @@ def _range_text(interval: Mapping[str, Any], turning: bool, angles: AngleUnit) -
     return f'{ends[0]}, and on' if interval['limited'][0] else f'up to {ends[1]}'
 
 
-def _assemblies_table(group: Mapping[str, Any]) -> TerminalTable:
+def _assemblies_table(
+    group: Mapping[str, Any], input_units: Sequence[str], units: DisplayUnits
+) -> Table:
     """Return the other assemblies of a group, each as a pose to paste into the file."""
-    inputs = ', '.join(f'{value + 0.0:.9g}' for value in group['inputs'])
+    inputs = ', '.join(
+        f'{units.file.to_file_unit(value, unit) + 0.0:.9g}'
+        for value, unit in zip(group['inputs'], input_units, strict=True)
+    )
     rows = [
         (
-            f'{{inputs: [{inputs}], points: {{{_points_text(one["points_m"])}}}}}',
+            f'{{inputs: [{inputs}], points: {{{_points_text(one["points_m"], units)}}}}}',
             _turns_text(one['turns']),
         )
         for one in group['assemblies']
     ]
-    return TerminalTable(
+    return Table(
         f'Other assemblies of group {group["group"]} at the inputs of the pose: '
         f'{len(rows)} found from {group["starts"]} starts',
-        ('pose', "on the pose's branch") if rows else ('',),
+        (Column('pose', 'pose'), Column("on the pose's branch", 'turns')) if rows else ('',),
         rows or [('none',)],
+        'other_assemblies' if rows else '',
     )
 
 
-def _points_text(points: Mapping[str, Sequence[float]]) -> str:
-    return ', '.join(f'{name}: [{x:.7g}, {y:.7g}]' for name, (x, y) in points.items())
+def _points_text(points: Mapping[str, Sequence[float]], units: DisplayUnits) -> str:
+    return ', '.join(
+        f'{name}: [{_lengths_text(place, units, ".7g")}]' for name, place in points.items()
+    )
 
 
 def _turns_text(turns: int) -> str:
@@ -602,11 +607,12 @@ def _turns_text(turns: int) -> str:
     return f'{abs(turns)} turn{"s" if abs(turns) > 1 else ""} {"on" if turns > 0 else "back"}'
 
 
-def _inputs_text(inputs: Sequence[float], turning: bool, angles: AngleUnit) -> str:
+def _inputs_text(inputs: Sequence[float], turning: bool, units: DisplayUnits) -> str:
     if not inputs:
         return 'everywhere'
     places = [
-        angles.format_angle(at, 2) if turning else f'{at + 0.0:.6g} m' for at in inputs[:_PLACES]
+        units.format_angle(at, 2) if turning else units.format_length(at)
+        for at in inputs[:_PLACES]
     ]
     more = len(inputs) - _PLACES
     return ', '.join(places) + (f' and {more} more' if more > 0 else '')

@@ -28,7 +28,8 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.cli.gallery import first_sentence
 from linkage_ros.cli.run import add_run_arguments, run_scene
-from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.cli.table import Table
+from linkage_ros.cli.terminal import print_tables
 from linkage_ros.description import load_scene, Scene, SceneLinkage
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.node import stay_on_this_machine
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
     if arguments.list:
         rows = [_scene_row(shipped_path(f'scenes/{name}.yaml')) for name in scene_names()]
-        print_tables(TerminalTable('', ('scene', 'drive', 'recorded', ''), rows))
+        print_tables(Table('', ('scene', 'drive', 'recorded', ''), rows))
         return 0
     name, names = arguments.name, scene_names()
     if name not in names:

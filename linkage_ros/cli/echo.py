@@ -16,7 +16,8 @@ and radians. Exit code 1: no message came, or fewer than --count.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from math import inf, isfinite
 import sys
@@ -27,12 +28,13 @@ from typing import Any
 from linkage_ros.cli.arguments import bounded_number
 from linkage_ros.errors import did_you_mean, escape_unprintable, LinkageError, list_names, shorten
 from linkage_ros.messages import EFFORT, JOINT_STATE_TYPE, POSITION, RATE, UNITS
-from linkage_ros.node import player_node
+from linkage_ros.node import leave_out_shared_memory
 from linkage_ros.replay import message_type
-from linkage_ros.signals import heed_signals
+from linkage_ros.signals import bounded_end, heed_signals
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 import yaml
 
 EXAMPLE = 'linkage echo /joint_states --count 3'
@@ -96,13 +98,32 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     end = monotonic() + arguments.seconds
     timeout = arguments.timeout or (_TIMEOUT if isfinite(arguments.count) else inf)
     seen = 0
-    with heed_signals(), player_node([], 'linkage_echo') as node:
+    with heed_signals(), _listening_node() as node:
         silence = _SilenceTimer(node, topic, timeout)
         kind = _await_type(node, topic, silence, end, stop)
         if kind is not None:
             seen = _receive_messages(node, topic, kind, arguments, silence, end, stop)
     missing = not seen or (isfinite(arguments.count) and seen < arguments.count)
     return int(missing and not stop.is_set())
+
+
+@contextmanager
+def _listening_node() -> Iterator[Node]:
+    """Create a node within a context; LinkageError if it cannot be."""
+    leave_out_shared_memory()
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = Node('linkage_echo', start_parameter_services=False)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
+        rclpy.try_shutdown()
+        reason = ' '.join(str(error).strip().splitlines()[:1]) or type(error).__name__
+        raise LinkageError('ROS', reason, 'see ROS_DOMAIN_ID and RMW_IMPLEMENTATION') from None
+    try:
+        yield node
+    finally:
+        with bounded_end():
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 class _SilenceTimer:

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Write the joints of a bag to a CSV or Parquet file, a row for each tick.
+Write the joints of a bag to a CSV, xlsx or Parquet file, a row for each tick.
 
 A row has the joint states and, where they were recorded, the accelerations of ~/motion and the
 forces of ~/pin_forces. The crank's samples have other times: --topic writes them to a separate

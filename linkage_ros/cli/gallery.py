@@ -20,9 +20,10 @@ from pathlib import Path
 import re
 from threading import Event
 
-from linkage_ros.cli.arguments import add_output, LINKAGES
-from linkage_ros.cli.terminal import print_tables, TerminalTable
-from linkage_ros.description import atomic_write
+from linkage_ros.cli.arguments import add_output, LINKAGES, RESULTS
+from linkage_ros.cli.result import add_result, Result, show_result, tables_json
+from linkage_ros.cli.table import Column, Table
+from linkage_ros.description import atomic_write, check_output_name
 from linkage_ros.errors import FileError
 from linkage_ros.resources import linkage_names, named_file, scene_names, shipped_path
 
@@ -44,16 +45,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='the scene, where a linkage and a scene have the same name',
     )
-    add_output(parser, LINKAGES, 'the file is printed')
+    add_result(parser, output=False)
+    add_output(parser, (*LINKAGES, *RESULTS), 'the file, or the list, is printed')
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """List, print or copy."""
     if arguments.name is None:
-        if arguments.output is not None:
+        if arguments.output is not None and arguments.output.suffix.lower() in LINKAGES:
             raise FileError('-o', '', 'needs a NAME', 'name what to copy')
-        print_tables(*(_gallery_table(folder) for folder in _FOLDERS))
+        tables = [_gallery_table(folder) for folder in _FOLDERS]
+        show_result(Result(tables_json(tables), tables), arguments)
         return 0
+    if arguments.output is not None:
+        check_output_name(arguments.output, LINKAGES)
     file = _shipped_file(arguments.name, ('scenes',) if arguments.scene else _FOLDERS)
     if arguments.output is None:
         print(file.read_text('utf-8'), end='')
@@ -64,10 +69,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _gallery_table(folder: str) -> TerminalTable:
+def _gallery_table(folder: str) -> Table:
     names = {'linkages': linkage_names, 'scenes': scene_names}[folder]()
     rows = [(name, first_sentence(shipped_path(f'{folder}/{name}.yaml'))) for name in names]
-    return TerminalTable('', (folder, ''), rows)
+    return Table('', (Column(folder, 'name'), Column('', 'description')), rows, folder)
 
 
 def _shipped_file(name: str, folders: tuple[str, ...]) -> Path:

@@ -18,13 +18,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-import json
 import sys
 from threading import Event
 from typing import Any
 
 from linkage_ros.bag import Bag, contents_of, layout_of
-from linkage_ros.cli.arguments import add_bag, add_radians, AngleUnit, wrap_angle
+from linkage_ros.cli.arguments import add_bag, add_radians, DEGREES, DisplayUnits, wrap_angle
 from linkage_ros.cli.bag_reading import (
     add_trust,
     bag_json,
@@ -34,12 +33,22 @@ from linkage_ros.cli.bag_reading import (
     scene_of,
     worst_account,
 )
-from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
+from linkage_ros.cli.result import add_result, Result, show_result
+from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
+from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description import Scene
 from linkage_ros.errors import escape_unprintable, LinkageError
 from linkage_ros.replay import examine_states
 from linkage_ros.signals import heed_signals
 
 _MIB = 2**20
+
+_TOPIC = (
+    Column('topic', 'name'),
+    Column('type', 'type'),
+    Column('>messages', 'messages'),
+    Column('>rate [Hz]', 'rate_hz', form='.6g'),
+)
 
 EXAMPLE = 'linkage info my_bag'
 
@@ -47,7 +56,7 @@ EXAMPLE = 'linkage info my_bag'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_bag(parser)
-    parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_result(parser)
     add_radians(parser)
     add_trust(parser)
 
@@ -56,19 +65,19 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Describe the bag; return 1 if stopped."""
     bag = open_bag(arguments.bag, stop)
     with heed_signals():  # a signal ends the reading; the part read so far is still shown
-        account = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
-    if arguments.json:
-        print(json.dumps(account, indent=1, allow_nan=False))
-    else:
-        print_tables(*bag_tables(account, arguments.angles))
+        account, scene = describe_bag(bag, stop, trust_effects=arguments.trust_effects)
+    result = Result(account, [*bag_tables(account, arguments.angles, scene)])
+    show_result(result, arguments, arguments.angles)
     if account['stopped']:
         print('linkage info: stopped; not all of the bag was read', file=sys.stderr)
     return int(account['stopped'])
 
 
-def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
+def describe_bag(
+    bag: Bag, stop: Event, *, trust_effects: bool = False
+) -> tuple[dict[str, Any], Scene | None]:
     """
-    Return the description of a bag, as JSON holds it.
+    Return the description of a bag, as JSON holds it, and its scene.
 
     A BagError is raised if a file of the bag cannot be read.
     """
@@ -78,6 +87,7 @@ def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[
         contents = contents_of(bag, lambda read: advance(read // _MIB, size), stop.is_set)
     account = bag_json(bag, layouts, contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
+    scene = None
     try:
         scene = scene_of(bag, trust_effects=trust_effects)
         account['scene'] = scene_json(scene)
@@ -88,39 +98,36 @@ def describe_bag(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[
             )
     except LinkageError as error:
         account['scene_missing'] = f'{error.where}: {error.reason}'
-        return account
+        return account, scene
     account['replay'] = replay_account(examined)
     account['stopped'] |= examined.stopped
     for linkage, worst in zip(account['scene']['linkages'], examined.linkages, strict=True):
         linkage.update(worst_account(worst))
-    return account
+    return account, scene
 
 
-def bag_tables(account: dict[str, Any], angles: AngleUnit) -> Iterator[TerminalTable]:
-    """Yield the description of a bag as tables."""
+def bag_tables(
+    account: dict[str, Any], units: DisplayUnits = DEGREES, scene: Scene | None = None
+) -> Iterator[Table]:
+    """Yield the description of a bag as tables, with the lengths of its scene's linkages."""
     yield _facts_table(account['bag'], _bag_facts(account))
-    words = [
-        word
+    counters = [
+        Column('>discarded' if word == 'let_go' else f'>{word}', word, form=_count_text)
         for word in ('received', 'dropped', 'let_go')
         if word == 'dropped' or _sum_counters(account, word)
     ]
-    counted = ['>discarded' if word == 'let_go' else f'>{word}' for word in words]
-    heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
-    rows = [
-        (
-            escape_unprintable(topic['name']),
-            escape_unprintable(topic['type']),
-            str(topic['messages']),
-            '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
-            *('?' if topic[word] is None else str(topic[word]) for word in words),
-            _qos_text(topic),
-        )
-        for topic in account['topics']
-    ]
-    yield TerminalTable('Topics', heads, rows)
-    for linkage in (account['scene'] or {'linkages': []})['linkages']:
+    columns = (*_TOPIC, *counters, Column('QoS', 'qos'))
+    rows = ({**topic, 'qos': _qos_text(topic)} for topic in account['topics'])
+    yield table_of_rows('Topics', 'topics', columns, rows)
+    files = [each.linkage_content.units for each in scene.linkages] if scene else []
+    for index, linkage in enumerate((account['scene'] or {'linkages': []})['linkages']):
+        units = units.of_file(files[index]) if files else units
         title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
-        yield _facts_table(title, _linkage_rows(linkage, account['begin_ns'], angles))
+        yield _facts_table(title, _linkage_rows(linkage, account['begin_ns'], units))
+
+
+def _count_text(count: int | None, _units: DisplayUnits) -> str:
+    return '?' if count is None else str(count)
 
 
 def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -173,10 +180,10 @@ def _sum_counters(account: dict[str, Any], word: str) -> int | None:
 
 
 def _linkage_rows(
-    linkage: dict[str, Any], begin: int | None, angles: AngleUnit
+    linkage: dict[str, Any], begin: int | None, units: DisplayUnits
 ) -> Iterator[tuple[str, str]]:
     bars = [
-        f'{bar["kind"]} ({", ".join(f"{length:g}" for length in bar["lengths_m"])} m)'
+        f'{bar["kind"]} ({_lengths_text(bar["lengths_m"], units)})'
         for bar in linkage.get('four_bars', ())
     ]
     yield 'links', '; '.join([str(linkage['links']), *bars])
@@ -192,32 +199,35 @@ def _linkage_rows(
     yield 'states', f'{linkage["states"]} closed{toggles}{limited}'
     worst, near = linkage['worst_residual'], linkage['nearest_to_toggle']
     if worst:
-        yield (
-            'worst residual',
-            f'{worst["residual_m"]:.1e} m, {_event_text(worst, inputs, begin, angles)}',
-        )
+        residual = units.format_length(worst['residual_m'], '.1e')
+        yield 'worst residual', f'{residual}, {_event_text(worst, inputs, begin, units)}'
     if near:
         distance = near['input_to_toggle']
-        away = '' if distance is None else f', {_input_text(distance, inputs[0], angles)} from one'
-        angle = f'transmission angle {angles.format_angle(near["transmission_angle_rad"])}'
+        away = '' if distance is None else f', {_input_text(distance, inputs[0], units)} from one'
+        angle = f'transmission angle {units.format_angle(near["transmission_angle_rad"])}'
         nearness = f'conditioning {near["conditioning"]:.4g}, {angle}{away}'
-        yield 'nearest toggle', f'{nearness}, {_event_text(near, inputs, begin, angles)}'
+        yield 'nearest toggle', f'{nearness}, {_event_text(near, inputs, begin, units)}'
+
+
+def _lengths_text(lengths: list[float], units: DisplayUnits) -> str:
+    texts = (f'{units.convert(length, "m"):g}' for length in lengths)
+    return f'{", ".join(texts)} {units.length}'
 
 
 def _event_text(
-    found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, angles: AngleUnit
+    found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None, units: DisplayUnits
 ) -> str:
     """Return the time and place of an event."""
     values = ', '.join(
-        f'{given["joint"]} {_input_text(value, given, angles)}'
+        f'{given["joint"]} {_input_text(value, given, units)}'
         for given, value in zip(inputs, found['inputs'], strict=True)
     )
     return f'at {(found["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
 
 
-def _input_text(value: float, given: dict[str, str], angles: AngleUnit) -> str:
+def _input_text(value: float, given: dict[str, str], units: DisplayUnits) -> str:
     turning = given['unit'] == 'rad'
-    return angles.value_text(wrap_angle(value) if turning else value, turning)
+    return units.value_text(wrap_angle(value) if turning else value, turning)
 
 
 def _compression_text(found: dict[str, Any]) -> str:
@@ -250,9 +260,6 @@ def _qos_text(topic: dict[str, Any]) -> str:
     return escape_unprintable(topic['reliability']).replace('_', ' ') + latched
 
 
-def _facts_table(title: str, facts: Iterator[tuple[str, str]]) -> TerminalTable:
-    return TerminalTable(
-        escape_unprintable(title),
-        ('', ''),
-        [(name, escape_unprintable(value)) for name, value in facts],
-    )
+def _facts_table(title: str, facts: Iterator[tuple[str, str]]) -> Table:
+    texts = ((name, escape_unprintable(value)) for name, value in facts)
+    return facts_table(escape_unprintable(title), texts)

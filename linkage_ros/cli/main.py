@@ -44,7 +44,6 @@ COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene and its crank, on a separate ROS graph',
     'simulate': 'run a scene as fast as possible, without ROS, to a bag, CSV or Parquet',
-    'play': 'publish a bag on the graph, at its own pace or another',
     'echo': 'print the messages of a topic as YAML, or their rate',
     'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
     'plot': 'draw the joints of a bag over the angle of its crank',

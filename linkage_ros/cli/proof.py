@@ -49,7 +49,7 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
         done += 1
         if done % _TOLD == 0:
             advance(done, max(done, ticks))
-        for closure, seen in zip(closures, replayed.tick.full_states, strict=True):
+        for closure, seen in zip(closures, replayed.tick.states, strict=True):
             if seen.position is not None and seen.position.joints:
                 worst = max(worst, closure.residual(seen.position))
 

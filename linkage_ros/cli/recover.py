@@ -11,13 +11,17 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 import sys
 from threading import Event
+from typing import Any
 
 from linkage_ros.bag import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
-from linkage_ros.cli.terminal import print_tables, show_progress, TerminalTable
+from linkage_ros.cli.result import add_result, Result, show_result
+from linkage_ros.cli.table import Column, Table, table_of_rows
+from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import remove_bag
 from linkage_ros.errors import escape_unprintable
 from linkage_ros.signals import heed_signals
@@ -37,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o', '--output', type=Path, metavar='FOLDER', help='new folder; without it BAG_recovered'
     )
     add_force(parser)
+    add_result(parser, output=False)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -49,36 +54,51 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if recovery is None:
         print('stopped; nothing was written', file=sys.stderr)
         return STOPPED
-    _print_recovery(recovery)
+    _show_recovery(recovery, arguments)
     return WHOLE if recovery.is_whole else LOSS
 
 
-def _print_recovery(recovery: Recovery) -> None:
-    rows = []
-    for topic in recovery.topics:
-        promised = '?' if topic.expected is None else f'{topic.expected:,}'
-        rows.append((topic.name, f'{topic.saved:,}', promised))
-    if rows:
-        print_tables(TerminalTable('', ('topic', '>saved', '>of'), rows))
-    if recovery.attachments:
-        print(escape_unprintable(f'attachments  {", ".join(recovery.attachments)}'))
-    _print_lines('note', list(recovery.remarks))
-    _print_lines('repaired', list(recovery.repaired))
+_TOPIC = (
+    Column('topic', 'name'),
+    Column('>saved', 'saved', form=','),
+    Column('>of', 'expected', form=lambda count, _: '?' if count is None else f'{count:,}'),
+)
+
+
+def _show_recovery(recovery: Recovery, arguments: argparse.Namespace) -> None:
     lost = []
     for file, (start, end, reason) in recovery.losses:
         size = f', {end - start:,} bytes' if end > start else ''
         lost.append(f'{file} at byte {start:,}{size}: {reason}')
     if recovery.missing_count:
         lost.append(f'{recovery.missing_count:,} messages that the bag promises')
-    _print_lines('LOST', lost)
-    if recovery.is_whole:
-        print('nothing lost')
-    print(f'bag          {recovery.folder}')
+    account = {
+        'bag': str(recovery.folder),
+        'whole': recovery.is_whole,
+        'topics': [
+            {'name': topic.name, 'saved': topic.saved, 'expected': topic.expected}
+            for topic in recovery.topics
+        ],
+        'attachments': list(recovery.attachments),
+        'notes': list(recovery.remarks),
+        'repaired': list(recovery.repaired),
+        'lost': lost,
+    }
+    show_result(Result(account, [*_recovery_parts(account)]), arguments)
 
 
-def _print_lines(word: str, lines: list[str]) -> None:
-    for line in lines[:_MOST_SHOWN]:
-        # A name in a damaged file may contain line breaks; one loss stays one line.
-        print(f'{word:<13}{escape_unprintable(line)}')
-    if len(lines) > _MOST_SHOWN:
-        print(f'{word:<13}and {len(lines) - _MOST_SHOWN:,} more')
+def _recovery_parts(account: dict[str, Any]) -> Iterator[Table | str]:
+    if account['topics']:
+        yield table_of_rows('', 'topics', _TOPIC, account['topics'])
+    lines = []
+    if account['attachments']:
+        lines.append(f'attachments  {", ".join(account["attachments"])}')
+    for word, said in (('note', 'notes'), ('repaired', 'repaired'), ('LOST', 'lost')):
+        told = account[said]
+        lines += [f'{word:<13}{line}' for line in told[:_MOST_SHOWN]]
+        if len(told) > _MOST_SHOWN:
+            lines.append(f'{word:<13}and {len(told) - _MOST_SHOWN:,} more')
+    if account['whole']:
+        lines.append('nothing lost')
+    # A name in a damaged file may contain line breaks; one loss stays one line.
+    yield from map(escape_unprintable, [*lines, f'bag          {account["bag"]}'])

@@ -25,14 +25,22 @@ import argparse
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-import json
 from pathlib import Path
 import sys
 from threading import Event
 from typing import Any
 
 from linkage_ros.bag import Bag, read_run_metadata, recorded_events, RUN_FILE, RunMetadata
-from linkage_ros.cli.arguments import add_bag, add_force, add_set, finite_or_none, SCENE_HELP
+from linkage_ros.cli.arguments import (
+    add_bag,
+    add_force,
+    add_set,
+    DEGREES,
+    DisplayUnits,
+    finite_or_none,
+    RESULTS,
+    SCENE_HELP,
+)
 from linkage_ros.cli.bag_reading import (
     add_trust,
     BagReading,
@@ -42,7 +50,8 @@ from linkage_ros.cli.bag_reading import (
     unfinished_text,
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource, TopicNames
-from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.cli.result import add_result, Result, show_result
+from linkage_ros.cli.table import Column, Table, table_of_rows
 from linkage_ros.description import load_scene, remove_bag, Scene
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, UNITS
@@ -226,49 +235,59 @@ def first_text(first: Mapping[str, Any], begin: int) -> str:
     )
 
 
-def topics_table(account: Mapping[str, Any]) -> TerminalTable:
-    """Return the table of topics."""
-    heads = ['topic', '>recorded', '>same bytes', '>different', '>not made now', '>not recorded']
-    keys = ['recorded', 'same', 'different', 'not_made_now', 'not_recorded']
-    if any(topic['same_but_for_turns'] for topic in account['topics']):
-        heads.insert(3, '>but for turns')
-        keys.insert(2, 'same_but_for_turns')
-    rows = [
-        (escape_unprintable(topic['name']), *(str(topic[key]) for key in keys))
-        for topic in account['topics']
-    ]
-    return TerminalTable('', heads, rows)
+_TOPIC = (
+    Column('topic', 'name'),
+    Column('>recorded', 'recorded'),
+    Column('>same bytes', 'same'),
+    Column('>but for turns', 'same_but_for_turns'),
+    Column('>different', 'different'),
+    Column('>not made now', 'not_made_now'),
+    Column('>not recorded', 'not_recorded'),
+)
 
 
-def greatest_table(account: Mapping[str, Any], begin: int) -> TerminalTable:
-    """Return the table of greatest differences."""
-    rows = [
-        (
-            f'{row["quantity"]} [{row["unit"]}]',
-            _number_text(row['difference']),
-            _place_text(row['difference_at'], begin) if 'difference_at' in row else '',
-            str(row['ulp']),
-            _place_text(row['ulp_at'], begin) if 'ulp_at' in row else '',
-        )
-        for row in account['greatest']
-    ]
-    return TerminalTable('Greatest differences', ('', '>apart', 'where', '>ulp', 'where'), rows)
+def _topics_table(account: Mapping[str, Any]) -> Table:
+    turned = any(topic['same_but_for_turns'] for topic in account['topics'])
+    columns = [one for one in _TOPIC if turned or one.key != 'same_but_for_turns']
+    return table_of_rows('', 'topics', columns, account['topics'])
 
 
-def joints_table(account: Mapping[str, Any], begin: int) -> TerminalTable:
+def _number_text(value: float | None, _units: DisplayUnits = DEGREES) -> str:
+    return 'not a number' if value is None else f'{value:.3g}'
+
+
+def _greatest_table(account: Mapping[str, Any], begin: int) -> Table:
+    def place(where: Mapping[str, Any] | None, _units: DisplayUnits) -> str:
+        return f'{where["joint"]}, {_tick_text(where, begin)}' if where else ''
+
+    columns = (
+        Column('', 'quantity'),
+        Column('>apart', 'difference', form=_number_text),
+        Column('where', 'difference_at', form=place),
+        Column('>ulp', 'ulp'),
+        Column('where', 'ulp_at', form=place),
+    )
+    blank = {'difference_at': None, 'ulp_at': None}
+    rows = (blank | row | {'quantity': _quantity_text(row)} for row in account['greatest'])
+    return table_of_rows('Greatest differences', 'greatest', columns, rows)
+
+
+def joints_table(account: Mapping[str, Any], begin: int) -> Table:
     """Return the table of differences joint by joint."""
-    rows = [
-        (
-            escape_unprintable(row['joint']),
-            f'{row["quantity"]} [{row["unit"]}]',
-            str(row['compared']),
-            _number_text(row['rms']),
-            _number_text(row['greatest']),
-            _tick_text(row['greatest_at'], begin) if row['greatest_at'] else '',
-        )
-        for row in account['joints']
-    ]
-    return TerminalTable('', ('joint', '', '>compared', '>rms', '>greatest', 'where'), rows)
+    columns = (
+        Column('joint', 'joint'),
+        Column('', 'quantity'),
+        Column('>compared', 'compared'),
+        Column('>rms', 'rms', form=_number_text),
+        Column('>greatest', 'greatest', form=_number_text),
+        Column('where', 'greatest_at', form=lambda at, _: _tick_text(at, begin) if at else ''),
+    )
+    rows = ({**row, 'quantity': _quantity_text(row)} for row in account['joints'])
+    return table_of_rows('', 'joints', columns, rows)
+
+
+def _quantity_text(row: Mapping[str, Any]) -> str:
+    return f'{row["quantity"]} [{row["unit"]}]'
 
 
 def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
@@ -293,16 +312,8 @@ def _versions_text(said: Mapping[str, str]) -> str:
     return ', '.join(texts) or 'unknown versions'
 
 
-def _place_text(where: Mapping[str, Any], begin: int) -> str:
-    return f'{escape_unprintable(where["joint"])}, {_tick_text(where, begin)}'
-
-
 def _tick_text(where: Mapping[str, Any], begin: int) -> str:
     return f'tick {where["tick"]}, {(where["time_ns"] - begin) / 1e9:+.6f} s'
-
-
-def _number_text(value: float | None) -> str:
-    return 'not a number' if value is None else f'{value:.3g}'
 
 
 # Counterfactual replay: another scene runs over the samples of a bag.
@@ -415,7 +426,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--scene', metavar='SCENE', help=f'another scene to run: {SCENE_HELP}')
     add_set(parser)
     parser.add_argument(
-        '-o', '--output', type=Path, metavar='FOLDER', help='new bag; with --scene or --set'
+        '-o',
+        '--output',
+        type=Path,
+        metavar='FOLDER',
+        help='new bag, with --scene or --set; or the result, OUTPUT.csv, .xlsx, .parquet, .json '
+        'or .txt',
     )
     add_force(parser)
     parser.add_argument(
@@ -424,14 +440,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the samples' topic, with --scene or --set; absent, the run's own, /crank_states, or "
         'the only one that has the input joints',
     )
-    parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_result(parser, output=False)
     add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Replay the bag; return the exit code that the module docstring describes."""
     other = arguments.scene is not None or bool(arguments.set)
-    for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
+    new_bag = arguments.output
+    if new_bag is not None and new_bag.suffix.lower() in RESULTS:
+        new_bag = None
+    for option, value in (('-o', new_bag), ('--crank-topic', arguments.crank_topic)):
         if value is not None and not other:
             raise LinkageError(option, 'is for another scene', 'name it with --scene or --set')
     bag = open_bag(arguments.bag, stop)
@@ -449,16 +468,12 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             reading,
             scene,
             arguments.crank_topic,
-            arguments.output,
+            new_bag,
             force=arguments.force,
         )
         code = 0
-    if arguments.json:
-        print(json.dumps(account, indent=1, allow_nan=False))
-    elif not other:
-        _show_proof(account)
-    else:
-        _show_counterfactual(account)
+    parts = (_counterfactual_parts if other else _proof_parts)(account)
+    show_result(Result(account, [*parts]), arguments)
     for line in _find_shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
     if reading.missing:
@@ -503,7 +518,7 @@ def replay_report(bag: Bag, reading: BagReading, *, trust_effects: bool = False)
     return bag_account(bag, scene, reading, begin) | account
 
 
-def _show_proof(account: dict[str, Any]) -> None:
+def _proof_parts(account: dict[str, Any]) -> Iterator[Table | str]:
     begin = account['begin_ns'] or 0
     differ, ticks = account['different_ticks'], account['compared_ticks']
     verdict = account['verdict']
@@ -511,48 +526,43 @@ def _show_proof(account: dict[str, Any]) -> None:
         text = f'identical: all {ticks} ticks give the recorded bytes'
     else:
         text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
-    print(f'{account["bag"]}: {text}')
+    yield f'{account["bag"]}: {text}'
     if account['beginning_missing']:
-        print(account['beginning_missing'])
+        yield account['beginning_missing']
     for gap in account['gaps'] if differ else ():
-        print(escape_unprintable(gap))
+        yield escape_unprintable(gap)
     first = account['first_difference']
     if first and differ:
-        print(escape_unprintable(f'first: {first_text(first, begin)}'))
+        yield escape_unprintable(f'first: {first_text(first, begin)}')
         last = account['last_different_tick']['tick']
         if last < account['ticks'] and last != first['tick']:
-            print(f'from tick {last + 1} on all are the same')
+            yield f'from tick {last + 1} on all are the same'
     elif first:
-        print(escape_unprintable(f'undecided, first: {first_text(first, begin)}'))
+        yield escape_unprintable(f'undecided, first: {first_text(first, begin)}')
     if account['withheld_ticks']:
-        print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
-    for line in versions_text(account['versions']):
-        print(line)
-    print()
-    print_tables(topics_table(account))
+        yield f'{account["withheld_ticks"]} ticks are without a message, then and now'
+    yield from versions_text(account['versions'])
+    yield _topics_table(account)
     if account['greatest']:
-        print()
-        print_tables(greatest_table(account, begin))
+        yield _greatest_table(account, begin)
 
 
-def _show_counterfactual(account: dict[str, Any]) -> None:
-    print(
+def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
+    yield (
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
         f'from {escape_unprintable(account["crank_topic"])}'
     )
     for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
         if account[key] and account['topics']:
-            print(f'only {when}: {", ".join(account[key])}')
+            yield f'only {when}: {", ".join(account[key])}'
     if account['topics']:
-        print()
-        print_tables(topics_table(account))
+        yield _topics_table(account)
     if account['joints']:
-        print()
-        print_tables(joints_table(account, account['begin_ns'] or 0))
+        yield joints_table(account, account['begin_ns'] or 0)
     if account['new_bag']:
-        print()
+        yield ''
         counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
-        print(f'{account["new_bag"]}: {counts}')
+        yield f'{account["new_bag"]}: {counts}'
 
 
 def _find_shortcomings(account: dict[str, Any]) -> Iterator[str]:

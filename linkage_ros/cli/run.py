@@ -24,13 +24,14 @@ from linkage_ros.cli.arguments import (
     add_radians,
     add_ros_arguments,
     add_set,
-    AngleUnit,
     bounded_number,
+    DisplayUnits,
     SCENE_HELP,
 )
 from linkage_ros.cli.page_of_run import check_page, PageOfRun, view_command
 from linkage_ros.cli.proof import LONGEST_PROOF, proof_of
-from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.cli.table import Table
+from linkage_ros.cli.terminal import print_tables
 from linkage_ros.kinematics import Status
 from linkage_ros.node import LinkageNode, run_linkage_node
 from linkage_ros.replay import turning_joints
@@ -66,7 +67,7 @@ class Display:
     It may serve a page of the run.
     """
 
-    def __init__(self, *, plain: bool, angles: AngleUnit, page: bool = False) -> None:
+    def __init__(self, *, plain: bool, angles: DisplayUnits, page: bool = False) -> None:
         self._angles = angles
         self._with_page = page
         self._page: PageOfRun | None = None
@@ -123,15 +124,14 @@ class Display:
 
 
 def _current_state(
-    loop: TickLoop, turning: Mapping[str, bool], angles: AngleUnit
+    loop: TickLoop, turning: Mapping[str, bool], angles: DisplayUnits
 ) -> tuple[str, list[JointRow]]:
     """Return the input's age as text, and the inputs and joints to show."""
     tick = loop.counts.last_tick
     age = 'no crank'
     values: list[tuple[str, float, float | None]] = []
-    for linkage, (crank, position, _, reading) in zip(
-        loop.pipeline.linkages, tick.full_states if tick else (), strict=False
-    ):
+    for linkage, state in zip(loop.pipeline.linkages, tick.states if tick else (), strict=False):
+        crank, position, reading = state.crank, state.position, state.reading
         if crank is None or position is None:
             continue
         if not position.joints:
@@ -150,11 +150,13 @@ def _current_state(
 
 
 def _shown_joint(
-    name: str, value: float, rate: float | None, turning: bool, angles: AngleUnit
+    name: str, value: float, rate: float | None, turning: bool, angles: DisplayUnits
 ) -> JointRow:
     rate_text = ''
     if rate is not None:
-        rate_text = f'{angles.convert(rate):.4f} {angles.name}/s' if turning else f'{rate:.4f} m/s'
+        rate_text = (
+            f'{angles.convert(rate):.4f} {angles.angle}/s' if turning else f'{rate:.4f} m/s'
+        )
     return JointRow(name, angles.value_text(value, turning), rate_text)
 
 
@@ -184,11 +186,11 @@ def _status_table(loop: TickLoop, rate: float, age: str, joints: Sequence[JointR
 # The summary at the end of a run.
 
 
-def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
+def summary_table(node: LinkageNode, longest: float) -> Table:
     """Return the summary of a node's last run; the proof of its bag takes a time in [s]."""
     loop = node.loop
     if loop is None:
-        return TerminalTable('', ('',), [('nothing ran',)])
+        return Table('', ('',), [('nothing ran',)])
     counts = loop.counts
     per_second = counts.ticks / loop.run_seconds
     rows = [('ticks', f'{counts.ticks} in {loop.run_seconds:.2f} s, {per_second:.1f} a second')]
@@ -242,7 +244,7 @@ def summary_table(node: LinkageNode, longest: float) -> TerminalTable:
         ]
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
-    return TerminalTable('', ('', ''), rows)
+    return Table('', ('', ''), rows)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

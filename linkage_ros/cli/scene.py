@@ -18,7 +18,6 @@ import argparse
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
-import json
 from os.path import isfile
 from pathlib import Path
 import sys
@@ -26,7 +25,8 @@ from threading import Event
 from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
-from linkage_ros.cli.terminal import print_tables, TerminalTable
+from linkage_ros.cli.result import add_result, Result, show_result, tables_json
+from linkage_ros.cli.table import Column, facts_table, Table
 from linkage_ros.description import (
     as_text,
     declared_fields,
@@ -46,7 +46,6 @@ from linkage_ros.description import (
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS, effects_requiring, module_of
 from linkage_ros.stages.faults import FAULTS
@@ -69,11 +68,25 @@ REGISTRIES: Mapping[str, Mapping[str, Any]] = {
     'drive': DRIVES,
     'effect': EFFECTS,
     'fault': FAULTS,
-    'solver': SOLVERS,
 }
 """Everything that a scene can name, by kind."""
 
-_HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
+_STAGE = (
+    Column('>', 'number'),
+    Column('stage', 'name'),
+    'where',
+    Column('what it does', 'meaning'),
+    Column('in this scene', 'parameters'),
+    Column('', 'needed_by'),
+)
+_FAULT = ('name', 'kind', Column('in this scene', 'parameters'), 'injected')
+_TOPIC = (
+    Column('', 'what'),
+    Column('topic', 'name'),
+    Column('message', 'type'),
+    Column('', 'note'),
+)
+_PARAMETER = [Column(name, name) for name in ('parameter', 'unit', 'default', 'values', 'meaning')]
 
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 """Functions that make the JSON Schema of each kind of file."""
@@ -81,22 +94,18 @@ SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
 EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 
-def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[TerminalTable]:
+def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     """Yield the tables of a scene that has been built."""
-    yield TerminalTable(title, ('', ''), [*_scene_facts(scene), *_solver_facts(pipeline.linkages)])
+    yield facts_table(title, _scene_facts(scene))
     for lines in _group_alike(pipeline.linkages):
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
         )
-        heads = ('>', 'stage', 'where', 'what it does', 'in this scene', '')
-        yield TerminalTable(
-            f'Stages of {names}' if names else 'Stages', heads, list(_stage_rows(lines[0]))
-        )
+        title = f'Stages of {names}' if names else 'Stages'
+        yield Table(title, _STAGE, list(_stage_rows(lines[0])), 'stages')
     if scene.faults:
-        yield TerminalTable(
-            'Faults', ('name', 'kind', 'in this scene', 'injected'), list(_fault_rows(scene))
-        )
-    yield TerminalTable('Topics', ('', 'topic', 'message', ''), list(_topic_rows(scene, pipeline)))
+        yield Table('Faults', _FAULT, list(_fault_rows(scene)), 'faults')
+    yield Table('Topics', _TOPIC, list(_topic_rows(scene, pipeline)), 'topics')
 
 
 def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
@@ -113,24 +122,6 @@ def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
         f'{record.directory}/{record.name or f"{scene.name}, and the time"}' if record else 'no'
     )
     yield 'recorded', recorded
-
-
-def _solver_facts(linkages: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
-    """Yield the solvers that close the loops, if the scene names any."""
-    for line in linkages:
-        name = f'{line.scene_linkage.name}: ' if line.scene_linkage.name else ''
-        if line.solver_choice is not None:
-            yield (
-                'solver',
-                (
-                    f'{name}for an accuracy of {line.scene_linkage.accuracy:g}: '
-                    f'{line.solver_choice.why}'
-                ),
-            )
-        elif line.scene_linkage.solver is not None:
-            solver, parameters = line.scene_linkage.solver
-            text = _parameters_text(parameters)
-            yield 'solver', f'{name}{solver}{text and ", "}{text}'
 
 
 def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
@@ -231,9 +222,6 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
 
     account = scene_json(scene)
     for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
-        solver = line.scene_linkage.solver
-        linkage['solver'] = None if solver is None else _named_parameters(*solver)
-        linkage['accuracy'] = line.scene_linkage.accuracy
         linkage['stages'] = [
             {
                 **_named_parameters(stage.name, stage.parameters),
@@ -291,26 +279,24 @@ def _shorten_list(names: list[str]) -> str:
     return f'{", ".join(names[:_MOST_NAMES])}, … ({len(names)})'
 
 
-# Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds.
+# Drives, effects and faults as tables: parameters, units, defaults and bounds.
 
 
 def parameters_of(what: str, name: str) -> Any:
-    """Return the parameter type of a drive, effect, fault or solver."""
+    """Return the parameter type of a drive, effect or fault."""
     if what == 'fault':
         return FAULTS[name]
     module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
     return module.PARAMETERS
 
 
-def table_of(what: str, name: str) -> TerminalTable:
-    """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
+def table_of(what: str, name: str) -> Table:
+    """Return the table of a drive, effect or fault; ``what`` is a key of `REGISTRIES`."""
     parameters = parameters_of(what, name)
     title = f'{what} {name}: {first_docstring_line(parameters)}'
     rows = list(parameter_rows(parameters))
     return (
-        TerminalTable(title, _HEADS, rows)
-        if rows
-        else TerminalTable(title, ('',), [('no parameters',)])
+        Table(title, _PARAMETER, rows, name) if rows else Table(title, ('',), [('no parameters',)])
     )
 
 
@@ -322,27 +308,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--list',
         nargs='*',
         metavar='NAME',
-        help='drives, effects, faults and solvers: their parameters, units, defaults and bounds; '
+        help='drives, effects and faults: their parameters, units, defaults and bounds; '
         'all of them, or those named',
     )
     one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
-    parser.add_argument(
-        '--json', action='store_true', help='the description of the file as JSON, in SI units'
-    )
+    add_result(parser)
     add_set(parser)
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check a scene, list, or print a schema."""
-    if arguments.json and arguments.file is None:
-        raise LinkageError('--json', 'describes one file', 'name a scene or a linkage file')
     if arguments.schema:
         check_no_settings(arguments.set)
         print(as_text(SCHEMAS[arguments.schema]()), end='')
         return 0
     if arguments.file is None:
         check_no_settings(arguments.set)
-        print_tables(*(table_of(what, name) for what, name in _items_to_list(arguments.list)))
+        tables = [table_of(what, name) for what, name in _items_to_list(arguments.list)]
+        account = tables_json(table for table in tables if table.key)
+        show_result(Result(account, tables), arguments)
         return 0
     wrong = _find_violations(named_file(arguments.file, 'scenes', 'linkages'))
     for error in wrong:
@@ -353,11 +337,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     for note in scene_notes(scene):
         print(f'linkage scene: note: {note}', file=sys.stderr)
     pipeline = Pipeline(scene)
-    if arguments.json:
-        account = {'file': arguments.file, **built_scene_json(scene, pipeline)}
-        print(json.dumps(account, indent=1, allow_nan=False))
-    else:
-        print_tables(*scene_tables(scene, pipeline, arguments.file))
+    account = {'file': arguments.file}
+    if arguments.json or arguments.output is not None:
+        account |= built_scene_json(scene, pipeline)
+    show_result(Result(account, [*scene_tables(scene, pipeline, arguments.file)]), arguments)
     return 0
 
 
@@ -375,7 +358,7 @@ def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
             words = [word for _, word in known]
             raise LinkageError(
                 f'--list {name}',
-                'there is no such drive, effect, fault or solver',
+                'there is no such drive, effect or fault',
                 did_you_mean(name, words, f'known: {list_names(words)}'),
             )
         yield from found

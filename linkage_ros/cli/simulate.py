@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_read_output,
         required=True,
         metavar='FOLDER|OUTPUT',
-        help='folder of a new bag; or a table of the joints, OUTPUT.csv or OUTPUT.parquet; for a '
+        help='folder of a new bag; or a table of the joints, OUTPUT.csv, .xlsx or .parquet; for a '
         'study a table of its runs, or a picture of the spread, OUTPUT.png, .svg or .pdf',
     )
     add_force(parser)

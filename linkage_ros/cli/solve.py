@@ -10,17 +10,15 @@
 Solve a linkage at some inputs, over its range, or for a value of a dependent joint.
 
 Angles are in (-π, π] rad. They are typed, and shown in the table, in degrees unless --radians is
-given; CSV and JSON hold radians. Slides are in metres.
+given. Slides are typed and shown in the unit of lengths of the linkage file. A table in a file has
+the units of the linkage file; JSON has SI units.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-import csv
-import io
-import json
-from math import degrees, isfinite, nan, radians
+from math import isfinite, nan
 import sys
 from threading import Event
 from typing import Any, NamedTuple
@@ -28,43 +26,31 @@ from typing import Any, NamedTuple
 from linkage_ros.cli.arguments import (
     add_at,
     add_file,
-    add_output,
     add_radians,
-    AngleUnit,
     bounded_number,
-    fixed_text,
+    DisplayUnits,
     read_inputs,
     read_numbers,
     wrap_angle,
 )
-from linkage_ros.cli.terminal import print_tables, show_progress, table_text, TerminalTable
-from linkage_ros.description import atomic_write, load
+from linkage_ros.cli.result import add_result, Result, show_result
+from linkage_ros.cli.table import Column, Table
+from linkage_ros.cli.terminal import show_progress
+from linkage_ros.description import linkage_content, read_closure
 from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.kinematics import assur_groups, Closure, InputSweep, Iterated, traced_carriers
-from linkage_ros.names import csv_text
+from linkage_ros.resources import named_file
 
 _STEPS = 36
 _MOST = 1e300
 _DIGITS = 6
 _TOLD = 1000
 """States between two reports of the progress."""
-FORMATS = {'.csv': 'csv', '.json': 'json', '.txt': 'table'}
-"""Formats of a file, by its suffix."""
 
 _ORDERS = ('', ' rate', ' acceleration')
 _PER = ('', '/s', '/s²')
 
 EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
-
-
-class ResultColumn(NamedTuple):
-    """A column of the result: its joint or coordinate with the quantity; a text has no unit."""
-
-    name: str
-    unit: str
-
-    def __str__(self) -> str:
-        return f'{self.name} [{self.unit}]' if self.unit else self.name
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -119,53 +105,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--points', action='store_true', help='add the traced points, in the frame of the ground'
     )
-    parser.add_argument(
-        '--format',
-        choices=('table', 'csv', 'json'),
-        help='format of the printed result (default: table)',
-    )
-    add_output(parser, FORMATS, 'the result is printed')
+    add_result(parser)
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Solve the linkage."""
-    if arguments.format and arguments.output is not None:
-        raise LinkageError(
-            f'--format {arguments.format}',
-            'is for a printed result, and -o names a file',
-            'leave it out: the suffix of the file selects its format',
-        )
-    closure = load(arguments.file)
+    file = named_file(arguments.file, 'linkages')
+    content = linkage_content(file)
+    closure = read_closure(content, file.stem)
+    arguments.angles = arguments.angles.of_file(content.units)
     if arguments.joint:
         _check_alone(arguments)
         several = len(closure.input_names) > 1
         columns, rows = (_exchanged_table if several else _inverse_table)(closure, arguments)
     else:
         columns, rows = _forward_table(closure, arguments)
-    kind = arguments.format or 'table'
-    if arguments.output is not None:
-        kind = FORMATS[arguments.output.suffix.lower()]
-    if kind == 'table':
-        table = _states_table(columns, rows, arguments.angles)
-        if arguments.output is None:
-            print_tables(table)
-            return 0
-        answer = table_text(table) + '\n'
-    elif kind == 'csv':
-        answer = _format_csv(columns, rows)
-    else:
-        answer = _format_json(columns, rows)
-    if arguments.output is None:
-        sys.stdout.write(answer)
-        return 0
-    atomic_write(arguments.output, answer.encode())
-    print(arguments.output)
+    account = {
+        'units': {column.key: column.unit for column in columns if column.unit},
+        'states': [
+            {column.key: value for column, value in zip(columns, row, strict=True)} for row in rows
+        ],
+    }
+    show_result(Result(account, [Table('', columns, rows, 'states')]), arguments, arguments.angles)
     return 0
 
 
 def _forward_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[ResultColumn], list[list[Any]]]:
+) -> tuple[list[Column], list[list[Any]]]:
     question = _read_question(closure, arguments)
     rows = []
     with show_progress('states solved') as advance:
@@ -188,7 +155,7 @@ def _check_alone(arguments: argparse.Namespace) -> None:
 
 def _exchanged_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[ResultColumn], list[list[Any]]]:
+) -> tuple[list[Column], list[list[Any]]]:
     """Return the row of the state in which as many joints as inputs have the typed values."""
     names, typed = zip(*arguments.joint, strict=True)
     inverse = closure.driven_by(*names)
@@ -202,7 +169,7 @@ def _exchanged_table(
 
 def _inverse_table(
     closure: Closure, arguments: argparse.Namespace
-) -> tuple[list[ResultColumn], list[list[Any]]]:
+) -> tuple[list[Column], list[list[Any]]]:
     """Return a row for every input at which the joint has one of the typed values."""
     name = arguments.joint[0][0]
     columns, rows = [], []
@@ -213,7 +180,7 @@ def _inverse_table(
         if joint in closure.input_names:
             raise LinkageError(option, 'is an input', f'write --at {typed:g}')
         turning = closure.branches(joint)[0].turning
-        value = arguments.angles.to_radians(typed) if turning else typed
+        value = arguments.angles.to_si(typed, 'rad' if turning else 'm')
         cranks = closure.cranks(joint, value)
         if not cranks:
             raise _unreached_error(closure, joint, value, option, arguments.angles)
@@ -226,7 +193,7 @@ def _inverse_table(
             # The branch and its crank come first; the gap is 0.
             rows.append([number, crank, row[1], value, *row[4:]])
     own, status, _, crank_column, *others = columns
-    columns = [ResultColumn('branch', ''), crank_column, status, own, *others]
+    columns = [Column('branch', 'branch'), crank_column, status, own, *others]
     if own in others:  # A point's coordinate, of which --points shows all.
         del columns[3]
         for row in rows:
@@ -235,7 +202,7 @@ def _inverse_table(
 
 
 def _unreached_error(
-    closure: Closure, joint: str, value: float, option: str, angles: AngleUnit
+    closure: Closure, joint: str, value: float, option: str, angles: DisplayUnits
 ) -> LinkageError:
     """Return the error for a value of a joint that no input within the limits reaches."""
     free = closure.branches(joint, limited=False)
@@ -262,7 +229,9 @@ def _joint_value(text: str) -> tuple[str, float]:
     return name, number
 
 
-def _show_reach(closure: Closure, typed: Sequence[tuple[float, ...]], angles: AngleUnit) -> None:
+def _show_reach(
+    closure: Closure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
+) -> None:
     """Say once where the linkage closes, if it does not at an input that was typed."""
     for given in typed:
         ranges = () if closure.position(*given).joints else InputSweep(closure, given).ranges
@@ -293,16 +262,15 @@ def _read_question(
     asked: Sequence[tuple[float, ...]] = (),
 ) -> Question:
     linkage = closure.linkage
-    in_degrees = arguments.angles.in_degrees
 
     def read_typed(typed: Sequence[float] | None, option: str) -> tuple[float, ...] | None:
         if typed is None:
             return None
-        return read_inputs(linkage, typed, option, in_degrees=in_degrees)
+        return read_inputs(linkage, typed, option, arguments.angles)
 
     asked = [
         *asked,
-        *(read_inputs(linkage, at, '--at', in_degrees=in_degrees) for at in arguments.at),
+        *(read_inputs(linkage, at, '--at', arguments.angles) for at in arguments.at),
     ]
     swept = arguments.sweep or arguments.first is not None or arguments.last is not None
     if swept or not asked:
@@ -310,13 +278,12 @@ def _read_question(
             raise LinkageError(
                 '--sweep', f'there are {len(linkage.inputs)} inputs', 'name each state with --at'
             )
-        in_turns = in_degrees and not linkage.inputs[0].slider
         asked += _sweep_inputs(
             InputSweep(closure),
             arguments.first,
             arguments.last,
             arguments.steps,
-            in_degrees=in_turns,
+            arguments.angles,
         )
     acceleration = read_typed(arguments.acceleration, '--acceleration')
     rate = read_typed(arguments.rate, '--rate')
@@ -335,8 +302,7 @@ def _sweep_inputs(
     first: float | None,
     last: float | None,
     steps: int,
-    *,
-    in_degrees: bool,
+    units: DisplayUnits,
 ) -> Iterator[tuple[float, ...]]:
     """
     Yield inputs from end to end at equal steps; without ends, over every range.
@@ -349,12 +315,12 @@ def _sweep_inputs(
         reached = input_sweep.widest_range
         assert reached is not None, 'reading the file has proved that it closes somewhere'
         ranges = [reached]
-    show, read = (degrees, radians) if in_degrees else (float, float)
+    unit = 'rad' if input_sweep.turning else 'm'
     for interval in ranges:
-        low = show(interval.lowest) if first is None else first
-        high = show(interval.highest) if last is None else last
+        low = units.convert(interval.lowest, unit) if first is None else first
+        high = units.convert(interval.highest, unit) if last is None else last
         for i in range(steps + 1):
-            value = read(low + (high - low) * i / steps if i < steps else high)
+            value = units.to_si(low + (high - low) * i / steps if i < steps else high, unit)
             if i == 0 and first is None:
                 value = interval.lowest
             elif i == steps and last is None:
@@ -362,19 +328,23 @@ def _sweep_inputs(
             yield (value,)
 
 
-def _output_columns(closure: Closure, question: Question) -> Iterator[ResultColumn]:
+def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
     linkage = closure.linkage
     for given in linkage.inputs:
-        yield ResultColumn(given.joint, given.unit)
-    yield ResultColumn('status', '')
-    yield ResultColumn('gap', 'm')
+        yield _state_column(given.joint, given.unit)
+    yield Column('status', 'status')
+    yield Column('>gap', 'gap', 'm', '.3g')
     for order in _derivative_orders(question):
         for name, turning in zip(linkage.joints, closure.turning, strict=True):
             unit = 'rad' if turning else 'm'
-            yield ResultColumn(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
+            yield _state_column(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
         for point in question.points:
             for axis in 'xy':
-                yield ResultColumn(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
+                yield _state_column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
+
+
+def _state_column(name: str, unit: str) -> Column:
+    return Column(f'>{name}', name, unit, f'.{_DIGITS}f')
 
 
 def _derivative_orders(question: Question) -> range:
@@ -415,44 +385,3 @@ def _state_row(closure: Closure, question: Question, given: tuple[float, ...]) -
 
 def _to_xy(place: complex) -> tuple[float, float]:
     return place.real, place.imag
-
-
-def _states_table(
-    columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]], angles: AngleUnit
-) -> TerminalTable:
-    def cell_text(column: ResultColumn, value: Any) -> str:
-        if isinstance(value, str | int) or value is None:
-            return str(value or '')
-        if column.name == 'gap':
-            return f'{value:.3g}'
-        return fixed_text(
-            angles.convert(value) if column.unit.startswith('rad') else value, _DIGITS
-        )
-
-    shown = [column._replace(unit=column.unit.replace('rad', angles.name)) for column in columns]
-    return TerminalTable(
-        '',
-        [f'>{column}' if column.unit else str(column) for column in shown],
-        [[cell_text(*pair) for pair in zip(columns, row, strict=True)] for row in rows],
-    )
-
-
-def _format_csv(columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]]) -> str:
-    written = io.StringIO()
-    writer = csv.writer(written, lineterminator='\n')
-    writer.writerow(csv_text(str(column)) for column in columns)
-    writer.writerows(
-        [repr(value) if isinstance(value, float) else value for value in row] for row in rows
-    )
-    return written.getvalue()
-
-
-def _format_json(columns: Sequence[ResultColumn], rows: Sequence[Sequence[Any]]) -> str:
-    answer = {
-        'units': {column.name: column.unit for column in columns if column.unit},
-        'states': [
-            {column.name: value for column, value in zip(columns, row, strict=True)}
-            for row in rows
-        ],
-    }
-    return json.dumps(answer, indent=1, ensure_ascii=False, allow_nan=False) + '\n'

@@ -20,8 +20,9 @@ from shutil import get_terminal_size
 import sys
 from textwrap import fill
 from time import monotonic
-from typing import Any, NamedTuple, TextIO
+from typing import Any, TextIO
 
+from linkage_ros.cli.table import Table
 from linkage_ros.errors import escape_unprintable, shorten
 
 _LONGEST_CELL = 4000
@@ -39,19 +40,9 @@ FIRST_LINE, _EVERY = 2.0, 30.0
 """Seconds until the first line, and between two."""
 
 
-class TerminalTable(NamedTuple):
-    """A table."""
-
-    title: str  # '' for no title
-    # Headings; a leading ``>`` aligns to the right. If all are empty, none is written.
-    columns: Sequence[str]
-    # The cells, as text. A line break in a cell begins a new line within its row.
-    rows: Sequence[Sequence[str]]
-
-
-def print_tables(*tables: TerminalTable) -> None:
+def print_tables(*tables: Table) -> None:
     """
-    Print tables, with an empty line between two.
+    Print tables of texts, with an empty line between two.
 
     On a terminal they are folded to its width. Output into a file or a pipe has no frames, and a
     row is one line however long it is: ``grep`` and ``awk`` find whole rows.
@@ -68,16 +59,14 @@ def print_tables(*tables: TerminalTable) -> None:
         _print_table(table, width)
 
 
-def _clean_table(table: TerminalTable) -> TerminalTable:
+def _clean_table(table: Table) -> Table:
     rows = [
         [shorten(escape_unprintable(cell), _LONGEST_CELL) for cell in row] for row in table.rows
     ]
-    return TerminalTable(
-        escape_unprintable(table.title), list(map(escape_unprintable, table.columns)), rows
-    )
+    return Table(escape_unprintable(table.title), list(map(escape_unprintable, table.heads)), rows)
 
 
-def _print_table(table: TerminalTable, width: int) -> None:
+def _print_table(table: Table, width: int) -> None:
     # A word that is wider than the terminal is not broken; a frame would break it.
     if find_spec('rich') is not None and _framed_width(_column_widths(table)) <= width:
         from rich.console import Console
@@ -87,7 +76,7 @@ def _print_table(table: TerminalTable, width: int) -> None:
         print(table_text(table))
 
 
-def fold_table(table: TerminalTable, width: int) -> list[TerminalTable]:
+def fold_table(table: Table, width: int) -> list[Table]:
     """
     Return a table as tables that are at most ``width`` characters wide with their frames.
 
@@ -105,7 +94,7 @@ def fold_table(table: TerminalTable, width: int) -> list[TerminalTable]:
             block = [0]
             blocks.append(block)
         block.append(index)
-    tables: list[TerminalTable] = []
+    tables: list[Table] = []
     for block in blocks:
         most = max(_column_width(columns[i]) for i in block)
         while (
@@ -115,9 +104,9 @@ def fold_table(table: TerminalTable, width: int) -> list[TerminalTable]:
             most -= 1
         wrapped = [[_wrap_cell(cell, most) for cell in columns[i]] for i in block]
         heads, *rows = zip(*wrapped, strict=True)
-        marks = ('>' * table.columns[i].startswith('>') for i in block)
+        marks = ('>' * table.heads[i].startswith('>') for i in block)
         tables.append(
-            TerminalTable(
+            Table(
                 '' if tables else _wrap_cell(table.title, width),
                 [mark + head for mark, head in zip(marks, heads, strict=True)],
                 rows,
@@ -141,7 +130,7 @@ def _column_width(cells: Sequence[str], most: int = sys.maxsize) -> int:
     return max(most, *(len(word) for cell in cells for word in cell.split()))
 
 
-def _column_widths(table: TerminalTable) -> list[int]:
+def _column_widths(table: Table) -> list[int]:
     return [_column_width(cells) for cells in zip(_column_heads(table), *table.rows, strict=True)]
 
 
@@ -150,15 +139,15 @@ def _framed_width(widths: Sequence[int]) -> int:
     return sum(widths) + _BORDER * len(widths) + 1
 
 
-def _column_heads(table: TerminalTable) -> list[str]:
-    return [column.removeprefix('>') for column in table.columns]
+def _column_heads(table: Table) -> list[str]:
+    return [column.removeprefix('>') for column in table.heads]
 
 
-def table_text(table: TerminalTable) -> str:
+def table_text(table: Table) -> str:
     """Return a table as plain text."""
     heads = _column_heads(table)
     widths = _column_widths(table)
-    right = [column.startswith('>') for column in table.columns]
+    right = [column.startswith('>') for column in table.heads]
     lines = [
         '  '.join(
             cell.rjust(width) if align else cell.ljust(width)
@@ -170,7 +159,7 @@ def table_text(table: TerminalTable) -> str:
     return '\n'.join([table.title, *lines] if table.title else lines)
 
 
-def _rich_table(table: TerminalTable) -> object:
+def _rich_table(table: Table) -> object:
     from rich import box
     from rich.table import Table as Drawn
     from rich.text import Text
@@ -183,7 +172,7 @@ def _rich_table(table: TerminalTable) -> object:
         show_header=any(heads),
         box=box.ROUNDED if any(heads) else None,
     )
-    for head, column in zip(heads, table.columns, strict=True):
+    for head, column in zip(heads, table.heads, strict=True):
         right = column.startswith('>')
         drawn.add_column(Text(head), justify='right' if right else 'left', no_wrap=True)
     for row in table.rows:

@@ -105,9 +105,12 @@ from linkage_ros.description.section import Section as Section
 from linkage_ros.description.tables import (
     block_rows as block_rows,
     check_kind as check_kind,
+    csv_of as csv_of,
+    FileTable as FileTable,
     numbers_of as numbers_of,
     table_file as table_file,
     TABLE_KINDS as TABLE_KINDS,
+    write_tables as write_tables,
 )
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.violations import (

@@ -129,10 +129,6 @@ class SceneLinkage:
     # Sections for error messages: in the scene, and in the linkage file.
     content: Section = field(compare=False, repr=False)
     linkage_content: Section = field(compare=False, repr=False)
-    # Name and parameters of the solver; None for the closed form.
-    solver: tuple[str, Any] | None = None
-    # Required accuracy of positions, in [rad] or [m], for the cheapest solver; None without one.
-    accuracy: float | None = None
     # Whether nothing is published while a joint is beyond its limits.
     silent_beyond_limits: bool = False
     # User-defined effects that the scene names but that were not imported, so that the linkage

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, MISSING, replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from os import PathLike
 from os.path import isfile
@@ -39,7 +39,6 @@ from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STI
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS, in_order, module_of
 
@@ -55,9 +54,6 @@ LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 _MOST_LINKAGES = 400
 """A hundred linkages at 1 kHz fill a core."""
 
-FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
-"""Bounds of `accuracy`, in [rad] or [m]."""
-
 PUBLISHED_ANGLES = ('continuous', 'wrapped')
 """How angles are published; see `Scene.wrapped`."""
 
@@ -72,8 +68,6 @@ _LINKAGE_KEYS = (
     'drive',
     'effects',
     'loads',
-    'solver',
-    'accuracy',
     'beyond_limits',
 )
 """Keys of an entry of ``linkages``; the scene has them for the entries without."""
@@ -190,7 +184,6 @@ def parse_scene(
     where: str,
     files: Mapping[str, bytes],
     folder: str = '',
-    solvers: Mapping[str, Any] | None = None,
     seed: int | None = None,
     *,
     trust_effects: bool = False,
@@ -207,9 +200,6 @@ def parse_scene(
         Origin of the files, for error messages.
     files, folder
         As in `Scene`.
-    solvers
-        Chosen solver of each linkage whose scene asks for an accuracy, by name of the linkage, in
-        the form of a scene file.
     seed
         Seed if the scene names none; None to derive it from the name.
     trust_effects
@@ -235,18 +225,7 @@ def parse_scene(
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
     source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
-    scene = _build_scene(content, files[SCENE_FILE], source, settings)
-    if not solvers or any(setting.startswith('accuracy=') for setting in settings):
-        return scene
-    return replace(scene, linkages=tuple(_as_chosen(one, solvers) for one in scene.linkages))
-
-
-def _as_chosen(scene_linkage: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
-    """Return a linkage with its chosen solver, if there is one."""
-    if scene_linkage.accuracy is None or scene_linkage.name not in solvers:
-        return scene_linkage
-    where = Section(scene_linkage.content.file, '', {'solver': solvers[scene_linkage.name]})
-    return replace(scene_linkage, solver=_read_solver(where, {}), accuracy=None)
+    return _build_scene(content, files[SCENE_FILE], source, settings)
 
 
 def seed_of(name: str) -> int:
@@ -377,7 +356,6 @@ def _read_scene_linkage(
         linkage_content=linkage_content,
         silent_beyond_limits=_is_silent_beyond(section_with('beyond_limits'), linkage),
         not_imported=not_imported,
-        **_read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
     return scene_linkage
@@ -483,52 +461,6 @@ def _read_record(content: Section) -> RecordParameters:
             'name', f'{record.name!r} is not a plain name', 'leave out the folders'
         )
     return record
-
-
-def _read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
-    """Return the solver, or the required accuracy, as fields of `SceneLinkage`."""
-    # An entry of the linkage replaces both entries of the scene.
-    where = own if 'solver' in own or 'accuracy' in own else scene
-    if 'accuracy' not in where:
-        return {'solver': _read_solver(where, parts) if 'solver' in where else None}
-    if 'solver' in where:
-        raise where.error('accuracy', 'cannot be combined with solver', 'write one of the two')
-    bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
-    return {'accuracy': where.number('accuracy', unit='rad and m', **bounds)}
-
-
-def _read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
-    """Return a solver's name and parameters; the file may give the name alone."""
-    if isinstance(where.mapping['solver'], str):
-        return _name_and_value(where)
-    solvers = where.section('solver')
-    named = list(solvers)
-    if len(named) > 1:
-        raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
-    if not named or named[0] not in SOLVERS:
-        solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names no solver', f'write one of {list_names(SOLVERS)}')
-    (name,) = named
-    parameters = import_module(SOLVERS[name]).PARAMETERS
-    return name, read_parameters(solvers.section(name), parameters, parts)
-
-
-def _name_and_value(where: Section) -> tuple[str, Any]:
-    name = where.text('solver')
-    if name not in SOLVERS:
-        known = f'known: {list_names(SOLVERS)}'
-        raise where.error(
-            'solver', f'there is no {quote(name)}', did_you_mean(name, SOLVERS, known)
-        )
-    parameters = import_module(SOLVERS[name]).PARAMETERS
-    for entry, _ in declared_fields(parameters):
-        if entry.default is MISSING:
-            raise where.error(
-                'solver',
-                f'{name} has no {entry.name}',
-                f'write solver: {{{name}: {{{entry.name}: …}}}}',
-            )
-    return name, parameters()
 
 
 def _read_loads(content: Section, parts: Parts) -> Loads:

@@ -25,8 +25,6 @@ from typing import Any
 from linkage_ros.description.linkage_file import FARTHEST, HEAVIEST, STRONGEST
 from linkage_ros.description.parameters import (
     CHARACTER,
-    declared_fields,
-    is_required,
     mapping_schema,
     named_mapping,
     Number,
@@ -37,15 +35,12 @@ from linkage_ros.description.parameters import (
 )
 from linkage_ros.description.scene import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
 from linkage_ros.description.scene_file import (
-    COARSEST_ACCURACY,
-    FINEST_ACCURACY,
     HIGHEST_RATE,
     LOWEST_RATE,
     PUBLISHED_ANGLES,
 )
 from linkage_ros.description.units import ANGLES, LENGTHS
 from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, STIFFEST
-from linkage_ros.solvers import SOLVERS
 from linkage_ros.stages.drives import DRIVES
 from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.stages.faults import FAULTS
@@ -58,7 +53,6 @@ DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
 """Pattern of the name of a module within a package."""
 
 _RATE = 'ticks a second; 0: one for every crank sample'
-_ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
 _NO_PLAY_UNDER_TORQUE: Schema = {
     'if': {
         'required': ['drive'],
@@ -112,7 +106,7 @@ def _point_schema(description: str, unit: str, most: float) -> Schema:
 
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
-    """Return the parameter types of all drives, effects or solvers in a registry."""
+    """Return the parameter types of all drives or effects in a registry."""
     return {name: import_module(module).PARAMETERS for name, module in registry.items()}
 
 
@@ -162,7 +156,6 @@ def scene_schema() -> Schema:
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
         'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
-        **_ONE_SOLVER,
         '$defs': _of_a_linkage(),
     }
 
@@ -202,7 +195,7 @@ def _linkages_schema(own: Mapping[str, Schema]) -> Schema:
         },
         required=('name', 'linkage'),
     )
-    one |= _ONE_SOLVER | _NO_PLAY_UNDER_TORQUE
+    one |= _NO_PLAY_UNDER_TORQUE
     return {
         'description': 'Several linkages instead of one.',
         'if': {'type': 'array'},
@@ -245,13 +238,6 @@ def _of_a_linkage() -> dict[str, Schema]:
             'patternProperties': {DOTTED: _OWN_EFFECT},
             'default': {},
         },
-        'solver': _solver_schema(),
-        'accuracy': _number_schema(
-            'Required accuracy of positions: selects the cheapest solver proved to have it.',
-            'rad and m',
-            least=FINEST_ACCURACY,
-            most=COARSEST_ACCURACY,
-        ),
         'loads': mapping_schema(
             'The forces that act on the links, where effects or the drive ask for them.',
             {
@@ -271,27 +257,6 @@ def _of_a_linkage() -> dict[str, Schema]:
                 **parameters_schema(AppliedLoads)['properties'],
             },
         ),
-    }
-
-
-def _solver_schema() -> Schema:
-    solvers = parameter_types(SOLVERS)
-    alone = [
-        name
-        for name, of in solvers.items()
-        if not any(is_required(entry) for entry, _ in declared_fields(of))
-    ]
-    one = mapping_schema(
-        'How the loops are closed: one solver.',
-        {name: parameters_schema(of) for name, of in solvers.items()},
-    )
-    others = ', '.join(f'{{{name}: {{…}}}}' for name in solvers if name not in alone)
-    return {
-        'description': one['description'],
-        'if': {'type': 'string'},
-        'then': {'enum': alone, 'description': f'or with its parameters: {others}'},
-        'else': {**one, 'minProperties': 1, 'maxProperties': 1},
-        'default': 'closed_form',
     }
 
 

@@ -7,10 +7,10 @@
 # language governing permissions and limitations under the License.
 
 """
-Write tables of numbers to CSV and Parquet files, block by block.
+Write tables to CSV, Parquet and xlsx files, block by block.
 
-Numbers keep every bit: CSV has the shortest text that reads as the same number. A missing value is
-an empty cell, or null. A file appears as a whole.
+Numbers keep every bit: CSV and xlsx have the shortest text that reads as the same number. A
+missing value is an empty cell, or null. A file appears as a whole.
 """
 
 from __future__ import annotations
@@ -23,38 +23,90 @@ import io
 from math import isfinite
 import os
 from pathlib import Path
-from typing import Any, BinaryIO
+import re
+from typing import Any, BinaryIO, NamedTuple
+from xml.sax.saxutils import escape
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from linkage_ros.description.file_access import check_output_name, read_regular, replace_file
-from linkage_ros.errors import FileError, LinkageError, quote
+from linkage_ros.errors import escape_unprintable, FileError, LinkageError, quote
 from linkage_ros.names import csv_text
 
-Row = Sequence[float | int | None]
+Row = Sequence[float | int | str | None]
 Write = Callable[[Sequence[Row]], None]
 """Writes a block of rows."""
 
 _CELLS = 2**20  # a block of this size takes about 40 MB
 
+_MOST_IN_SHEET = 2**20  # rows of a sheet, as a spreadsheet reads it
+_MOST_EXACT = 2**53  # a spreadsheet rounds integers beyond
+
 _MOST = 1000  # rows that `numbers_of` reads
 _LARGEST_FILE = 10_000_000  # bytes that it reads
 
 
+class FileTable(NamedTuple):
+    """A table for a file."""
+
+    name: str
+    heads: Sequence[str]
+    rows: Sequence[Row]
+
+    def heads_of(self, kind: type) -> list[str]:
+        """Return the heads of the columns that hold values of a kind alone."""
+        return [
+            head
+            for head, column in zip(self.heads, zip(*self.rows, strict=True), strict=False)
+            if all(isinstance(value, kind) for value in column if value is not None)
+        ]
+
+
 @contextmanager
-def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
+def table_file(
+    file: Path, heads: Sequence[str], whole: Sequence[str], texts: Sequence[str] = ()
+) -> Iterator[Write]:
     """
     Yield a function that writes blocks of a table; the file appears complete at the end, or not.
 
-    Its suffix selects the format, see `KINDS`; an existing file is replaced. ``whole`` names the
-    columns of integers. A LinkageError says that it cannot be written.
+    Its suffix selects the format, see `TABLE_KINDS`; an existing file is replaced. ``whole`` and
+    ``texts`` name the columns of integers and of texts. A LinkageError says that it cannot be
+    written.
     """
+    kind = TABLE_KINDS[file.suffix.lower()]
+    with _new_file(file) as stream, kind(stream, heads, whole, texts) as write:
+        yield write
+
+
+def write_tables(file: Path, tables: Sequence[FileTable]) -> None:
+    """Write tables: all of them as sheets of an xlsx file, else the first."""
+    if file.suffix.lower() == '.xlsx':
+        with _new_file(file) as stream, _open_workbook(stream) as book:
+            for table in tables:
+                with book.open_sheet(table.name, table.heads) as write:
+                    write(table.rows)
+        return
+    first = tables[0]
+    with table_file(file, first.heads, first.heads_of(int), first.heads_of(str)) as write:
+        write(first.rows)
+
+
+def csv_of(table: FileTable) -> str:
+    """Return a table as CSV."""
+    stream = io.BytesIO()
+    with _open_csv(stream, table.heads, (), ()) as write:
+        write(table.rows)
+    return stream.getvalue().decode()
+
+
+@contextmanager
+def _new_file(file: Path) -> Iterator[BinaryIO]:
     # A link is followed: its target is replaced, not the link.
     target = Path(os.path.realpath(file))
     try:
         if target.exists() and not target.is_file():
             raise LinkageError(str(file), 'exists and is not a file', 'name another file')
-        kind = TABLE_KINDS[file.suffix.lower()]
-        with replace_file(target) as stream, kind(stream, heads, whole) as write:
-            yield write
+        with replace_file(target) as stream:
+            yield stream
     except OSError as error:
         raise LinkageError(
             str(file), f'cannot be written: {error.strerror or error}', 'name another file'
@@ -87,22 +139,29 @@ def block_rows(columns: int) -> int:
 
 
 @contextmanager
-def _open_csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Iterator[Write]:
+def _open_csv(
+    stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str], _texts: Sequence[str]
+) -> Iterator[Write]:
     text = io.TextIOWrapper(stream, encoding='utf-8', newline='', write_through=True)
     writer = csv.writer(text, lineterminator='\n')  # writes floats with repr
     try:
         writer.writerow(map(csv_text, heads))
-        yield writer.writerows
+        yield lambda rows: writer.writerows(
+            [csv_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows
+        )
     finally:
         text.detach()  # else it would close the stream when it is garbage-collected
 
 
 @contextmanager
-def _open_parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
+def _open_parquet(
+    stream: BinaryIO, heads: Sequence[str], whole: Sequence[str], texts: Sequence[str]
+) -> Iterator[Write]:
     import pyarrow as pa  # local import: an extra, and slow to load
     from pyarrow import parquet
 
-    schema = pa.schema([(head, pa.int64() if head in whole else pa.float64()) for head in heads])
+    kinds = dict.fromkeys(whole, pa.int64()) | dict.fromkeys(texts, pa.string())
+    schema = pa.schema([(head, kinds.get(head, pa.float64())) for head in heads])
 
     def write_rows(rows: Sequence[Row]) -> None:
         try:
@@ -121,9 +180,126 @@ def _open_parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) 
         yield write_rows
 
 
-TABLE_KINDS: dict[
-    str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
-] = {'.csv': _open_csv, '.parquet': _open_parquet}
+class _Workbook:
+    """A workbook in Office Open XML (ECMA-376), sheet after sheet, without styles."""
+
+    _MAIN = 'http://schemas.openxmlformats.org/spreadsheetml/2006/main'
+    _RELATIONS = 'http://schemas.openxmlformats.org/package/2006/relationships'
+    _OFFICE = 'http://schemas.openxmlformats.org/officeDocument/2006/relationships'
+    _TYPE = 'application/vnd.openxmlformats-officedocument.spreadsheetml'
+
+    def __init__(self, archive: ZipFile) -> None:
+        self._zip = archive
+        self._names: list[str] = []
+
+    @contextmanager
+    def open_sheet(self, name: str, heads: Sequence[str]) -> Iterator[Write]:
+        """Yield a function that writes rows of a new sheet."""
+        # A name of 31 characters, without some of them, and used once.
+        name = re.sub(r"[][:*?/\\']", '_', escape_unprintable(name))[:28] or 'table'
+        self._names.append(f'{name} {len(self._names) + 1}' if name in self._names else name)
+        count = 0
+        sheet = self._entry(f'xl/worksheets/sheet{len(self._names)}.xml')
+        with self._zip.open(sheet, 'w', force_zip64=True) as entry:
+
+            def write_rows(rows: Sequence[Row]) -> None:
+                nonlocal count
+                count += len(rows)
+                if count > _MOST_IN_SHEET:
+                    reason = f'has more than {_MOST_IN_SHEET} rows'
+                    raise LinkageError('a sheet', reason, 'write a .csv or .parquet file')
+                for row in rows:
+                    entry.write(f'<row>{"".join(map(_sheet_cell, row))}</row>'.encode())
+
+            entry.write(f'<worksheet xmlns="{self._MAIN}"><sheetData>'.encode())
+            write_rows([heads])
+            yield write_rows
+            entry.write(b'</sheetData></worksheet>')
+
+    def write_contents(self) -> None:
+        """Write what lists the sheets."""
+        numbered = [*enumerate(self._names, 1)]
+        self._write_relations('_rels/.rels', [('officeDocument', 'xl/workbook.xml')])
+        self._write_relations(
+            'xl/_rels/workbook.xml.rels',
+            [('worksheet', f'worksheets/sheet{number}.xml') for number, _ in numbered],
+        )
+        sheets = ''.join(
+            f'<sheet name="{escape(name)}" sheetId="{number}" r:id="r{number}"/>'
+            for number, name in numbered
+        )
+        self._write_entry(
+            'xl/workbook.xml',
+            f'<workbook xmlns="{self._MAIN}" xmlns:r="{self._OFFICE}">'
+            f'<sheets>{sheets}</sheets></workbook>',
+        )
+        parts = [('workbook', 'sheet.main')] + [
+            (f'worksheets/sheet{number}', 'worksheet') for number, _ in numbered
+        ]
+        types = ''.join(
+            f'<Override PartName="/xl/{part}.xml" ContentType="{self._TYPE}.{what}+xml"/>'
+            for part, what in parts
+        )
+        self._write_entry(
+            '[Content_Types].xml',
+            '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+            '<Default Extension="rels" '
+            'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+            f'{types}</Types>',
+        )
+
+    def _write_relations(self, name: str, targets: Sequence[tuple[str, str]]) -> None:
+        parts = ''.join(
+            f'<Relationship Id="r{number}" Type="{self._OFFICE}/{kind}" Target="{target}"/>'
+            for number, (kind, target) in enumerate(targets, 1)
+        )
+        self._write_entry(
+            name, f'<Relationships xmlns="{self._RELATIONS}">{parts}</Relationships>'
+        )
+
+    def _write_entry(self, name: str, text: str) -> None:
+        self._zip.writestr(self._entry(name), text)
+
+    def _entry(self, name: str) -> ZipInfo:
+        """Return an entry without the time of day: the same table gives the same bytes."""
+        entry = ZipInfo(name)
+        entry.compress_type = ZIP_DEFLATED
+        return entry
+
+
+@contextmanager
+def _open_workbook(stream: BinaryIO) -> Iterator[_Workbook]:
+    with ZipFile(stream, 'w') as archive:
+        book = _Workbook(archive)
+        yield book
+        book.write_contents()
+
+
+def _sheet_cell(value: float | str | None) -> str:
+    if value is None:
+        return '<c/>'
+    if isinstance(value, str) or not isfinite(value) or abs(value) > _MOST_EXACT:
+        text = escape(escape_unprintable(str(value)))
+        return f'<c t="inlineStr"><is><t xml:space="preserve">{text}</t></is></c>'
+    return f'<c><v>{value!r}</v></c>'
+
+
+@contextmanager
+def _open_xlsx(
+    stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str], _texts: Sequence[str]
+) -> Iterator[Write]:
+    with _open_workbook(stream) as book, book.open_sheet('table', heads) as write:
+        yield write
+
+
+_OpenTable = Callable[
+    [BinaryIO, Sequence[str], Sequence[str], Sequence[str]], AbstractContextManager[Write]
+]
+TABLE_KINDS: dict[str, _OpenTable] = {
+    '.csv': _open_csv,
+    '.xlsx': _open_xlsx,
+    '.parquet': _open_parquet,
+}
 """Writer for each suffix of a file."""
 
 

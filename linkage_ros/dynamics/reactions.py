@@ -355,9 +355,9 @@ class Reactions:
         a, linkage = acceleration.state.coordinates, self._mechanics.closure.linkage
         inertia, first = self._mechanics.loads.drive_inertia, 2 * len(self.joints)
         efforts: tuple[float, ...] = ()
-        for i, given in enumerate(linkage.inputs):
+        for i, driven in enumerate(linkage.inputs):
             inert, force = inertia * a[1 + i], forces[first + i]
-            if given.slider:
+            if driven.slider:
                 efforts += (force + inert * self._scale,)
             else:
                 efforts += (force * self._scale + inert,)

@@ -33,10 +33,6 @@ from linkage_ros.kinematics.batch import (
     Complex as Complex,
     Mask as Mask,
 )
-from linkage_ros.kinematics.built_once import (
-    BUILD_LOCK as BUILD_LOCK,
-    BuiltProperty as BuiltProperty,
-)
 from linkage_ros.kinematics.closure import Closure as Closure
 from linkage_ros.kinematics.crank_branches import CrankBranch as CrankBranch
 from linkage_ros.kinematics.curves import (
@@ -47,10 +43,7 @@ from linkage_ros.kinematics.curves import (
     unwrap_angles as unwrap_angles,
 )
 from linkage_ros.kinematics.doubles import (
-    HUGE as HUGE,
     SHRINK as SHRINK,
-    to_double as to_double,
-    to_doubles as to_doubles,
 )
 from linkage_ros.kinematics.drawn_pose import read_drawn_pose as read_drawn_pose
 from linkage_ros.kinematics.dyads.rpr import (
@@ -120,7 +113,6 @@ from linkage_ros.kinematics.ranges import (
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
     InputRange as InputRange,
-    PointMotion as PointMotion,
     Position as Position,
     SingularInput as SingularInput,
     SingularityMargin as SingularityMargin,
@@ -154,18 +146,10 @@ from linkage_ros.kinematics.sides import (
     without_drawn_pose as without_drawn_pose,
     written_sides as written_sides,
 )
-from linkage_ros.kinematics.singularity_margin import signed_distance as signed_distance
-from linkage_ros.kinematics.solved_links import Angle as Angle, SolvedLinks as SolvedLinks
 from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
-    FixedPoint as FixedPoint,
     LinkState as LinkState,
-    PLACED as PLACED,
-    PointOnLink as PointOnLink,
-    PointOnRail as PointOnRail,
-    RelativeAngle as RelativeAngle,
-    Step as Step,
 )
 from linkage_ros.kinematics.sweep_analysis import (
     check_closes as check_closes,

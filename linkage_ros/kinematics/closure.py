@@ -18,7 +18,7 @@ from cmath import rect
 from collections.abc import Iterable, Sequence
 from math import inf
 from operator import mul
-from typing import Any, ClassVar, overload, TYPE_CHECKING
+from typing import Any, overload, TYPE_CHECKING
 
 from linkage_ros.errors import escape_unprintable, list_names, quote
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -102,9 +102,6 @@ class Closure:
 
     """
 
-    by_steps: ClassVar[bool] = True
-    """Whether its steps close it, which can be compiled; other solvers have a way of their own."""
-
     gap_unit: str = 'm'
     """Unit of the gap of an open position."""
 
@@ -146,7 +143,8 @@ class Closure:
         self._single = factors == [1.0]
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
-        self._keep_limits()
+        if self.bounds:
+            self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
         self._compiled: list[Compiled] = []
         self._inverses: dict[str, Inverse] = {}
 
@@ -178,12 +176,6 @@ class Closure:
         from linkage_ros import LinkagePage  # local import: only a notebook asks for pages
 
         return LinkagePage(self)
-
-    def _keep_limits(self) -> None:
-        """Let `position` check the limits; without limits it checks nothing."""
-        vars(self).pop('position', None)
-        if self.bounds:
-            self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
 
     def position(self, *inputs: float) -> Position:
         """

@@ -77,8 +77,6 @@ class InverseClosure(Closure):
 
     """
 
-    by_steps = False
-
     def __init__(self, closed: Closure, inverse: Inverse, branch: CrankBranch) -> None:
         output = inverse.output
         (crank,) = closed.linkage.inputs

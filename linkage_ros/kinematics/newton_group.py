@@ -26,7 +26,6 @@ the pose is followed again for each state, with the same proof that no other ass
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from math import hypot, inf, isnan, nan, prod
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -83,10 +82,6 @@ Sum of the last changes by Newton's method, in [rad] and lengths: the next is be
 Near a toggle the method converges more slowly by the same factor by which the rounding is greater.
 """
 
-_EARLY_STEPS = 8
-_EARLY_SINGULAR = 1e-6
-"""Steps that end at a tolerance, and the conditioning below which full accuracy is needed."""
-
 
 class IteratedPose(NamedTuple):
     """The links at one state."""
@@ -112,7 +107,7 @@ class Iteration:
     __slots__ = (
         '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
         '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
-        '_system_line', '_table', 'branch', 'inputs', 'solution', 'tolerance',
+        '_system_line', '_table', 'branch', 'inputs', 'solution',
     )  # fmt: skip
 
     def __init__(
@@ -155,26 +150,14 @@ class Iteration:
         self.branch = keep_results(self._follow_branch)
         # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
         self.solution = keep_results(self._solution_of_pose)
-        # Bound of the last correction, in [rad] and in the unit of the lengths; 0 for full
-        # accuracy.
-        self.tolerance = 0.0
 
     @property
     def equation_count(self) -> int:
         """Return the number of equations solved at once."""
         return len(self._start)
 
-    def stopped_at(self, tolerance: float) -> Iteration:
-        """Return the same iteration with a tolerance; with several inputs it changes nothing."""
-        stopped = copy(self)
-        stopped.tolerance = tolerance
-        return stopped
-
     def close(self, solved: LinkState) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        early = self._closed_early(solved) if self.tolerance else None
-        if early is not None:
-            return early
         status, values = (
             self._close_straight(solved)
             if has_symbols(solved)
@@ -315,29 +298,6 @@ class Iteration:
         slides = [slide.place(values, solved).real for slide in self._slides]
         self._append_solution(solved, [*values, *(unknowns + turned)[0::3].tolist(), *slides])
         return IteratedPose(status, 0.0, values, solved)
-
-    def _closed_early(self, solved: LinkState) -> IteratedPose | None:
-        """Append a solution within the tolerance; None if the first steps do not contract."""
-        inputs = self._inputs_of(solved)
-        start = self._start_at(inputs) if len(inputs) == 1 else None
-        if start is None or start.is_end:
-            return None
-        unknowns, last = start.unknowns, start.farthest
-        for _ in range(_EARLY_STEPS):
-            errors, jacobian = self._evaluate_system(solved, unknowns)
-            try:
-                step = np.linalg.solve(jacobian, -errors)
-            except np.linalg.LinAlgError:
-                return None
-            length = float(np.abs(step).max())
-            if not length < 0.7 * last:
-                return None
-            unknowns, last = unknowns + step, length
-            if length <= self.tolerance:
-                if _reciprocal_condition(jacobian) <= _EARLY_SINGULAR:
-                    return None
-                return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
-        return None
 
     def _not_closed(self, solved: LinkState) -> IteratedPose:
         """Return the pose at a toggle, or the nearest one where the links are open."""

@@ -6,11 +6,6 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.node.bag_topics import (
-    bag_topic as bag_topic,
-    create_publishers as create_publishers,
-    offered_qos as offered_qos,
-)
 from linkage_ros.node.demo_nodes import CrankSource as CrankSource, PDController as PDController
 from linkage_ros.node.diagnostics import (
     chatter_count as chatter_count,
@@ -20,21 +15,6 @@ from linkage_ros.node.diagnostics import (
 )
 from linkage_ros.node.node import LinkageNode as LinkageNode
 from linkage_ros.node.parameters import LINKAGE_NODE as LINKAGE_NODE
-from linkage_ros.node.playback import (
-    ClockTicks as ClockTicks,
-    LATE as LATE,
-    Playback as Playback,
-    playback_queue as playback_queue,
-    PlaybackPart as PlaybackPart,
-    QueuedMessage as QueuedMessage,
-    read_ahead as read_ahead,
-)
-from linkage_ros.node.player import (
-    CLOCK as CLOCK,
-    play as play,
-    PlaybackOptions as PlaybackOptions,
-    player_node as player_node,
-)
 from linkage_ros.node.real_time import (
     leave_out_shared_memory as leave_out_shared_memory,
     stay_on_this_machine as stay_on_this_machine,

@@ -307,7 +307,7 @@ class DiagnosticsSummary:
             'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
         }
         looks = (
-            [*zip(counts.last_tick.linkages, counts.last_tick.full_states, strict=True)]
+            [*zip(counts.last_tick.linkages, counts.last_tick.states, strict=True)]
             if counts.last_tick
             else []
         )

@@ -201,11 +201,6 @@ class LinkageNode(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         for note in scene_notes(scene):
             self.get_logger().warning(str(note))
-        for linkage in pipeline.linkages:
-            if linkage.solver_choice is not None:
-                name = f'{linkage.scene_linkage.name}: ' if linkage.scene_linkage.name else ''
-                accuracy = f'accuracy {linkage.scene_linkage.accuracy:g}'
-                self.get_logger().info(f'{name}{accuracy}: {linkage.solver_choice.why}')
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 

@@ -36,7 +36,7 @@ from linkage_ros.bag import (
 from linkage_ros.description import RecordParameters, Scene
 from linkage_ros.errors import RecordingError
 from linkage_ros.replay import EXTRA, scene_files, to_attachments
-from linkage_ros.tick import LinkagePipeline, TickLoop
+from linkage_ros.tick import TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
@@ -89,7 +89,7 @@ class RunRecording:
         def new_bag(whole: bool) -> BagWriter:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _new_folder(runs, record.name, scene.name)
-            files = _make_attachments(scene, described, begun, loop.pipeline.linkages, folder)
+            files = _make_attachments(scene, described, begun, folder)
             opening = [
                 (index, description)
                 for index, (key, _) in enumerate(described)
@@ -221,7 +221,6 @@ def _make_attachments(
     scene: Scene,
     topics: Sequence[tuple[str, Topic]],
     begun: str,
-    lines: Sequence[LinkagePipeline],
     folder: Path,
 ) -> dict[str, tuple[str, bytes]]:
     several = {EXTRA, WRENCH_TOPICS}
@@ -229,7 +228,7 @@ def _make_attachments(
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
     if wrenches := [topic.name for key, topic in topics if key == WRENCH_TOPICS]:
         named[WRENCH_TOPICS] = wrenches
-    return to_attachments(scene_files(scene, named, begun, lines, folder))
+    return to_attachments(scene_files(scene, named, begun, folder))
 
 
 def _new_folder(directory: Path, name: str, scene: str) -> Path:

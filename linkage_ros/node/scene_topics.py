@@ -175,7 +175,7 @@ class SceneTopics:
             topics['faults_topic'] = self._change_publisher.topic_name
         text_type = message_type('std_msgs/msg/String', '~/scene')
         self._scene_publisher = self._node.create_publisher(text_type, SCENE_TOPIC, SCENE_QOS)
-        files = scene_files(scene, topics, '', pipeline.linkages)
+        files = scene_files(scene, topics, '')
         self._scene_publisher.publish(text_message(announced_text(files)))
 
     def disconnect(self) -> None:

@@ -115,7 +115,6 @@ def recorded_scene(
         str(bag.path),
         files,
         str(_folder_of(bag.path) / run.scene_folder),
-        run.solvers,
         run.seed,
         trust_effects=trust_effects,
         settings=settings,

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 import json
 import os
 from pathlib import Path
@@ -18,10 +18,9 @@ import platform
 from typing import Any
 
 from linkage_ros import __version__
-from linkage_ros.bag import BEGUN, CHOSEN, RUN_FILE, SEED, USER_EFFECTS
+from linkage_ros.bag import BEGUN, RUN_FILE, SEED, USER_EFFECTS
 from linkage_ros.description import Scene
 from linkage_ros.replay.replay import user_effects_here
-from linkage_ros.tick import LinkagePipeline
 
 EXTRA = 'extra'
 """Key of the auxiliary topics, of which there may be several."""
@@ -31,7 +30,6 @@ def scene_files(
     scene: Scene,
     topics: Mapping[str, Any],
     begun: str,
-    lines: Sequence[LinkagePipeline],
     bag: Path | None = None,
 ) -> dict[str, bytes]:
     """
@@ -46,8 +44,6 @@ def scene_files(
         **topics,
         BEGUN: begun,
         SEED: scene.seed,
-        # A replay must use the same solver.
-        **({CHOSEN: chosen} if (chosen := _chosen_solvers(lines)) else {}),
         **({USER_EFFECTS: own} if (own := user_effects_here(scene)) else {}),
         'linkage_ros': __version__,
         'python': platform.python_version(),
@@ -62,15 +58,6 @@ def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
         return {}
     folder = Path(scene.folder).resolve()
     return {'scene_folder': str(folder if bag is None else os.path.relpath(folder, bag.resolve()))}
-
-
-def _chosen_solvers(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
-    """Return the chosen solver of each linkage that has one, by name of the linkage."""
-    return {
-        line.scene_linkage.name: {line.solver_choice.solver: line.solver_choice.parameters}
-        for line in lines
-        if line.solver_choice is not None
-    }
 
 
 def to_attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:

@@ -117,7 +117,7 @@ def simulate_run(
     topics = _bag_topics(loop, first)
     named: dict[str, Any] = {key: topic.name for key, topic in topics if key != EXTRA}
     named['extra_topics'] = [topic.name for key, topic in topics if key == EXTRA]
-    files = scene_files(scene, named, WITH_THE_RUN, first.linkages, folder)
+    files = scene_files(scene, named, WITH_THE_RUN, folder)
     # A signal ends the run between two ticks: raised here, it would cut a record of the bag.
     with heed_signals():
         writer = BagWriter(folder, [topic for _, topic in topics], to_attachments(files))

@@ -33,8 +33,7 @@ from typing import NamedTuple
 from linkage_ros.description import parse_scene
 from linkage_ros.errors import escape_unprintable, LinkageError, quote
 from linkage_ros.replay.simulate import check_simulated, tick_times
-from linkage_ros.stages.effects import SensorReading
-from linkage_ros.tick import CompiledState, LinkageState, Pipeline, StateTuple
+from linkage_ros.tick import Pipeline
 import numpy as np
 from numpy.typing import NDArray
 
@@ -199,7 +198,7 @@ def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome
         messages += bool(tick.message)
         place = wanted.get(index)
         for which, seen in enumerate(tick.states):
-            reading = _reading_of(seen)
+            reading = seen.reading
             if reading is None:
                 continue
             values = (reading.joints, reading.rates, reading.efforts)
@@ -215,14 +214,6 @@ def _reduce_run(pipeline: Pipeline, at: Sequence[int], instants: int) -> Outcome
         for joint, one in zip(joints[which], reduction.column_statistics(), strict=False)
     }
     return Outcome('', len(at), messages, statistics, kept)
-
-
-def _reading_of(state: LinkageState | CompiledState | StateTuple) -> SensorReading | None:
-    """Return the reading of a linkage at a tick; None without one."""
-    if isinstance(state, LinkageState | CompiledState):
-        return state.reading
-    _, numbers, *_ = state
-    return None if numbers is None else SensorReading(*numbers)
 
 
 class _Reduction:

@@ -207,7 +207,8 @@ def examine_states(
             if recorded:
                 joint_states += 1
                 same += recorded == tick.message
-            for watch, (crank, position, _, _) in zip(watched, tick.full_states, strict=True):
+            for watch, state in zip(watched, tick.states, strict=True):
+                crank, position = state.crank, state.position
                 if crank is not None and position is not None and position.joints:
                     watch.add_state(time, crank.angles, position)
             if not number % _REPORT_EVERY:

@@ -6,13 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.tick.compiled_tick import CompiledState as CompiledState, StateTuple as StateTuple
-from linkage_ros.tick.pipeline import (
-    LinkagePipeline as LinkagePipeline,
-    LinkageState as LinkageState,
-    Pipeline as Pipeline,
-    Tick as Tick,
-)
+from linkage_ros.tick.interpreted_tick import InterpretedTick as InterpretedTick, Tick as Tick
+from linkage_ros.tick.linkage_pipeline import LinkagePipeline as LinkagePipeline
+from linkage_ros.tick.linkage_state import LinkageState as LinkageState
+from linkage_ros.tick.pipeline import Pipeline as Pipeline
 from linkage_ros.tick.sample_router import SampleRouter as SampleRouter
 from linkage_ros.tick.tick_loop import (
     Counts as Counts,

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Generate the usual tick of a linkage as the text of one Python function.
+The usual tick of a scene, compiled: the text of one Python function.
 
 In the usual tick there is a crank state, every loop closes, the linkage and its forces follow the
 compiled path, and no published angle wraps. Every other tick, the first among them, is interpreted
@@ -20,46 +20,33 @@ memory that it touches: frames, objects, functions. One function of local variab
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from itertools import chain, islice
 from math import pi
-from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.generated_code import define_function, Lines
-from linkage_ros.stages.drives import CrankState
-from linkage_ros.stages.effects import SensorReading
+from linkage_ros.kinematics import all_finite
+from linkage_ros.stages.drives import compile_drive, CrankState
+from linkage_ros.stages.effects import FORCE_EFFECTS, MechanismState, SensorReading
+from linkage_ros.tick.interpreted_tick import InterpretedTick, Tick
+from linkage_ros.tick.linkage_pipeline import LinkagePipeline
+from linkage_ros.tick.linkage_state import LinkageState
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import AppliedForces
-    from linkage_ros.kinematics.compiling import Compiled
-    from linkage_ros.messages import JointStateWriter
-    from linkage_ros.stages.drives import Drive
-    from linkage_ros.stages.effects import Continuous, DriveStage, WriterStage
+    from linkage_ros.kinematics.compiling import Compiled, TracedMotion
 
 _CRANK_FIELDS = ', '.join(CrankState._fields)
 
-InterpretedTick = Callable[[int, CrankState | None], Any]
-"""Computes a tick at a time, in [ns], step by step from the given crank state on."""
-
-
-class CompiledState(NamedTuple):
-    """State of a compiled linkage at a tick: the reading, and the base of the full state."""
-
-    crank: CrankState
-    reading: SensorReading | None  # None where nothing is published
-    # As in `Reaction`, in pins and sliders; empty where no message holds them.
-    reactions: tuple[tuple[float, float, float], ...]
-    given: tuple[float, ...]  # As in `MechanismState`
-
-
-StateTuple: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
-"""The same as plain tuples."""
+_KINEMATIC = ('velocity', 'acceleration')
+"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
 
 
 class CompiledTick(NamedTuple):
-    """The usual tick up to its reading, as lines of Python."""
+    """The usual tick of a linkage up to its reading, as lines of Python."""
 
     # Lines that compute from ``now``, and the objects that they use. They define the fields of
-    # `CrankState` by name, or return through ``interpret``.
+    # `CrankState` by name, or return through ``interpret`` or ``interpret_from``.
     lines: list[str]
     bound: dict[str, Any]
     crank: str  # The crank state, as an expression
@@ -72,39 +59,182 @@ class CompiledTick(NamedTuple):
     reactions: list[str]  # All reaction values in sequence, as expressions; likewise
 
 
-def compile_tick(
-    drive: Drive,
-    drive_stages: Sequence[DriveStage],
-    compiled_linkage: Compiled,
-    angles: Continuous | None,
-    applied: AppliedForces | None,
-) -> CompiledTick:
-    """
-    Write the usual tick of a linkage.
+def compile_tick(interpreted: InterpretedTick) -> Callable[[int], Tick] | None:
+    """Return a tick as a function of the time, in [ns], with the same bits, or None."""
+    linkages = interpreted.linkages
+    compiled = [compile_linkage(linkage) for linkage in linkages]
+    if not any(compiled):
+        return None
+    pairs = zip(linkages, compiled, strict=True)
+    whole = [one for linkage, one in pairs if one is not None and _is_whole(linkage)]
+    if len(whole) == len(linkages) == 1:
+        return _compile_single(interpreted, whole[0])
+    if len(whole) == len(linkages) and not interpreted.extras:
+        return _combine_ticks(interpreted, whole)
+    computes = [
+        linkage.interpret if one is None else _compile_state(linkage, one)
+        for linkage, one in zip(linkages, compiled, strict=True)
+    ]
+    return lambda now: interpreted.make_tick(now, [compute(now) for compute in computes])
 
-    The compiled linkage closes for at least one input; it returns the values of a `CompiledTick`,
-    as far as the scene asks for them. ``angles`` unwraps the published angles; ``applied``
-    gives the loads that change. None if not needed.
+
+def _compile_state(
+    linkage: LinkagePipeline, compiled: CompiledTick
+) -> Callable[[int], LinkageState]:
+    """Return the state of a linkage as a function of the time, in [ns]."""
+    apply_sensors = linkage.apply_later_sensors
+    lines = [f'reading = new(Reading, {_reading_text(compiled)})']
+    if apply_sensors is not None:
+        lines.append('reading = apply_sensors(now, reading)')
+    lines.append(f'return {_state_text(compiled)}')
+    return _define_function(linkage, compiled, lines, {'apply_sensors': apply_sensors})
+
+
+def _is_whole(linkage: LinkagePipeline) -> bool:
+    """Return whether sensors and messages of a linkage take nothing that is interpreted."""
+    return (
+        all(one.writer.of_reading or one.forces_only for one in linkage.extras)
+        and linkage.apply_later_sensors is None
+    )
+
+
+def _compile_single(interpreted: InterpretedTick, compiled: CompiledTick) -> Callable[[int], Tick]:
+    """Return the whole tick of a scene with one linkage."""
+    (linkage,) = interpreted.linkages
+    packed = interpreted.make_writer((True,)).compile_write(
+        'now', compiled.joints, compiled.rates, compiled.efforts
+    )
+    lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
+    writers = [extra.writer for extra in interpreted.extras]
+    if writers:
+        lines.append('reading = new(Reading, reading)')
+    state = _values_text(compiled)
+    messages = _tuple_text(
+        [
+            f'write{index}(now, {"None" if writer.of_reading else "state"}, reading)'
+            for index, writer in enumerate(writers)
+        ]
+    )
+    if 'state' in messages:
+        lines.append(f'state = {_state_text(compiled)}')
+        state = 'state'
+    lines.append(f'return new(Tick, (message, {messages}, ({state},), linkages))')
+    bound: dict[str, Any] = {'Tick': Tick, 'linkages': interpreted.linkages}
+    bound |= {f'write{index}': writer.write for index, writer in enumerate(writers)}
+    bound['interpret'] = interpreted.run
+    bound['interpret_from'] = lambda now, crank: interpreted.make_tick(
+        now, [linkage.interpret_from(now, crank)]
+    )
+    return _define_function(linkage, compiled, lines, bound | packed.bound)
+
+
+def _combine_ticks(
+    interpreted: InterpretedTick, compiled_ticks: Sequence[CompiledTick]
+) -> Callable[[int], Tick]:
+    """Return the whole tick of a scene with several linkages and one message."""
+    linkages = interpreted.linkages
+    adders = [*map(_compile_adder, linkages, compiled_ticks)]
+    write = interpreted.make_writer((True,) * len(linkages)).write
+    numbers = [
+        sum(len(getattr(compiled, group)) for compiled in compiled_ticks)
+        for group in ('joints', 'rates', 'efforts')
+    ]
+    count, *_ = numbers
+    all_rates, all_efforts = (number == count for number in numbers[1:])
+
+    def tick(now: int) -> Tick:
+        positions: list[float] = []
+        rates: list[float] = []
+        efforts: list[float] = []
+        states = [add(now, positions, rates, efforts) for add in adders]
+        if len(positions) < count:
+            named = Tick(b'', (), states, linkages).states
+            return interpreted.make_tick(now, named)
+        message = write(now, positions, rates if all_rates else [], efforts if all_efforts else [])
+        return Tick(message, (), states, linkages)
+
+    return tick
+
+
+def _compile_adder(linkage: LinkagePipeline, compiled: CompiledTick) -> Callable[..., Any]:
     """
-    crank = drive.compile_state(compiled_linkage.driven, 'return interpret(now, None)')
-    lines, bound = [*crank.lines], {**crank.bound}
+    Return a function that adds one linkage to a message of several, and returns its state.
+
+    The function takes the time, in [ns], and the lists of positions, rates and efforts, which it
+    extends by the reading of ``compiled``. A tick that is interpreted extends none of the lists.
+    """
+    groups = {'positions': compiled.joints, 'rates': compiled.rates, 'efforts': compiled.efforts}
+    lines = [
+        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading_text(compiled)}',
+        *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
+        f'return {_values_text(compiled)}',
+    ]
+    return _define_function(
+        linkage, compiled, lines, {}, ['now', *(f'all_{name}' for name in groups)]
+    )
+
+
+@dataclass(frozen=True)
+class _OutputSelection:
+    """Picks the values that a scene publishes from the motion of a compiled linkage."""
+
+    # Two objects with equal keys pick the same values.
+    key: list[Any]
+    linkage: LinkagePipeline = field(compare=False)
+
+    def __call__(self, motion: TracedMotion, *given: float) -> Sequence[Sequence[float]]:
+        """Return the ideal reading of a symbolic motion, and the joint forces."""
+        acceleration = motion.acceleration
+        if acceleration is None or not all_finite(acceleration.joints):
+            return []
+        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), (), given)
+        _velocity, _acceleration, *stages = self.linkage.mechanism_stages
+        for stage in stages:
+            moved = stage(moved)
+        published = any(extra.forces_only for extra in self.linkage.extras)
+        reactions = [*chain(*moved.reactions)] if published else []
+        return [*self.linkage.observe(0, moved)[1:], reactions]
+
+
+def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
+    """Compile the tick of a linkage up to the reading; None where a part has no such form."""
+    wanted = linkage.wanted
+    moved = {effect.name for effect in wanted.effects if effect.stage is not None}
+    if linkage.mechanism_faults:
+        return None
+    if not moved <= {*_KINEMATIC, *FORCE_EFFECTS}:
+        return None
+    loads = None if moved.isdisjoint(FORCE_EFFECTS) else linkage.changing_loads
+    outputs = None
+    if 'acceleration' in moved:
+        of = [wanted.parameters[name] for name in linkage.effect_names if name in moved]
+        of += [linkage.observed_effects, linkage.context.loads, linkage.context.friction]
+        outputs = _OutputSelection(of, linkage)
+    compiled = linkage.closure.compile_linkage(
+        len(moved.intersection(_KINEMATIC)), outputs, loads.given_count if loads else 0
+    )
+    # Where the forces have no solution, a compiled path has fewer values.
+    if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
+        return None
     # The state of a drive that exerts an effort holds more than its fields.
-    exerts = getattr(drive, 'exerts_effort', False)
+    exerts = getattr(linkage.drive, 'exerts_effort', False)
+    lines, bound = compile_drive(
+        linkage.drive, compiled.driven, 'return interpret(now)', 'return interpret_from(now, None)'
+    )
     state = 'crank' if exerts else f'CrankState({_CRANK_FIELDS})'
-    for index, stage in enumerate(drive_stages):
+    for index, stage in enumerate(linkage.drive_stages):
         bound[f'stage{index}'] = stage
         lines.append(f'crank = {_CRANK_FIELDS}, = stage{index}({state})')
         state = 'crank'
-    leave = f'return interpret(now, {state})'
-    if applied is not None:
-        bound['applied'] = applied
-        lines += _fall_back_unless('applied.begin >= 0', leave)
-        lines.append('given = applied.given_at(now)')
-    mechanism, groups = _mechanism_lines(compiled_linkage, leave)
+    leave = f'return interpret_from(now, {state})'
+    if loads is not None:
+        bound['loads'] = loads
+        lines += [*_fall_back_unless('loads.begin >= 0', leave), 'given = loads.given_at(now)']
+    mechanism, groups = _mechanism_lines(compiled, leave)
     lines += mechanism.lines
     bound |= mechanism.bound
     joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
-    if efforts and drive_stages:
+    if efforts and linkage.drive_stages:
         # Within its play, the motor moves alone and carries only itself.
         lines += _fall_back_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
     if efforts and exerts:
@@ -112,13 +242,12 @@ def compile_tick(
         effort = efforts[0]
         lines.append("bearing = getattr(crank, 'bearing', ())")
         lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
-    if angles is not None:
-        bound['running'] = angles
-        lines += _unwrap_lines(angles.places, joints, leave)
-    crank_text = 'crank' if exerts else f'({_CRANK_FIELDS})'
-    given = '()' if applied is None else 'given'
-    groups = joints, rates, accelerations, efforts, reactions
-    return CompiledTick(lines, bound, crank_text, given, *groups)
+    if linkage.running is not None:
+        bound['running'] = linkage.running
+        lines += _unwrap_lines(linkage.running.places, joints, leave)
+    crank, given = 'crank' if exerts else f'({_CRANK_FIELDS})', '()' if loads is None else 'given'
+    reading = joints, rates, accelerations, efforts
+    return CompiledTick(lines, bound, crank, given, *reading, reactions)
 
 
 def _mechanism_lines(compiled_linkage: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
@@ -170,98 +299,25 @@ def _fall_back_unless(condition: str, leave: str) -> tuple[str, str]:
     return f'if not ({condition}):', f'    {leave}'
 
 
-def compile_linkage_state(
-    compiled: CompiledTick,
-    apply_sensors: Callable[[int, SensorReading], SensorReading | None] | None,
-    interpret: InterpretedTick,
-) -> Callable[[int], Any]:
-    """
-    Return the state of a linkage as a function of the time, in [ns].
-
-    ``apply_sensors`` applies further sensor stages; ``interpret`` computes the ticks that
-    ``compiled`` does not.
-    """
-    lines = [f'reading = new(Reading, {_reading_text(compiled)})']
-    if apply_sensors is not None:
-        lines.append('reading = apply_sensors(now, reading)')
-    crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
-    lines.append(f'return new(CompiledState, {_state_text(compiled, crank)})')
-    return _define_function(
-        compiled, lines, {'apply_sensors': apply_sensors, 'interpret': interpret}
-    )
-
-
-def compile_contribution(compiled: CompiledTick, interpret: InterpretedTick) -> Callable[..., Any]:
-    """
-    Return a function that adds one linkage to a message of several, and returns its state.
-
-    The function takes the time, in [ns], and the lists of positions, rates and efforts, which it
-    extends by the reading of ``compiled``. A tick computed by ``interpret`` extends none of the
-    lists.
-    """
-    groups = {'positions': compiled.joints, 'rates': compiled.rates, 'efforts': compiled.efforts}
-    lines = [
-        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading_text(compiled)}',
-        *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
-        f'return {_state_text(compiled, compiled.crank)}',
-    ]
-    return _define_function(
-        compiled, lines, {'interpret': interpret}, ['now', *(f'all_{name}' for name in groups)]
-    )
-
-
-def compile_scene_tick(
-    compiled: CompiledTick,
-    writer: JointStateWriter,
-    extras: Sequence[WriterStage],
-    tick_type: type[Any],
-    linkages: Sequence[Any],
-    interpret: InterpretedTick,
-) -> Callable[[int], Any]:
-    """
-    Return the whole tick of a scene with one linkage, as a function of the time, in [ns].
-
-    ``writer`` serializes the joint states, and ``extras`` the other messages, from the reading
-    alone or from a `CompiledState`. ``interpret`` computes the ticks that ``compiled`` does not.
-    ``tick_type`` and ``linkages`` are the type of the result, and the linkages that it refers to.
-    """
-    bound: dict[str, Any] = {'Tick': tick_type, 'linkages': linkages, 'interpret': interpret}
-    bound |= {f'write{index}': extra.write for index, extra in enumerate(extras)}
-    packed = writer.compile_write('now', compiled.joints, compiled.rates, compiled.efforts)
-    lines = [f'reading = {_reading_text(compiled)}', *packed.lines]
-    if extras:
-        lines.append('reading = new(Reading, reading)')
-    state = _state_text(compiled, compiled.crank)
-    messages = _tuple_text(
-        [
-            f'write{index}(now, {"None" if extra.of_reading else "state"}, reading)'
-            for index, extra in enumerate(extras)
-        ]
-    )
-    if 'state' in messages:
-        lines.append(f'state = new(CompiledState, {state})')
-        state = 'state'
-    lines.append(f'return new(Tick, (message, {messages}, ({state},), linkages))')
-    return _define_function(compiled, lines, bound | packed.bound)
-
-
 def _define_function(
+    linkage: LinkagePipeline,
     compiled: CompiledTick,
     lines: Sequence[str],
     bound: dict[str, Any],
     parameters: Sequence[str] = ('now',),
 ) -> Callable[..., Any]:
-    # The constructor of a named tuple is a Python function; `tuple.__new__` is a C function.
-
-    new = tuple.__new__
-    types = {
-        'new': new,
+    known = {
+        # The constructor of a named tuple is a Python function; `tuple.__new__` is a C function.
+        'new': tuple.__new__,
         'CrankState': CrankState,
         'Reading': SensorReading,
-        'CompiledState': CompiledState,
+        'LinkageState': LinkageState,
+        'complete': linkage.solve_mechanism,
+        'interpret': linkage.interpret,
+        'interpret_from': linkage.interpret_from,
     }
     source = '\n    '.join([f'def tick({", ".join(parameters)}):', *compiled.lines, *lines])
-    function: Callable[..., Any] = define_function(source, 'tick', compiled.bound | types | bound)
+    function: Callable[..., Any] = define_function(source, 'tick', compiled.bound | known | bound)
     return function
 
 
@@ -270,10 +326,21 @@ def _reading_text(compiled: CompiledTick) -> str:
     return f'(now, {", ".join(map(_tuple_text, groups))})'
 
 
-def _state_text(compiled: CompiledTick, crank: str) -> str:
+def _state_text(compiled: CompiledTick) -> str:
+    """Write the state of a linkage, whose reading is an object."""
+    crank = compiled.crank if compiled.crank == 'crank' else f'new(CrankState, {compiled.crank})'
+    return f'LinkageState(complete, {crank}, {_tail_text(compiled)})'
+
+
+def _values_text(compiled: CompiledTick) -> str:
+    """Write the same as plain tuples, as in `Tick`."""
+    return f'({compiled.crank}, {_tail_text(compiled)})'
+
+
+def _tail_text(compiled: CompiledTick) -> str:
     numbers = iter(compiled.reactions)
     reactions = [_tuple_text(three) for three in zip(numbers, numbers, numbers, strict=True)]
-    return f'({crank}, reading, {_tuple_text(reactions)}, {compiled.given})'
+    return f'reading, {_tuple_text(reactions)}, {compiled.given}'
 
 
 def _tuple_text(parts: Sequence[str]) -> str:

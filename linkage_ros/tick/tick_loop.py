@@ -27,7 +27,9 @@ from linkage_ros.bag import Recorder
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Position, Status
 from linkage_ros.messages import Rejection, time_message
-from linkage_ros.tick.pipeline import LinkageState, Pipeline, Tick
+from linkage_ros.tick.interpreted_tick import Tick
+from linkage_ros.tick.linkage_state import LinkageState
+from linkage_ros.tick.pipeline import Pipeline
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultChange, Injection
@@ -470,10 +472,11 @@ class TickLoop:
         ):
             recorder.offer(withheld, now, solve_time, time_message(solve_time))
         counts.ticks += 1
-        for index, one in enumerate(tick.states):
+        for index, one in enumerate(tick.computed):
             if not isinstance(one, LinkageState):
-                _, reading, _ = one
-                counts.suppressed += reading is None
+                continue
+            if one.is_compiled:
+                counts.suppressed += one.reading is None
                 continue
             position = one.position
             if position is None:

@@ -62,7 +62,6 @@ def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     effects = [effect_of(name) for name in in_order(computed)]
     computes_forces = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
     _refuse_idle(scene_linkage, computes_forces)
-    _refuse_solver(scene_linkage, computes_forces)
     parameters = {
         effect.name: scene_linkage.effects.get(effect.name) or effect.parameters()
         for effect in effects
@@ -109,13 +108,3 @@ def _refuse_idle(scene_linkage: SceneLinkage, forced: bool) -> None:
                 'acts on nothing here: no effect and no drive asks for forces',
                 f'leave it out, drive by torque, or name one of {list_names(FORCE_EFFECTS)}',
             )
-
-
-def _refuse_solver(scene_linkage: SceneLinkage, forced: bool) -> None:
-    """Refuse a solver without dyad poses where the forces start from these."""
-    if forced and scene_linkage.solver is not None and scene_linkage.solver[0] != 'closed_form':
-        raise DefinitionError(
-            'solver',
-            f'{scene_linkage.solver[0]} computes no forces, and an effect or the drive needs them',
-            f'write closed_form, or leave {list_names(FORCE_EFFECTS)} and torque out',
-        )

@@ -23,7 +23,6 @@ from ..support.commands import linkage
 COMMANDS = {
     'info': [],
     'replay': [],
-    'play': [],
     'plot': ['-o', 'new.png'],
     'report': ['-o', 'new.html'],
     'export': ['-o', 'new.csv'],
@@ -140,6 +139,7 @@ def others(folder: Path) -> dict[str, Path]:
     }
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize('command', COMMANDS)
 @pytest.mark.parametrize('kind', ['folder', 'without metadata', 'file', 'packed', 'ROS 1'])
 def test_bags_of_other_formats_get_one_line(tmp_path, command, kind) -> None:

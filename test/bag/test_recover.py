@@ -274,11 +274,7 @@ def test_what_was_killed_and_is_recovered_is_finished(run):
 # `recover_bag` where everything is against it: any damage, bad disks, full ones, no bag at all.
 
 
-@settings(
-    max_examples=150,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     damages=st.lists(
         st.tuples(

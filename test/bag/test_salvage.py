@@ -50,6 +50,7 @@ RECORDS = {'chunk': chunk, 'attachment': attachment}
 PLACES = [0, 1, MIB - 40, *range(MIB - 10, MIB + 3), 2 * MIB - 9, 2 * MIB, 3 * MIB + 5]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', RECORDS)
 @pytest.mark.parametrize('start', [0, 7])
 def test_a_whole_record_is_found_wherever_it_lies(kind, start):

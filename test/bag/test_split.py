@@ -64,6 +64,7 @@ def triples(topics, messages):
     return [(topics[m.topic].name, m.log_time, m.data) for m in messages]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('storage', SPLITS.values(), ids=SPLITS)
 def test_every_reader_finds_every_message_in_the_folder_and_in_the_files(
     tmp_path, topics, messages, readers, storage

@@ -39,10 +39,11 @@ def test_ratios_are_taken_turn_by_turn():
 
 def test_table_is_the_same_as_text_and_as_markdown():
     table = Table('t', ('', 'µs'), [('a', '1.0')])
-    assert table_text(table.for_terminal()) == 't\n    µs\na  1.0'
+    assert table_text(table.aligned()) == 't\n    µs\na  1.0'
     assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
 
 
+@pytest.mark.sample(0)
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
@@ -65,6 +66,7 @@ def test_ticks_are_measured_against_the_bare_loop(tmp_path):
     assert 'bare loop' in kept
 
 
+@pytest.mark.sample(0)
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
@@ -82,6 +84,7 @@ def test_a_hundred_linkages_are_measured(tmp_path):
     assert _measured(cells[1:4])
 
 
+@pytest.mark.sample(0)
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
@@ -92,6 +95,7 @@ def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tm
         assert _measured(cells[1:4])
 
 
+@pytest.mark.sample(0)
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
@@ -123,6 +127,7 @@ def test_the_empty_scene_is_measured_against_the_same_by_hand(tmp_path):
         assert cells[4] == target
 
 
+@pytest.mark.sample(0)
 @pytest.mark.timeout(90)
 def test_compiled_linkages_are_measured_beside_plain_steps_and_c_and_by_their_dyads(tmp_path):
     kept = _bench(tmp_path, '--only', 'compiled')
@@ -138,6 +143,7 @@ def test_compiled_linkages_are_measured_beside_plain_steps_and_c_and_by_their_dy
         assert _measured(_row(kept, str(dyads))[1:3])
 
 
+@pytest.mark.sample(0)
 @pytest.mark.timeout(90)
 def test_solving_is_measured_against_straight_line_and_pylinkage(tmp_path):
     kept = _bench(tmp_path, '--only', 'kinematics')

@@ -50,10 +50,12 @@ def tried() -> list[Tried]:
     return [one for some in results_of(attempt, work, 2) for one in some]
 
 
+@pytest.mark.sample(0)
 def test_a_failing_call_loses_no_counted_message(tried: list[Tried]) -> None:
     assert [(one.injection, one.outcome.faults) for one in tried if one.outcome.faults] == []
 
 
+@pytest.mark.sample(0)
 def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None:
     assert len(tried) > 100
     verdicts = [one.outcome.verdict for one in tried]
@@ -67,6 +69,7 @@ def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None
     }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('disk', [Disk('tmpfs', 'tmpfs', 4), Disk('ext4', 'ext4', 6, 20)])
 @pytest.mark.parametrize(
     ('storage', 'filler'),

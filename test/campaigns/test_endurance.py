@@ -25,6 +25,7 @@ import pytest
 MINUTES = 15.0 / 60.0  # h
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('scene', ['demo', 'excavator_delay', 'worn_press'])
 def test_memory_is_flat_and_messages_are_counted_over_a_quarter_of_an_hour(scene: str) -> None:
     # A process of its own: memory freed by other tests would hide growth.

@@ -6,107 +6,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The campaign's reference agrees with others that share nothing with it."""
+"""
+Condition numbers of the campaign's reference are those by differences of balls.
+
+`test/study/test_enclosure.py` compares its solutions with the constraints.
+"""
 
 from __future__ import annotations
 
-from math import pi
-from typing import Any
-
-from campaigns.accuracy.adversarial import ADVERSARIAL, four_bar, inverted_slider_crank
-from campaigns.accuracy.mechanism import GROUND, Turn
+from campaigns.accuracy.adversarial import ADVERSARIAL
 from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.reference import (
     condition_numbers,
     exact_condition_numbers,
     Outcome,
     Reference,
-    Truth,
 )
 from campaigns.accuracy.run import make
-from mpmath import mp, mpf
 import pytest
-
-from .newton import DIGITS, Newton
-from ..kinematics import reference as elsewhere
-from ..kinematics.samples import (
-    FOUR_BARS,
-    four_bars,
-    inverted_slider_cranks,
-    SLIDER_CRANKS,
-)
-
-
-def as_mpf(ball: Any) -> mpf:
-    """Return the middle of a ball."""
-    with mp.workdps(80):
-        return mpf(ball.mid().str(80, radius=False))
-
-
-def coefficient(truth: Truth, joint: int, power: int) -> mpf:
-    """Return a joint's value or a derivative of it, lengths in [m]."""
-    is_slide = isinstance(list(truth.motion.mechanism.joints.values())[joint], str)
-    with mp.workdps(80):
-        scale = mpf(2) ** truth.motion.constants.exponent if is_slide else 1
-        return as_mpf(truth.joints[joint][power]) * (2 if power == 2 else 1) * scale
-
-
-def same_angle(one: mpf, other: mpf, within: float) -> bool:
-    with mp.workdps(80):
-        return abs(elsewhere.turned(one - other)) < within
-
-
-@pytest.mark.parametrize('family', FOUR_BARS)
-def test_four_bars_are_as_by_mpmath_to_40_digits(family: str) -> None:
-    for a, b, c, d, phi, side in four_bars(family, 100):
-        expected = elsewhere.four_bar(a, b, c, d, phi, side, digits=90)
-        truth = Reference(four_bar((a, b, c, d), side)).solve(phi, 0.0)
-        assert (truth.outcome is Outcome.OPEN) == (expected.gap > 0)
-        if truth.outcome is not Outcome.CLOSED:
-            continue
-        links = [expected.coupler, expected.rocker]
-        rates = [expected.coupler_rate, expected.rocker_rate]
-        for joint in range(2):
-            assert same_angle(coefficient(truth, joint, 0), links[joint].value, 1e-40)
-            off = abs(coefficient(truth, joint, 1) - rates[joint].value)
-            assert off <= 1e-40 * rates[joint].condition
-
-
-@pytest.mark.parametrize('family', SLIDER_CRANKS)
-def test_inverted_slider_cranks_are_as_by_mpmath_to_40_digits(family: str) -> None:
-    for a, d, offset, phi, side in inverted_slider_cranks(family, 100):
-        expected = elsewhere.inverted_slider_crank(a, d, offset, phi, side, digits=90)
-        truth = Reference(inverted_slider_crank((a, d, offset), side)).solve(phi, 0.0)
-        assert (truth.outcome is Outcome.OPEN) == (expected.gap > 0)
-        if truth.outcome is not Outcome.CLOSED:
-            continue
-        assert same_angle(coefficient(truth, 0, 0), expected.rod.value, 1e-40)
-        slide = expected.slide
-        assert abs(coefficient(truth, 1, 0) - slide.value) <= 1e-40 * slide.condition
-        for joint, rate in enumerate((expected.rod_rate, expected.slide_rate)):
-            assert abs(coefficient(truth, joint, 1) - rate.value) <= 1e-40 * rate.condition
-
-
-def test_condition_numbers_are_those_of_the_older_reference() -> None:
-    for a, b, c, d, phi, side in four_bars('fold and stretch', 100):
-        expected = elsewhere.four_bar(a, b, c, d, phi, side)
-        reference = Reference(four_bar((a, b, c, d), side))
-        truth = reference.solve(phi, 0.0)
-        if truth.outcome is not Outcome.CLOSED:
-            continue
-        kappa = condition_numbers(reference, [truth], [phi], [0.0])[0]
-        for joint, (link, rate) in enumerate(
-            (
-                (expected.coupler, expected.coupler_rate),
-                (expected.rocker, expected.rocker_rate),
-            )
-        ):
-            # Here an angle counts as π at least, and the crank's rate is an input.
-            position = float(link.condition - abs(link.value)) + pi
-            assert kappa[joint, 0] == pytest.approx(position, rel=1e-9)
-            velocity = float(rate.condition + abs(rate.value))
-            assert kappa[joint, 1] == pytest.approx(velocity, rel=1e-9)
-
 
 ALL = [*RANDOM, *(name for name in ADVERSARIAL if name != 'lengths × 1e±150')]
 
@@ -126,53 +43,3 @@ def test_condition_numbers_in_doubles_are_right_where_differences_can_tell(famil
             assert condition_numbers(reference, *arguments)[0] == pytest.approx(
                 exact, rel=1e-3, abs=1e-15
             )
-
-
-@pytest.mark.parametrize('family', [name for name in ALL if name != 'subnormal input'])
-def test_every_family_is_as_by_newton_s_method_from_the_file_s_terms(family: str) -> None:
-    for index in range(2):
-        mechanism, phi, alpha = make(0, family, index)
-        reference, newton = Reference(mechanism), Newton(mechanism)
-        truth = reference.solve(phi[-1], alpha[-1])
-        if truth.outcome is not Outcome.CLOSED:
-            continue
-        with mp.workdps(DIGITS):
-            # Near enough for Newton to stay in the assembly, far enough to have work to do.
-            start = rounded_pose(truth, mpf(10) ** -30)
-            h = mpf(10) ** -45
-            angle = elsewhere.turned(mpf(phi[-1]))
-            times = [-h, mpf(0), h]
-            joints = [
-                newton.joints(newton.solve(angle + t + mpf(alpha[-1]) * t * t / 2, start))
-                for t in times
-            ]
-            for j, joint in enumerate(mechanism.joints.values()):
-                before, now, after = (values[j] for values in joints)
-                scale = 1 if isinstance(joint, Turn) else max(abs(now), mpf(10) ** -30)
-                off = coefficient(truth, j, 0) - now
-                off = elsewhere.turned(off) if isinstance(joint, Turn) else off
-                assert abs(off) < 1e-35 * scale
-                velocity, acceleration = (coefficient(truth, j, k) for k in (1, 2))
-                size = abs(velocity) + abs(acceleration) + scale
-                assert abs(velocity - (after - before) / (2 * h)) < 1e-15 * size
-                assert abs(acceleration - (after - 2 * now + before) / h**2) < 1e-6 * size
-
-
-def rounded_pose(truth: Truth, error: mpf) -> dict[str, tuple[mpf, ...]]:
-    """Return angle and place of all links, and all slides, with an error."""
-    motion = truth.motion
-    unit = mpf(2) ** motion.constants.exponent
-    pose: dict[str, tuple[mpf, ...]] = {}
-    for link in motion.mechanism.links:
-        if link != GROUND:
-            direction = motion.unit[link][0]
-            x, y = (as_mpf(part) * unit for part in _parts(motion.origin[link][0]))
-            angle = mp.atan2(*(as_mpf(part) for part in reversed(_parts(direction))))
-            pose[link] = (angle + error, x + error * unit, y - error * unit)
-    for name in motion.mechanism.sliders:
-        pose[name] = (as_mpf(_parts(motion.slide[name][0])[0]) * unit,)
-    return pose
-
-
-def _parts(ball: Any) -> tuple[Any, Any]:
-    return (ball.real, ball.imag)

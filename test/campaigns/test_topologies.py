@@ -34,6 +34,8 @@ from linkage_ros.kinematics import Closure, InputRange, SingularInput, Status
 import numpy as np
 import pytest
 
+from ..support.sampling import sample_count
+
 SEED = 20261122
 """Another seed than the campaign's, whose findings are fixed."""
 
@@ -54,6 +56,7 @@ def notes_of(tally: Tally, family: str, test: str) -> str:
     )
 
 
+@pytest.mark.sample(0)
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', FAMILIES)
@@ -66,6 +69,7 @@ def test_the_kinematics_have_no_findings(
     assert {*tally.errors} == {*QUANTITIES}
 
 
+@pytest.mark.sample(0)
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('test', [CHECK, CHECK_ALTERED, FILE])
@@ -78,7 +82,11 @@ def test_commands_succeed_or_refuse_in_one_line(
 
 
 def test_the_result_does_not_depend_on_the_number_of_processes() -> None:
-    work = parts(SEED, {KINEMATICS: 6, CHECK: 4}, ['RRR moving–ground', 'RPR input–ground'])
+    work = parts(
+        SEED,
+        {KINEMATICS: sample_count(6, 2), CHECK: sample_count(4, 1)},
+        ['RRR moving–ground', 'RPR input–ground'],
+    )
     alone, shared = run(work, jobs=1), run(work[::-1], jobs=2)
     for test, families in alone.items():
         for family, tally in families.items():

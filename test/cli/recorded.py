@@ -136,7 +136,7 @@ class Recorded:
                 for name, message in zip(self._extras, tick.extras, strict=bool(tick.extras)):
                     if message:
                         self._write(index, name, now, stamp, message)
-            elif any(look.position for look in tick.full_states):
+            elif any(look.position for look in tick.states):
                 self._write(index, '/linkage/withheld', now, stamp, time_message(stamp))
         counts = dict.fromkeys(self._numbers, 0) | dict(dropped or {})
         self._writer.close({'linkage_ros.dropped': json.dumps(counts)})

@@ -101,7 +101,7 @@ def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
         assert pipeline.offer(joint_message('rocker_joint', stamp, value, 0.0), stamp) is None
     found = pipeline.tick(SECOND + MS)
     assert found.message
-    (rate,) = found.full_states[0].crank.rates
+    (rate,) = found.states[0].crank.rates
     cranks = [
         LINKAGE.driven_by('rocker_joint', branch=1).position(y)['crank_joint']
         for y in (end - 1e-3, end)

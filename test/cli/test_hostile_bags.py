@@ -200,7 +200,6 @@ COMMANDS = {
     'report': [],
     'replay': [],
     'recover': ['-o', 'recovered'],
-    'play': ['--rate', '1000'],
 }
 
 
@@ -308,7 +307,6 @@ TYPED = {
     'report': [[]],
     'export': [['-o', 'x.csv'], ['-o', 'y.csv', '--topic', '/joint_states']],
     'plot': [[]],
-    'play': [['--rate', '1000']],
     'recover': [['-o', 'recovered']],
     'replay': [
         [],

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
 import json
-from math import acos, cos, degrees, pi, remainder, sin, sqrt, tau
+from math import acos, cos, pi, sin, sqrt
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -34,7 +34,7 @@ from rosbags.rosbag2 import (
     Writer as RosbagsWriter,
 )
 
-from .conftest import json_keys, Run
+from .conftest import json_keys
 from .recorded import (
     answer,
     BEGIN,
@@ -219,24 +219,6 @@ def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any)
 
 def test_json_has_the_documented_keys(bag: Path, tell: Any) -> None:
     assert set(tell(bag)) == json_keys('info')
-
-
-def test_a_person_reads_the_same(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert answer(info, bag) == 0
-    lines = [' '.join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert 'duration 1.499000000 s' in lines
-    assert 'dropped 3' in lines
-    assert 'run again 1500 of 1500 joint states give the recorded bytes' in lines
-    assert f'/crank_states {JOINT_STATE} 1500 1000 0 best effort' in lines
-    least = min(range(1500), key=lambda k: transmission(1.0 + 0.007 * k, A, B, C, D))
-    angle = remainder(1.0 + 0.007 * least, tau)
-    mu = transmission(angle, A, B, C, D)
-    # Samples and joint states are logged a quarter of a millisecond after what they tell of.
-    assert (
-        f'nearest toggle conditioning {sqrt(2) * sin(mu / 2):.4g}, '
-        f'transmission angle {degrees(mu):.3f}°, at {least * 1e-3 - 0.00025:+.6f} s, '
-        f'crank_joint {degrees(angle):.3f}°'
-    ) in lines
 
 
 def test_the_file_alone_says_what_the_folder_says(bag: Path, tell: Any) -> None:
@@ -446,17 +428,6 @@ def test_what_is_no_bag_is_answered_in_a_line(tmp_path: Path) -> None:
         with pytest.raises(LinkageError, match=reason) as caught:
             answer(info, tmp_path / name)
         assert '\n' not in str(caught.value)
-
-
-def test_from_the_command_line(linkage: Run, bag: Path) -> None:
-    found = linkage('info', str(bag))
-    assert (found.returncode, found.stderr) == (0, '')
-    assert found.stdout.startswith(f'{bag}\n')
-    missing = linkage('info', 'gone')
-    assert missing.returncode == 2
-    assert missing.stderr.splitlines() == [
-        'linkage info: gone: does not exist; name the folder of a bag, or its file'
-    ]
 
 
 @pytest.mark.parametrize(('beyond', 'states', 'limited'), [('publish', 10, 4), ('silent', 6, 0)])

@@ -30,13 +30,10 @@ from linkage_ros.messages import JointStateWriter
 from linkage_ros.node import RunRecording
 from linkage_ros.replay import (
     Comparison,
-    recorded_scene,
-    replay_ticks as replayed,
     TickPlace,
     ulp_distance,
     versions_here,
 )
-from linkage_ros.resources import shipped_path
 import pytest
 
 from .conftest import json_keys, json_keys_of, Run
@@ -610,34 +607,3 @@ def test_deviations_are_those_of_all_messages():
     assert crank.at == TickPlace(4, 4)
     slide = found.topics[0].deviations['slide', 'position']
     assert (slide.compared, slide.differing, slide.rms) == (4, 0, 0.0)
-
-
-# A run whose solver was chosen by an accuracy.
-
-
-@pytest.mark.ros
-def test_a_solver_that_was_chosen_is_not_chosen_again(
-    linkage: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Choosing takes times, and another machine, or another hour, has others.
-    (tmp_path / 'scene.yaml').write_text(
-        f'linkage: {shipped_path("linkages/class_3.yaml")}\ndrive: '
-        f'{{constant_rate: {{rate: 2.0}}}}\n'
-        'accuracy: 1.0e-6\nrecord: {name: run}\n'
-    )
-    ran = linkage('run', 'scene.yaml', '--seconds', '1', '--plain')
-    assert ran.returncode == 0, ran.stderr
-    bag = read_bag(tmp_path / 'runs' / 'run')
-    chosen = json.loads(bag.attachments['run.json'])['solver']
-    assert list(chosen['']) == ['table'], 'of class III it is forty times as fast'
-
-    def again(*_: object) -> None:
-        pytest.fail('chosen again')
-
-    monkeypatch.setattr('linkage_ros.solvers.choose.choose_solver', again)
-    ticks = list(replayed(bag, recorded_scene(bag)))
-    assert len(ticks) > 100
-    assert [tick.tick.message for tick in ticks] == [tick.recorded for tick in ticks]
-    answer = linkage('replay', 'runs/run')
-    assert answer.returncode == 0
-    assert 'identical' in answer.stdout

@@ -224,7 +224,7 @@ def test_a_command_ends_whose_output_nobody_reads(folder) -> None:
     process = start(
         folder,
         'import sys; from linkage_ros.cli.main import main; sys.exit(main())',
-        *('solve', 'four.yaml', '--steps', '5000', '--format', 'csv'),
+        *('solve', 'four.yaml', '--steps', '5000', '--csv'),
     )
     try:
         wait_until_it_sleeps(process)
@@ -263,7 +263,6 @@ MESSAGES = 30_000  # in a chunk
 COMMANDS = {
     'info': ([], 'linkage info: stopped\n'),
     'replay': ([], 'linkage replay: stopped\n'),
-    'play': ([], 'linkage play: stopped\n'),
     'plot': ([], 'linkage plot: stopped\n'),
     'report': (['-o', 'x.html'], 'linkage report: stopped\n'),
     'export': (['-o', 'x.csv'], 'linkage export: stopped; nothing was written\n'),

@@ -24,7 +24,7 @@ from .conftest import Run
 
 
 def solved(linkage: Run, *arguments: str) -> list[dict[str, str]]:
-    answer = linkage('solve', *arguments, '--format', 'csv')
+    answer = linkage('solve', *arguments, '--csv')
     assert answer.returncode == 0, answer.stderr
     return list(csv.DictReader(io.StringIO(answer.stdout)))
 
@@ -103,7 +103,7 @@ def test_links_that_are_then_iterated_are_named(linkage: Run, tmp_path: Path) ->
     asked = [
         word for name in (*joints, f'motor2={pose.inputs[2]!r}') for word in ('--joint', name)
     ]
-    answer = linkage('solve', 'arms.yaml', '--radians', '--format', 'csv', *asked)
+    answer = linkage('solve', 'arms.yaml', '--radians', '--csv', *asked)
     assert answer.stderr.startswith('linkage solve: note: with elbow0, elbow1, motor2 as inputs ')
     assert answer.stderr.endswith(' are solved by iteration, from the pose of the file\n')
     (row,) = csv.DictReader(io.StringIO(answer.stdout))
@@ -119,7 +119,7 @@ def test_table_and_json_hold_the_same(linkage: Run) -> None:
         'branch', 'crank_joint', '[rad]', 'status',
         'rocker_joint', '[rad]', 'coupler_joint', '[rad]',
     ]  # fmt: skip
-    states = json.loads(linkage('solve', *asked, '--format', 'json').stdout)['states']
+    states = json.loads(linkage('solve', *asked, '--json').stdout)['states']
     assert [state['branch'] for state in states] == [1, 2]
     for line, state in zip(table[1:], states, strict=True):
         assert float(line.split()[1]) == pytest.approx(state['crank_joint'], abs=1e-6)

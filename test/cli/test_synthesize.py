@@ -87,12 +87,6 @@ def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> N
     assert re.search(r'published +[1-9]\d* joint states', ran.stdout)
 
 
-def test_a_file_without_defects_is_named_alone(linkage: Run) -> None:
-    pairs = ['--pair', '50', '100', '--pair', '80', '110', '--pair', '110', '125']
-    made = linkage('synthesize', *pairs, '-o', 'sound.yaml')
-    assert made.stdout.splitlines()[-1] == 'sound.yaml'
-
-
 def test_a_negative_length_is_told_as_the_reversed_link_that_it_means(
     linkage: Run, tmp_path: Path
 ) -> None:
@@ -204,25 +198,6 @@ def test_three_poses_are_met_exactly(linkage: Run, tmp_path: Path) -> None:
     assert (tmp_path / 'poses.yaml').exists()
 
 
-def test_what_is_not_met_is_said_with_the_nearest_and_nothing_is_written(
-    linkage: Run, tmp_path: Path
-) -> None:
-    made = linkage(
-        'synthesize',
-        *SOURCE_003,
-        '--need',
-        'crank-rocker',
-        '--min-transmission',
-        '30',
-        *('-o', 'x.yaml'),
-    )
-    assert made.returncode == 1
-    assert made.stdout.startswith('None of 1 solution(s) has what is needed. Nearest to it:')
-    for words in ('branch defect', 'not crank-rocker', 'not 30°'):
-        assert words in made.stdout
-    assert not (tmp_path / 'x.yaml').exists()
-
-
 IN_DEGREES = {
     'pairs': SOURCE_003,
     'pairs with free zeros': [
@@ -273,60 +248,6 @@ def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
     first = float(proof(radians_.stdout)[0][1])
     assert degrees(first) == pytest.approx(float(proof(degrees_.stdout)[0][1][:-1]), abs=1e-3)
     assert 'off [rad]' in radians_.stdout or kind == 'a timed curve'
-
-
-def test_an_error_in_radians_is_told_in_radians(linkage: Run) -> None:
-    pairs = ['--pair', '0.5', '1', '--pair', '0.5', '2', '--pair', '1', '1.5']
-    answer = linkage('synthesize', '--radians', *pairs)
-    assert answer.returncode == 2
-    assert 'rocker at 1 rad and at 2 rad for the same crank angle, 0.5 rad' in answer.stderr
-
-
-WRONG = [
-    # what is typed, what the answer names
-    ([], 'the task: is not given; name one of --pair'),
-    (['--pair', '1', '2'], 'pairs: there are 1; three make a four-bar'),
-    ([*SOURCE_003, *POSES], '--pair and --pose: stand for two tasks'),
-    (['--pair', '25', '30', '--pair', '25', '30', '--pair', '1', '2'], 'pairs 1 and 2: are the'),
-    (['--pair', '25', '30', '--pair', '385', '30', '--pair', '1', '2'], 'pairs 1 and 2'),
-    (['--pair', '0', '0', '--pair', '20', '20', '--pair', '40', '40'], 'pairs'),
-    (['--pair', '0', '0', '--pair', '20', 'nan', '--pair', '40', '40'], 'pair 2'),
-    ([*SOURCE_003, '--ground', '-1'], 'ground: -1.0 m is not a length; give it one from 1e-12 to'),
-    *(([*SOURCE_003, '--ground', each], 'ground: ') for each in ('0', '1e-320', '1e10', 'nan')),
-    ([*SOURCE_003, '--need', 'crankrocker'], "did you mean 'crank-rocker'?"),
-    ([*SOURCE_003, '--min-transmission', 'nan'], 'transmission angle: nan° is not in'),
-    ([*SOURCE_003, '--max-link-ratio', '0.5'], 'link ratio: 0.5 is not a ratio'),
-    ([*SOURCE_003, '--best', '0'], '0 is not between 1 and 9.0072e+15'),
-    ([*SOURCE_003, '-o', 'no/such/folder/x.yaml'], 'no/such/folder'),
-    ([*SOURCE_003, '-o', 'x.yaml', '--pick', '2'], '--pick 2: there are 1 solution(s)'),
-    ([*SOURCE_003, '--draw', 'x.xyz'], 'x.xyz'),
-    (['--pairs', 'nothing.csv'], 'nothing.csv: cannot be read'),
-    (['--pairs', 'bad.csv'], 'line 3'),
-    (LOG, '--crank-range is missing'),
-    (['--function', '__import__("os")', '--range', '1', '2', *RANGES], '__import__'),
-    (['--function', 'log10(x)', '--range', '-1', '2', *RANGES], 'is not defined from x = -1 to 0'),
-    (['--function', 'log10(x)', '--range', '1', '1', *RANGES], 'range'),
-    (['--function', '1', '--range', '1', '2', *RANGES], 'function'),
-    ([*LOG, *RANGES, '--points', '2'], 'three make a four-bar'),
-    ([*LOG, *RANGES, '--at', '1', '1.5', '3'], '3'),
-    (['--point', '0', '0', '--point', '1', '0'], 'point'),
-    (['--point', '0', '0', '--point', '1', '0', '--point', '1', 'x'], 'x'),
-    (POSES, 'no pivots are given'),
-    ([*POSES, '--moving-pivot', '0', '0'], '--moving-pivot: was given 1 time(s)'),
-    ([*POSES[:8], *MOVING], 'poses'),
-    ([*POSES[:8], *POSES[:4], *MOVING], 'poses 1 and 3'),
-]
-
-
-@pytest.mark.parametrize(('typed', 'named'), WRONG, ids=[' '.join(row[0]) or '-' for row in WRONG])
-def test_wrong_input_is_answered_in_a_line(
-    linkage: Run, tmp_path: Path, typed: list[str], named: str
-) -> None:
-    (tmp_path / 'bad.csv').write_text('crank,rocker\n25,30\n35\n')
-    answer = linkage('synthesize', *typed)
-    assert answer.returncode == 2
-    assert named in answer.stderr
-    assert 'Traceback' not in answer.stderr
 
 
 def test_a_search_shows_how_far_it_is(tmp_path: Path) -> None:

@@ -18,9 +18,9 @@ from linkage_ros.cli import (
     fold_table,
     print_tables,
     show_progress,
+    Table,
     table_text,
     terminal,
-    TerminalTable,
 )
 import pytest
 
@@ -29,17 +29,17 @@ from .conftest import on_terminal
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 
 
-def words(tables: list[TerminalTable]) -> list[str]:
+def words(tables: list[Table]) -> list[str]:
     return sorted(' '.join(map(table_text, tables)).split())
 
 
 def test_a_table_that_fits_stays_as_it_is():
-    table = TerminalTable('title', ['a', '>b'], [['x', '1']])
+    table = Table('title', ['a', '>b'], [['x', '1']])
     assert fold_table(table, 80) == [table]
 
 
 def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
-    table = TerminalTable('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
+    table = Table('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
     (part,) = fold_table(table, 30)
     assert table_text(part).splitlines() == [
         'one  some words that are',
@@ -51,7 +51,7 @@ def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
 def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
     heads = ['>crank [°]', *(f'>joint_{i} [°]' for i in range(8))]
     rows = [[f'{row}.5', *(f'{row}{i}.123456' for i in range(8))] for row in range(3)]
-    parts = fold_table(TerminalTable('title', heads, rows), 50)
+    parts = fold_table(Table('title', heads, rows), 50)
     assert len(parts) > 1
     assert [part.title for part in parts] == ['title', *[''] * (len(parts) - 1)]
     for part in parts:
@@ -63,7 +63,7 @@ def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
 
 def test_no_word_is_broken():
     path = '/a/path/that/is/longer/than/the/terminal.yaml'
-    table = TerminalTable(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
+    table = Table(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
     parts = fold_table(table, 20)
     assert set(words(parts)) == set(words([table]))
 
@@ -81,7 +81,7 @@ def test_no_line_of_a_wide_table_is_wider_than_the_terminal(tmp_path, columns):
 
 
 def test_in_a_pipe_each_row_is_one_line(capsys):
-    print_tables(TerminalTable('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
+    print_tables(Table('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
     assert len(capsys.readouterr().out.splitlines()) == 3
 
 

@@ -30,8 +30,7 @@ OF_SCENES = {
     'mjcf': '', 'view': '-o x.html', 'accuracy': '--quick',
 }  # fmt: skip
 OF_BAGS = {
-    'plot': '-o x.svg', 'info': '', 'report': '-o x.html', 'export': '-o x.csv', 'play': '',
-    'replay': '',
+    'plot': '-o x.svg', 'info': '', 'report': '-o x.html', 'export': '-o x.csv', 'replay': '',
 }  # fmt: skip
 WITH_BAGS_TOO = {'accuracy', 'animate', 'view'}
 

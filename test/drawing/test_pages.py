@@ -187,5 +187,5 @@ def test_the_effect_that_the_page_has_for_an_example_works(monkeypatch):
         'effects: {saturation: {largest: 0.5}}\n'
     )
     pipeline = Pipeline(scene_of(text))
-    read = [pipeline.tick(second * 10**9).full_states[0].reading.joints[0] for second in range(3)]
+    read = [pipeline.tick(second * 10**9).states[0].reading.joints[0] for second in range(3)]
     assert read == [0.0, 0.5, 0.5]

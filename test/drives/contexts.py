@@ -37,7 +37,7 @@ def readings(built: Pipeline, *times: int) -> list[tuple[float, float]]:
     """Return value and rate of the input, which is published first, at times in [ns]."""
     found = []
     for time in times:
-        reading = built.tick(time).full_states[0].reading
+        reading = built.tick(time).states[0].reading
         assert reading is not None
         found.append((reading.joints[0], reading.rates[0]))
     return found

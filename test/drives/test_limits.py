@@ -102,7 +102,7 @@ def test_what_is_refused_when_the_scene_is_built(name):
     if not expected:
         built = pipeline(drive, four_bar(limits))
         for index in range(4000):
-            (look,) = built.tick(BEGIN + index * MS).full_states
+            (look,) = built.tick(BEGIN + index * MS).states
             assert look.position.status is Status.CLOSED
         return
     with pytest.raises(FileError) as error:

@@ -216,7 +216,7 @@ def test_a_scene_takes_the_messages_of_a_broadcaster_without_velocities(
             stamp=divmod(stamp, SECOND),
         )  # fmt: skip
         assert scene.offer(message, stamp) is GOOD
-    crank = scene.tick(stamp + 5 * MS).full_states[0].crank
+    crank = scene.tick(stamp + 5 * MS).states[0].crank
     assert crank.angles[0] == pytest.approx(1.05 if carry == 'true' else 1.04, abs=1e-12)
     if carry == 'true' or 'velocity' in effects:
         assert crank.rates[0] == pytest.approx(2.0, rel=1e-9)

@@ -368,11 +368,11 @@ def scene(drive_text, effects=''):
 def test_a_scene_is_driven_by_commands():
     pipeline = scene('{start: 0.5, rate: 0}')
     assert pipeline.topic == TOPIC
-    first = pipeline.tick(BEGIN).full_states[0].reading
+    first = pipeline.tick(BEGIN).states[0].reading
     assert first.joints[0] == 0.5, 'the input is published first'
     message = serialized(['other', 'crank_joint'], efforts=[9.0, 0.02])
     assert pipeline.offer(message, BEGIN) is GOOD
-    moved = pipeline.tick(BEGIN + 100 * MS).full_states[0].reading
+    moved = pipeline.tick(BEGIN + 100 * MS).states[0].reading
     assert moved.joints[0] > 0.6
     assert moved.rates[0] > 1.0
     spoilt = serialized(['crank_joint'], efforts=[nan])

@@ -331,6 +331,6 @@ def test_the_squeezer_ends_where_the_test_set_says(method, step):
     linkage = (LINKAGES / 'andrews_squeezer.yaml').read_bytes()
     (line,) = pipeline_of(text, linkage).linkages
     for tick in range(31):
-        seen = line.compute_state(BEGIN + tick * MS)
+        seen = line.interpret(BEGIN + tick * MS)
     found = dict(zip(line.scene_linkage.joint_names, seen.reading.joints, strict=True))
     assert found == pytest.approx(SQUEEZED, abs=1e-8)

@@ -232,7 +232,7 @@ loads: {{LOADS}}
     closure, touched = Closure(shipped('four_bar')), 0
     for index in range(0, 1000, 20):
         now = BEGIN + 1_000_000 * index
-        one, other = (pipeline.tick(now).full_states[0] for pipeline in (into, free))
+        one, other = (pipeline.tick(now).states[0] for pipeline in (into, free))
         assert one.reading.joints == other.reading.joints
         assert one.reading.rates == other.reading.rates
         rocker, rate = one.reading.joints[2], one.reading.rates[2]

@@ -79,7 +79,7 @@ def test_a_torque_on_the_rocker_and_a_force_on_the_coupler(angle, masses):
         '  forces: {coupler.P: {direction: [0.6, -0.8], constant: 20}}\n',
         linkage + masses,
     )
-    (look,) = pipeline.tick(SECOND).full_states
+    (look,) = pipeline.tick(SECOND).states
     a, b = four_bar_at(angle)
     place = a + complex(0.06, 0.03) * (b - a) / B
     torque, pins = statics(angle, -1.5, 20 * complex(0.6, -0.8), place)
@@ -99,7 +99,7 @@ def test_the_drive_moves_its_own_inertia_and_nothing_else():
     pipeline.tick(SECOND)
     assert pipeline.offer(joint_state(['crank_joint'], [], [], [effort]), SECOND) is None
     for index in range(1, 50):
-        (look,) = pipeline.tick(SECOND + index * 10**6).full_states
+        (look,) = pipeline.tick(SECOND + index * 10**6).states
         seconds = index / 1000
         # The start, and half of effort over inertia times the time squared.
         assert look.crank.angles[0] == pytest.approx(0.5 + 0.5 * effort / 0.02 * seconds**2)

@@ -304,7 +304,7 @@ def read(drive, commands=(), ticks=200, loads=''):
         for tick, effort in commands:
             if tick == index:
                 assert linkage.drive.offer(EffortCommand(0, effort), now) is None
-        reading = linkage.compute_state(now).reading
+        reading = linkage.interpret(now).reading
         found.append((*linkage.drive.motor[:2], reading.joints[0], reading.rates[0]))
     return found
 

@@ -43,7 +43,7 @@ def crank_after(pipeline, messages, milliseconds):
         while waiting and waiting[0][0] <= tick:
             time, wrench = waiting.pop(0)
             assert topic.offer_wrench(wrench_stamped(*wrench), BEGIN + round(time * MS)) is None
-        crank = pipeline.tick(BEGIN + tick * MS).full_states[0].crank
+        crank = pipeline.tick(BEGIN + tick * MS).states[0].crank
     return crank.angles[0], crank.rates[0]
 
 
@@ -250,7 +250,7 @@ def test_the_effort_of_a_crank_that_is_held_contains_a_wrench_until_it_is_too_ol
                 pipeline.wrenches[0].offer_wrench(wrench_stamped(3, 2, 0.5), BEGIN + 10 * MS)
                 is None
             )
-        efforts.append(pipeline.tick(BEGIN + tick * MS).full_states[0].reading.efforts[0])
+        efforts.append(pipeline.tick(BEGIN + tick * MS).states[0].reading.efforts[0])
     assert efforts == pytest.approx([0.0] * 10 + [-1.5] * 10 + [0.0] * 20, abs=1e-14)
 
 

@@ -36,7 +36,7 @@ def published(effects, ticks=100, seed=0, rate=10.0):
     pipeline = pipeline_of(f'seed: {seed}\neffects: {{velocity: {{}}, {effects}}}')
     crank = JointStateWriter(['crank_joint']).write(BEGIN, [0.5], [rate], [])
     assert pipeline.offer(crank, BEGIN) is None
-    return [pipeline.tick(BEGIN + i * MS).full_states[0].reading for i in range(ticks)]
+    return [pipeline.tick(BEGIN + i * MS).states[0].reading for i in range(ticks)]
 
 
 def chi_square(total, n):

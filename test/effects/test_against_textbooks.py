@@ -114,7 +114,7 @@ def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
     for effects in ('', f', friction: {{joints: {{{joints}}}}}'):
         built = pipeline('slider_crank', f'{DRIVE}effects: {{effort: {{}}{effects}}}')
         ticks = [built.tick(BEGIN + index * 7 * MS) for index in range(40)]
-        efforts.append([tick.full_states[0].reading.efforts[0] for tick in ticks])
+        efforts.append([tick.states[0].reading.efforts[0] for tick in ticks])
     for index, (bare, rubbed) in enumerate(zip(*efforts, strict=True)):
         t = mpf(7 * index) / 1000
         rate = mp.diff(crank, t)
@@ -143,7 +143,7 @@ def test_a_link_that_stretches_makes_the_four_bar_of_the_longer_link(link):
             f'drive: {{constant_rate: {{rate: {rate}, start: {at}}}}}\n'
             f'effects: {{compliance: {{links: {{{link}: {stiffness}}}}}}}'
         )
-        reading = pipeline('four_bar', scene).tick(BEGIN).full_states[0].reading
+        reading = pipeline('four_bar', scene).tick(BEGIN).states[0].reading
         stretched = FourBar(drawn, (at, rate, pull), GRAVITY)
         if link == 'coupler':
             stretched.b += tension / stiffness

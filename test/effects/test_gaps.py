@@ -63,7 +63,7 @@ def pipeline(effects, drive=SINE, faults=''):
 def run(effects, ticks=4000):
     """Return for each tick, 1 ms apart, what is read."""
     work = pipeline(effects)
-    return [work.tick(BEGIN + i * MS).full_states[0].reading for i in range(ticks)]
+    return [work.tick(BEGIN + i * MS).states[0].reading for i in range(ticks)]
 
 
 @pytest.mark.parametrize('velocity', ['', 'velocity: {}, '], ids=['', 'with rates'])
@@ -107,7 +107,7 @@ def test_a_topic_that_pauses_leaves_a_gap_that_arrives_a_delay_later():
         now = BEGIN + i * MS
         if i < 200 or i >= 400:
             assert work.offer(write(now, [0.8 + 1e-4 * i], [0.1], []), now) is None
-        found = work.tick(now).full_states[0].reading
+        found = work.tick(now).states[0].reading
         stamps += [] if found is None else [(found.stamp - BEGIN) // MS]
     # The last sample, of 199 ms, is carried forward for 50 ms; the next comes at 400 ms.
     assert stamps == [*range(250), *range(400, 580)]
@@ -144,7 +144,7 @@ def test_freeze_over_an_open_loop_publishes_the_last_state():
     for i in range(3000):
         if i == 100:
             work.injection.switch_fault('hang', on=True)
-        found.append(work.tick(BEGIN + i * MS).full_states[0].reading)
+        found.append(work.tick(BEGIN + i * MS).states[0].reading)
     posed = [closes(crank_at(BEGIN + i * MS)) for i in range(len(found))]
     assert all(posed[:100])
     assert not all(posed)
@@ -216,7 +216,7 @@ def test_the_shipped_double_rocker_opens_and_arrives_whole():
     # The case that was met: of 1,178 messages 551 had stamps at which there was no pose.
     scene = f'rate: 1000\n{SINE}effects: {{delay: {{seconds: 0.1, stamp: measured}}}}\n'
     work = pipeline_of(scene, (LINKAGES / 'double_rocker.yaml').read_bytes())
-    looks = [work.tick(BEGIN + i * MS).full_states[0] for i in range(4000)]
+    looks = [work.tick(BEGIN + i * MS).states[0] for i in range(4000)]
     posed = {BEGIN + i * MS for i, look in enumerate(looks) if look.position.joints}
     stamps = [look.reading.stamp for look in looks if look.reading is not None]
     assert stamps == sorted(time for time in posed if time <= BEGIN + 3899 * MS)
@@ -226,5 +226,5 @@ def test_accelerations_arrive_with_their_reading_whether_the_linkage_has_a_pose_
     work = pipeline('acceleration: {}, delay: {seconds: 0.1}')
     ticks = [work.tick(BEGIN + i * MS) for i in range(2000)]
     arrived = [tick for tick in ticks if tick.message]
-    assert any(not tick.full_states[0].position.joints for tick in arrived)
+    assert any(not tick.states[0].position.joints for tick in arrived)
     assert all(tick.extras and tick.extras[0] for tick in arrived)

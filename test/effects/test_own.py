@@ -139,7 +139,7 @@ def scene_file(folder, effects):
 def joints(file, second=0):
     pipeline = Pipeline(load_scene(file))
     for now in range(second + 1):
-        (look,) = pipeline.tick(now * SECOND).full_states
+        (look,) = pipeline.tick(now * SECOND).states
     return look.reading.joints
 
 
@@ -203,7 +203,7 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
     (linkage,) = pipeline.linkages
     assert linkage.effect_names == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
-    (look,) = pipeline.tick(0).full_states
+    (look,) = pipeline.tick(0).states
     assert look.reading.rates == ()
     assert pipeline.extras == []
     force = look.motion.reactions[0].fx
@@ -385,7 +385,5 @@ def test_the_node_writes_it_into_its_bag(tmp_path, package):
     run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
-    files = run_recording._make_attachments(
-        scene, [], 'with the run', Pipeline(scene).linkages, tmp_path
-    )
+    files = run_recording._make_attachments(scene, [], 'with the run', tmp_path)
     assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)

@@ -93,7 +93,7 @@ def test_a_broken_link_leaves_no_pose():
     looks = []
     for time in TIMES:
         pipeline.injection.advance(BEGIN + time * MS)
-        looks += pipeline.tick(BEGIN + time * MS).full_states
+        looks += pipeline.tick(BEGIN + time * MS).states
     assert [look.position.status for look in looks] == [
         Status.CLOSED, Status.CLOSED, Status.INDETERMINATE, Status.INDETERMINATE,
         Status.CLOSED, Status.CLOSED,
@@ -115,7 +115,7 @@ def test_not_a_number_is_refused_and_the_last_good_sample_carried_forward():
     assert refused == [None, None, why, why, None, None]
     for message in published:
         assert not any(map(isnan, ROCKER.read(message).angles))
-    crank = [look.crank.angles[0] for look in pipeline.tick(BEGIN + 60 * MS).full_states]
+    crank = [look.crank.angles[0] for look in pipeline.tick(BEGIN + 60 * MS).states]
     assert crank == [pytest.approx(2.03)]
 
 

@@ -9,33 +9,22 @@
 """
 The truth that the kinematics are measured against, to as many digits as a test asks for.
 
-Nothing here is taken from the package. A loop is solved in coordinates, by intersecting circles
-(or a circle with a line), and differentiated implicitly: with the unit complex numbers of its
-links, the derivative of its closing equation is linear in what is sought, for every input and for
-the crank's rate alike. Coordinates cancel near a change point; digits are cheap, so they may.
+It is the campaign's: a dyad in power series of balls (`campaigns.accuracy.reference`), which
+`test/study/test_enclosure.py` compares with the constraints in all families.
 
 An error is stated in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over the lengths and
 the crank's direction within (-π, π]: what rounding inputs and result once may cause by itself.
 """
 
 from dataclasses import dataclass
+from math import inf, pi
 from typing import Any, NamedTuple
 
+from campaigns.accuracy import adversarial
+from campaigns.accuracy.mechanism import Mechanism
+from campaigns.accuracy.reference import condition_numbers, Outcome, Reference
 from linkage_ros.kinematics import Status
-from mpmath import mp, mpc, mpf
-
-# The reference of the kinematics tests, with any number of digits.
-#
-# Nothing here is taken from the package. A loop is solved in coordinates, by intersecting
-# circles (or a circle with a line), and differentiated implicitly: with the unit complex numbers
-# of its links, the derivative of its closing equation is linear in the unknowns, for every
-# input and for the crank's rate alike. Coordinates cancel near a change point; this is harmless,
-# since the number of digits is free.
-#
-# An error is given in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over the lengths
-# and the crank's direction within (-π, π]: the error that rounding inputs and result once may
-# cause by itself.
-
+from mpmath import mp, mpf
 
 UNIT_ROUNDOFF = 2.0**-53
 DIGITS = 50
@@ -44,8 +33,8 @@ DIGITS = 50
 class Quantity(NamedTuple):
     """A correct value and its condition number κ; infinite where the value has no derivative."""
 
-    value: mpf
-    condition: mpf
+    value: Any
+    condition: float
 
     def error_of(self, computed: float) -> float:
         """Return the error of a length or rate in units of u·κ."""
@@ -73,150 +62,84 @@ def turned(angle: mpf) -> mpf:
 @dataclass(frozen=True, slots=True)
 class FourBar:
     """
-    A four-bar at one crank direction; angles from the ground O→D.
+    A four-bar at one crank direction; angles from the ground O→D, the crank turns at 1 rad/s.
 
-    ``gap`` is what coupler and rocker miss each other by (0: they meet), ``cross`` AB × DB; the
-    rest is None where they miss, and rates are None where cross is 0.
+    ``gap`` is what coupler and rocker miss each other by (0: they meet). The rest is None where
+    they miss; at a toggle κ is infinite, and there are no rates.
     """
 
     gap: mpf
-    cross: mpf
     coupler: Quantity | None = None
     rocker: Quantity | None = None
     coupler_rate: Quantity | None = None
     rocker_rate: Quantity | None = None
-
-
-def four_bar(a: Any, b: Any, c: Any, d: Any, phi: Any, side: int, digits: int = DIGITS) -> FourBar:
-    """
-    Solve crank a, coupler b, rocker c on ground d by intersecting the circles about A and D.
-
-    The crank is at φ in [rad]; B lies left of A→D if the side is +1. It works with so many digits.
-    """
-    with mp.workdps(digits):
-        a, b, c, d, phi = map(mpf, (a, b, c, d, phi))
-        crank_unit = mp.expj(phi)
-        diagonal = d - a * crank_unit
-        s = abs(diagonal)
-        gap = max(abs(b - c) - s, s - (b + c))
-        if gap > 0:
-            return FourBar(gap, mpf(0))
-        foot = (s * s + b * b - c * c) / (2 * s)
-        height = mp.sqrt((b + c - s) * (b + c + s) * (s - abs(b - c)) * (s + abs(b - c))) / (2 * s)
-        coupler = diagonal / s * mpc(foot, side * height)
-        rocker = coupler - diagonal
-        cross = _cross(coupler, rocker)
-        if cross == 0:
-            poses = [Quantity(mp.arg(link), mp.inf) for link in (coupler, rocker)]
-            return FourBar(mpf(0), cross, *poses)
-        # a·e^iφ + b·e^iθ3 − c·e^iθ4 − d = 0, of which one partial derivative after the other:
-        coupler_unit, rocker_unit = coupler / b, rocker / c
-        inputs = (turned(phi), a, b, c, d)
-        partials = (1j * a * crank_unit, crank_unit, coupler_unit, -rocker_unit, mpc(-1))
-        slopes = [_two_links(coupler, rocker, 1j * partial) for partial in partials]
-        rates = slopes[0]
-        # b·e^iθ3·θ3' − c·e^iθ4·θ4' = −a·e^iφ, and that by each input again:
-        crank_slopes = (1j * a * crank_unit, crank_unit, 0, 0, 0)
-        rate_slopes = []
-        for i, (slope3, slope4) in enumerate(slopes):
-            coupler_slope = 1j * coupler * slope3 + (coupler_unit if i == 2 else 0)
-            rocker_slope = 1j * rocker * slope4 + (rocker_unit if i == 3 else 0)
-            rest = -crank_slopes[i] - coupler_slope * rates[0] + rocker_slope * rates[1]
-            rate_slopes.append(_two_links(coupler, rocker, rest))
-        return FourBar(
-            mpf(0),
-            cross,
-            _quantity(mp.arg(coupler), inputs, [slope[0] for slope in slopes]),
-            _quantity(mp.arg(rocker), inputs, [slope[1] for slope in slopes]),
-            _quantity(rates[0], inputs, [slope[0] for slope in rate_slopes]),
-            _quantity(rates[1], inputs, [slope[1] for slope in rate_slopes]),
-        )
+    coupler_acceleration: Quantity | None = None
+    rocker_acceleration: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class SliderCrank:
-    """An inverted slider-crank at one crank direction; None where there is a gap."""
+    """An inverted slider-crank, as `FourBar`."""
 
     gap: mpf
     rod: Quantity | None = None
     slide: Quantity | None = None
     rod_rate: Quantity | None = None
     slide_rate: Quantity | None = None
+    rod_acceleration: Quantity | None = None
+    slide_acceleration: Quantity | None = None
+
+
+def four_bar(
+    a: float, b: float, c: float, d: float, phi: float, side: int, digits: int = DIGITS
+) -> FourBar:
+    """Solve crank a, coupler b, rocker c on ground d; B lies left of A→D if the side is +1."""
+    return FourBar(*_solve(adversarial.four_bar((a, b, c, d), side), phi, digits))
 
 
 def inverted_slider_crank(
-    a: Any, d: Any, offset: Any, phi: Any, side: int, digits: int = DIGITS
+    a: float, d: float, offset: float, phi: float, side: int, digits: int = DIGITS
 ) -> SliderCrank:
     """
     Solve crank a, swivel D at d, and a rod whose line passes the crank pin A at an offset.
 
-    Parameters
-    ----------
-    a, d, offset
-        Lengths; offset is positive where the line passes left of A.
-    phi
-        Direction of the crank, in [rad].
-    side
-        +1: D lies ahead of A along the rod, -1: behind.
-    digits
-        To work with.
-
+    The offset is positive where the line passes left of A. If the side is +1, D lies ahead of A
+    along the rod, if -1, behind.
     """
+    mechanism = adversarial.inverted_slider_crank((a, d, offset), side)
+    return SliderCrank(*_solve(mechanism, phi, digits))
+
+
+def _solve(mechanism: Mechanism, phi: float, digits: int) -> list[Any]:
+    """Return the gap and, where the dyad closes, both joints, their rates and accelerations."""
+    reference = Reference(mechanism)
+    truth = reference.solve(phi, 0.0, 4 * digits)
     with mp.workdps(digits):
-        a, d, h, phi = map(mpf, (a, d, offset, phi))
-        crank_unit = mp.expj(phi)
-        diagonal = d - a * crank_unit
-        square = (diagonal * diagonal.conjugate()).real - h * h
-        if square < 0:
-            return SliderCrank(abs(h) - abs(diagonal))
-        r = side * mp.sqrt(square)
-        if r == 0:
-            # A straight rod on its swivel has no direction; a bent one stands across it.
-            rod = Quantity(mp.arg(diagonal / mpc(0, h)), mp.inf) if h else None
-            return SliderCrank(mpf(0), rod, Quantity(r, mp.inf))
-        # a·e^iφ + (r + ih)·e^iψ − d = 0
-        unit = diagonal / mpc(r, h)
-        inputs = (turned(phi), a, d, h)
-        partials = (1j * a * crank_unit, crank_unit, mpc(-1), 1j * unit)
-        slopes = [_rod(unit, r, h, -partial) for partial in partials]
-        rates = slopes[0]
-        # i(r + ih)·e^iψ·ψ' + e^iψ·r' = −i·a·e^iφ, and that by each input again:
-        crank_slopes = (-a * crank_unit, 1j * crank_unit, 0, 0)
-        rate_slopes = []
-        for i, (rod_slope, slide_slope) in enumerate(slopes):
-            unit_slope = 1j * unit * rod_slope
-            arm_slope = mpc(slide_slope, i == 3) * unit + mpc(r, h) * unit_slope
-            rest = -crank_slopes[i] - 1j * arm_slope * rates[0] - unit_slope * rates[1]
-            rate_slopes.append(_rod(unit, r, h, rest))
-        return SliderCrank(
-            mpf(0),
-            _quantity(mp.arg(unit), inputs, [slope[0] for slope in slopes]),
-            _quantity(r, inputs, [slope[1] for slope in slopes]),
-            _quantity(rates[0], inputs, [slope[0] for slope in rate_slopes]),
-            _quantity(rates[1], inputs, [slope[1] for slope in rate_slopes]),
-        )
+        unit = mpf(2) ** truth.motion.constants.exponent
 
+        def number(ball: Any) -> mpf:
+            return mpf(ball.mid().str(digits, radius=False))
 
-def _cross(one: mpc, other: mpc) -> mpf:
-    return one.real * other.imag - one.imag * other.real
-
-
-def _two_links(coupler: mpc, rocker: mpc, right: mpc) -> tuple[mpf, mpf]:
-    """Solve coupler·x − rocker·y = right for real x and y."""
-    area = _cross(coupler, rocker)
-    return _cross(right, rocker) / area, _cross(right, coupler) / area
-
-
-def _rod(unit: mpc, r: mpf, h: mpf, right: mpc) -> tuple[mpf, mpf]:
-    """Solve i(r + ih)·unit·x + unit·y = right for real x and y."""
-    along = right * unit.conjugate()
-    return along.imag / r, along.real + h * along.imag / r
-
-
-def _quantity(value: mpf, inputs: tuple[mpf, ...], slopes: list[mpf]) -> Quantity:
-    return Quantity(
-        value, abs(value) + sum(abs(x * s) for x, s in zip(inputs, slopes, strict=True))
-    )
+        if truth.outcome is Outcome.OPEN:
+            (dyad,) = mechanism.dyads
+            return [-number(dyad.margin(truth.motion)) * unit]
+        if truth.outcome is Outcome.SINGULAR:
+            return [mpf(0), Quantity(mpf(0), inf), Quantity(mpf(0), inf)]
+        slides = [isinstance(joint, str) for joint in mechanism.joints.values()]
+        values = [
+            number(series[order]) * (1, 1, 2)[order] * (unit if sliding else 1)
+            for order in range(3)
+            for series, sliding in zip(truth.joints, slides, strict=True)
+        ]
+        values[:2] = [v if slides[k] else turned(v) for k, v in enumerate(values[:2])]
+        kappa = condition_numbers(reference, [truth], [phi], [0.0])[0].T.flatten().tolist()
+        # There an angle counts as π, and the crank's rate ω is an input: y' ~ ω, y'' ~ ω².
+        beside = [*(0.0 if slides[k] else pi - abs(values[k]) for k in range(2))]
+        beside += [abs(value) for value in values[2:4]] + [2 * abs(value) for value in values[4:]]
+        return [mpf(0)] + [
+            Quantity(value, k * (unit if sliding else 1) - more)
+            for value, k, more, sliding in zip(values, kappa, beside, 3 * slides, strict=True)
+        ]
 
 
 # Limits of the error of a result, in units of u·κ (`reference`), and a record of the worst.

@@ -23,7 +23,6 @@ from linkage_ros.kinematics import (
     other_assemblies,
     Status,
 )
-from linkage_ros.solvers import TableClosure
 from mpmath import mp
 import numpy as np
 import pytest
@@ -83,6 +82,7 @@ def off_branch(closure: Closure, walked: Walked, joint: int = 0, count: int = 15
     return found
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_walk_keeps_the_constraints(kind):
     for made, _, *both in family(kind):
@@ -93,6 +93,7 @@ def test_the_walk_keeps_the_constraints(kind):
                 )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     wrong = {}
@@ -104,6 +105,7 @@ def test_a_platform_stays_on_the_branch_of_its_pose(kind):
     assert not wrong
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_ranges_end_where_the_curve_turns_back(kind):
     for index, (made, linkage, down, up) in enumerate(family(kind)):
@@ -381,16 +383,3 @@ def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed():
     expected = {name: z for (_, name), z in moved.points(later).items()}
     (reached,) = [one for one in other_assemblies(moved, 1) if one.turns == 1]
     assert all(abs(expected[name] - place) < 1e-9 for name, place in reached.points.items())
-
-
-@pytest.mark.parametrize(
-    ('name', 'span'), [('class3_over_a_turn', (-2.1, 5.1)), ('class3_beyond_range', (-6.1, 0.4))]
-)
-def test_a_table_is_proven_over_more_than_a_turn(name, span):
-    closure = defect(name)
-    table = TableClosure(closure.linkage, 1e-5, span=span)
-    assert table.proven <= 1e-5
-    inputs = np.random.default_rng(1).uniform(*span, 300).tolist()
-    for x in inputs:
-        for ours, exact in zip(table.position(x).joints, closure.position(x).joints, strict=True):
-            assert abs(remainder(ours - exact, tau)) <= table.proven

@@ -220,6 +220,7 @@ def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points():
 # A step closed alone gives the same pose as in an array, to the last bit.
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', [file.stem for file in FILES])
 def test_a_step_alone_is_as_among_the_others(name):
     closure = closure_of(name)

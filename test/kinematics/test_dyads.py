@@ -40,6 +40,7 @@ crank = st.floats(-7.0, 7.0)
 side = st.sampled_from((1, -1))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('family', FOUR_BARS)
 def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family):
     worst = Worst()
@@ -76,7 +77,7 @@ def test_the_sweep_holds_open_loops_and_toggles_too():
     assert found == {Status.CLOSED, Status.TOGGLE, Status.OPEN}
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, length, length, crank, side)
 def test_walking_the_loop_of_a_four_bar_ends_where_it_began(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
@@ -90,7 +91,7 @@ def test_walking_the_loop_of_a_four_bar_ends_where_it_began(a, b, c, d, phi, sig
         assert abs(y) < reached
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, length, length, crank, side)
 def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(a, b, c, d, phi, sign):
     pose = FourBar(a, b, c, d, sign).close(phi)
@@ -104,7 +105,7 @@ def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(a, b, c, d, phi
     assert left * sign > 0.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, length, length, crank, side)
 def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
     dyad, mirrored = FourBar(a, b, c, d, sign), FourBar(a, b, c, d, -sign)
@@ -121,7 +122,7 @@ def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
         assert dyad.rates(pose, 1.0) == mirrored.rates(image, 1.0)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True)
 @given(length, length, length, length, crank, side, st.integers(-40, 40))
 def test_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
     dyad = FourBar(a, b, c, d, sign)
@@ -140,6 +141,7 @@ def test_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
 offset = st.one_of(st.just(0.0), st.floats(-8.0, 8.0).filter(lambda h: h == 0.0 or abs(h) > 0.01))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('family', SLIDER_CRANKS)
 def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(family):
     worst = Worst()
@@ -172,7 +174,7 @@ def test_the_sweep_holds_open_loops_too():
     assert {Status.CLOSED, Status.OPEN} <= found
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, offset, crank, side)
 def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(a, d, h, phi, sign):
     pose = InvertedSliderCrank(a, d, h, sign).close(phi)
@@ -185,7 +187,7 @@ def test_walking_the_loop_of_a_slider_crank_ends_where_it_began(a, d, h, phi, si
     assert abs(y) < reached
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(derandomize=True)
 @given(length, length, offset, crank, side)
 def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
     assume(abs(a - d) != abs(h))
@@ -201,7 +203,7 @@ def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
         assert sin(pose.rail) == pytest.approx(-sin(image.rail), rel=1e-14, abs=1e-15)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(derandomize=True)
 @given(length, length, crank)
 def test_a_straight_rod_behind_is_the_one_ahead_turned_round(a, d, phi):
     assume(a != d)
@@ -280,7 +282,6 @@ def cylinder(
 PLACES = st.floats(-0.5, 0.5).map(lambda x: round(x, 3))
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     foot=st.tuples(st.floats(0.6, 2.0), st.floats(-1.0, 1.0)),
     c=st.floats(0.1, 0.5),

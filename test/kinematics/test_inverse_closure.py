@@ -28,9 +28,10 @@ import numpy as np
 import pytest
 
 from .linkages import four_bar_linkage
+from ..support.sampling import sample_count
 
 U = 2.0**-53
-STATES = int(os.environ.get('LINKAGE_STATES', '100'))
+STATES = int(os.environ.get('LINKAGE_STATES') or sample_count(100, 30))
 """States on each branch; 10⁶ in all take LINKAGE_STATES=6000."""
 
 LINKAGES = [
@@ -56,6 +57,7 @@ def numbers(count):
     return [1e-14, 1.0 - 1e-14, *(rng.random() for _ in range(count))]
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', LINKAGES)
 def test_crank_is_as_exact_as_the_roundings_allow(name):
     """|θ − exact| ≤ 8·u·(|θ| + (|y| + 2π)/|f′| + 1)."""

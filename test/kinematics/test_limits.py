@@ -15,7 +15,6 @@ import random
 from hypothesis import assume, given, settings, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, CODES, InputSweep, Limits, Status
-from linkage_ros.solvers import NewtonClosure, TableClosure
 import numpy as np
 import pytest
 
@@ -120,27 +119,6 @@ def test_without_limits_nothing_is_asked():
     assert 'position' in vars(closed(CRANK_ROCKER, ', input: {limits: [0, 1]}'))
 
 
-@pytest.mark.parametrize('make', [
-    lambda linkage: NewtonClosure(linkage, 1e-9), lambda linkage: TableClosure(linkage, 1e-6),
-])  # fmt: skip
-def test_every_solver_knows_of_them(make):
-    linkage = closed(CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}').linkage
-    values = (0.4, 0.5, 1.0, 1.5, 1.6)
-    expected = [LIMITED, CLOSED, CLOSED, CLOSED, LIMITED]
-    solver = make(linkage)
-    assert [solver.position(value).status for value in values] == expected
-    assert solver.solve(np.array(values), derivatives=0).status.tolist() == [
-        CODES[status] for status in expected
-    ]
-
-
-def test_a_table_covers_the_range_within_the_limits():
-    """So there is one where the linkage toggles, if the machine does not come there."""
-    closure = closed(DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}')
-    table = TableClosure(closure.linkage, 1e-6)
-    assert table.position(0.3).joints == pytest.approx(closure.position(0.3).joints, abs=1e-6)
-
-
 # Linkage, limits; the ranges, and what ends them.
 RANGES = {
     'all of it': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', [(0.5, 1.5)], 'crank_joint'),
@@ -226,7 +204,7 @@ def test_a_narrow_window_of_a_joint_is_found_up_to_the_toggle(near, width):
     assert not missed
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     sides=st.tuples(*[st.floats(0.2, 1.0)] * 4),
     own=st.none() | st.tuples(st.floats(-8.0, 8.0), st.floats(0.01, 9.0)),
@@ -313,6 +291,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
         assert interval.is_whole or interval.lowest <= value <= interval.highest
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('lines', 'seed', 'turns'),
     [(0, 10, 0), (0, 50, 0), (1, 27, 0), (2, 11, 0), (2, 38, 0), (0, 0, 1), (0, 2, 1)],

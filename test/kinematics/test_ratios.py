@@ -269,6 +269,7 @@ CAME_BACK_EARLY = (
 """Five-bars that seemed to repeat after one turn, in the mesh of another tooth."""
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('ratio', 'case'), [*((1.25, n) for n in range(4)), (-2.0, 3), (0.5, 3), (17 / 43, 3)]
 )

@@ -38,6 +38,7 @@ def agree(found: list[float], expected: list[float]) -> bool:
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', FLAT)
 def test_change_points_and_pins_that_meet_are_listed(kind):
     for index in range(COUNT):

@@ -20,7 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from linkage_ros.bag import BagWriter, Topic
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.replay import recorded_scene, replay_all
@@ -216,7 +216,6 @@ def test_a_clock_that_jumps_back_while_nothing_is_recorded():
     assert compare(four_bar, happens) > 250
 
 
-@settings(max_examples=50)
 @given(runs())
 def test_any_run_replays_to_the_same_bytes(drawn):
     text, plan = drawn

@@ -49,7 +49,7 @@ def test_by_default_the_same_is_published_as_within():
     tick = at(Pipeline(scene('effects: {velocity: {}}')), 2.0)
     free = LIMITED.replace(', input: {limits: [0.5, 1.5]}', '')
     other = at(Pipeline(scene('effects: {velocity: {}}', free)), 2.0)
-    assert tick.full_states[0].position.status is Status.LIMITED
+    assert tick.states[0].position.status is Status.LIMITED
     assert tick.message == other.message != b''
 
 
@@ -63,7 +63,7 @@ def test_silent_is_silent_beyond_and_within_the_same(effects):
         assert other.message
         if angle in (1.6, 2.0, 0.4):
             assert tick.message == b''
-            assert tick.full_states[0].position.status is Status.LIMITED
+            assert tick.states[0].position.status is Status.LIMITED
         else:
             assert tick.message == other.message
 
@@ -172,7 +172,7 @@ def test_rates_and_efforts_are_told_by_their_limits():
         rate
         for name, rate in zip(
             loop.pipeline.closures[0].linkage.joints,
-            loop.counts.last_tick.full_states[0].reading.rates,
+            loop.counts.last_tick.states[0].reading.rates,
             strict=True,
         )
         if name == 'rocker_joint'

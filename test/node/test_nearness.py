@@ -46,7 +46,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
         name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={})
     )
     linkages = [SimpleNamespace(scene_linkage=scene_linkage, closure=closure, drive=None)]
-    counts.last_tick = SimpleNamespace(linkages=linkages, full_states=(look,))
+    counts.last_tick = SimpleNamespace(linkages=linkages, states=(look,))
     pipeline = SimpleNamespace(linkages=linkages, max_age=1, newest_stamp=0)
     loop = SimpleNamespace(
         counts=counts,

@@ -22,6 +22,7 @@ COLCON = Path(sys.executable).with_name('colcon')
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(INSIDE in os.environ, reason='started by colcon itself'),
+    pytest.mark.sample(1),
     pytest.mark.skipif(not COLCON.exists(), reason='no colcon beside this Python'),
 ]
 

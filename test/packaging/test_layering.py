@@ -35,7 +35,7 @@ HEIGHTS = (
     ),
     ('kinematics', 'resources', 'messages'),
     ('description',),
-    ('bag', 'dynamics', 'solvers'),
+    ('bag', 'dynamics'),
     ('stages',),
     ('stages.drives',),
     ('stages.effects',),

@@ -132,6 +132,7 @@ def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
     ]
 
 
+@pytest.mark.sample(0)
 def test_a_release_lists_itself_and_its_hard_dependencies_with_versions(
     root, copy_checkout, tmp_path
 ):

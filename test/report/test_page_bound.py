@@ -15,6 +15,7 @@ from threading import Event
 
 from hypothesis import given, strategies as st
 from linkage_ros.bag import BagMessage, BagWriter, Contents, read_bag, read_run_metadata, Topic
+from linkage_ros.cli import Table
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
@@ -52,7 +53,6 @@ from linkage_ros.tools.view.report import (
     SHAPE_BYTES,
     STATE_BYTES,
     TABLE_BYTES,
-    TableOf,
     Window,
 )
 import numpy as np
@@ -233,8 +233,8 @@ def worst_run():
 def test_the_page_of_the_worst_run_is_below_the_bound():
     run = worst_run()
     tables = [
-        TableOf(WORST, ('a', '>b'), [(WORST, WORST)] * 5000),
-        *(TableOf('t', ('a',), [('b',)]) for _ in range(5000)),
+        Table(WORST, ('a', '>b'), [(WORST, WORST)] * 5000),
+        *(Table('t', ('a',), [('b',)]) for _ in range(5000)),
     ]
     told = ReportHeader(WORST, [(f'fact {n}', WORST) for n in range(8)], [WORST] * 10, tables)
     page = run_html(run, told)

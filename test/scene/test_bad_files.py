@@ -30,7 +30,7 @@ BOMB = b'a: &a [1, 1]\n' + b''.join(
 # Appended to a good scene; the error's place and reason, and a part of its remedy.
 SCENES = {
     'unknown key': (b'rtae: 5', ":2: rtae: unknown key; did you mean 'rate'?"),
-    'unlike any key': (b'x: 5', ':2: x: unknown key; known: accuracy, angles, beyond_limits, '),
+    'unlike any key': (b'x: 5', ':2: x: unknown key; known: angles, beyond_limits, '),
     'key twice': (b'rate: 1\nrate: 2', ':3: rate: is a duplicate (first in line 2); remove one'),
     'key twice, deep': (
         b'drive: {topic: {max_age: 1, max_age: 2}}',

@@ -292,7 +292,8 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
         if file.stem == 'five_bar':  # it has two inputs, which come from a topic
             inputs = JointStateWriter(scene.linkages[0].input_names)
             assert pipeline.offer(inputs.write(now, [SIXTY, SIXTY], [0.0, 0.0]), now) is None
-        ((crank, position, _, reading),) = pipeline.tick(now).full_states
+        (state,) = pipeline.tick(now).states
+        crank, position, reading = state.crank, state.position, state.reading
         assert crank is not None
         assert position is not None
         assert position.status is Status.CLOSED, crank
@@ -349,7 +350,8 @@ def test_a_run_begins_where_the_pose_says(tmp_path, kind):
     pipeline = Pipeline(load_scene(file))
     values = []
     for index in range(4001):
-        ((crank, position, _, _),) = pipeline.tick(BEGIN + index * MS).full_states
+        (state,) = pipeline.tick(BEGIN + index * MS).states
+        crank, position = state.crank, state.position
         assert crank is not None
         assert position is not None
         assert position.status is Status.CLOSED
@@ -365,11 +367,12 @@ def test_a_start_at_a_toggle_is_where_the_swing_turns_back(tmp_path, end, beyond
     file = tmp_path / 'designed.yaml'
     file.write_text(f'{FOLDS}pose: {{inputs: [{end + beyond!r}]}}\n')
     pipeline = Pipeline(load_scene(file))
-    ((crank, _, _, _),) = pipeline.tick(BEGIN).full_states
+    crank = pipeline.tick(BEGIN).states[0].crank
     assert crank is not None
     assert crank.angles[0] == pytest.approx(end, abs=2e-12)
     for index in range(1, 4000):
-        ((crank, position, _, _),) = pipeline.tick(BEGIN + index * MS).full_states
+        (state,) = pipeline.tick(BEGIN + index * MS).states
+        crank, position = state.crank, state.position
         assert position is not None
         assert position.status is Status.CLOSED, index
 

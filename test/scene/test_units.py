@@ -405,16 +405,6 @@ IN_MM_AND_DEGREES = {
         'effects: {measuring_range: {joints: {rocker_joint: {low: 90, high: 45}}}}',
         'effects.measuring_range.joints.rocker_joint: low 90 deg is not below high 45 deg; write',
     ),
-    'the span of a table': (
-        SLIDE_WITH_MASSES,
-        'solver: {table: {tolerance: 1.0e-6, span: [550, 500]}}',
-        'solver.table.span: 550 to 500 mm is empty; write [low, high]',
-    ),
-    'the tolerance of a table, which stays in SI': (
-        'four_bar: {a: 0.04, b: 0.1, c: 0.04, d: 0.1}',
-        'solver: {table: {tolerance: 1.0e-6}}',
-        'solver.table: tolerance 1e-06 [rad] cannot be proven near the toggle or change point at',
-    ),
 }
 
 

@@ -112,8 +112,8 @@ def test_a_run_is_reduced_to_what_its_messages_say(noisy):
 def test_the_spread_over_seeds_is_that_of_the_noise(noisy):
     ideal = load_scene('noisy.yaml', ['effects={}'])
     (line,) = Pipeline(ideal).linkages
-    line.compute_state(BEGIN)
-    exact = line.compute_state(BEGIN + 500_000_000).reading.joints[-1]
+    line.interpret(BEGIN)
+    exact = line.interpret(BEGIN + 500_000_000).reading.joints[-1]
     study = study_of(noisy, 0.5, 2)
     found = [run_one(study, (('seed', seed),)).positions[-1, -1] for seed in range(150)]
     assert len(set(found)) == 150

@@ -18,12 +18,11 @@ import re
 from linkage_ros.tools.study import (
     Budget,
     budget_json,
+    budget_table,
     change_text,
     closing_lines,
-    COLUMNS,
     error_knobs,
     error_text,
-    heads_of,
     JointError,
     lead_lines,
     neighbours_of,
@@ -179,7 +178,7 @@ def test_rows_are_sorted_complete_and_print_no_noise() -> None:
 def _check_rows(budget: Budget) -> None:
     rows = rows_of(budget)
     assert len(rows) == len(budget.knobs) + 2
-    assert all(len(row) == len(COLUMNS) == len(heads_of(budget)) for row in rows)
+    assert all(len(row) == len(budget_table(budget).heads) for row in rows)
     worst = [knob.own_setting.error.worst for knob in error_knobs(budget)]
     assert worst == sorted(worst, reverse=True)
     noisy = {

@@ -185,14 +185,3 @@ def test_a_bag_gives_motion_rate_and_delay(tmp_path):
 
 
 PENDULUM_SCENE = 'linkage: pendulum.yaml\nrate: 1000\n'
-
-
-@pytest.mark.parametrize('tolerance', [1e-3, 1e-6])
-def test_a_table_is_as_far_off_as_it_may_be(tmp_path, tolerance):
-    (tmp_path / 'scene.yaml').write_text(
-        f'{TOPIC}\nsolver: {{table: {{tolerance: {tolerance:.7f}}}}}\n'
-    )
-    motions = motions_of(load_scene(tmp_path / 'scene.yaml'), 'sine', 10.0)
-    own = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1).own_setting
-    assert own.label == 'table'
-    assert 1e-3 * tolerance < own.error.worst <= tolerance

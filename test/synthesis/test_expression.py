@@ -14,7 +14,7 @@ import pickle
 import sys
 import warnings
 
-from hypothesis import example, given, settings, strategies
+from hypothesis import example, given, strategies
 from linkage_ros.errors import SynthesisError
 from linkage_ros.tools.design import Expression, FUNCTIONS
 from mpmath import mp
@@ -304,7 +304,6 @@ def test_any_bytes_are_a_formula_or_refused(raw):
     _is_a_formula_or_refused(raw.decode('utf-8', 'surrogateescape'))
 
 
-@settings(max_examples=300)
 @given(
     strategies.lists(
         strategies.sampled_from([*'x()+-*/^.,1230eE ', '**', 'pi', *(f'{f}(' for f in FUNCTIONS)]),
@@ -359,7 +358,6 @@ def _walked(node: ast.AST, x: float) -> np.float64:
     raise AssertionError(node)
 
 
-@settings(max_examples=300)
 @given(_texts(), strategies.sampled_from([0.5, 2.0, -1.25]))
 @example('2**-x**2', 2.0)
 @example('-x**-x**2', 2.0)

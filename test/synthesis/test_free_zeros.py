@@ -17,7 +17,7 @@ from math import acos, atan, cos, pi, radians
 from typing import Any, NamedTuple
 
 from flint import arb, arb_mat, ctx
-from hypothesis import assume, given, settings, strategies as st
+from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import SynthesisError
 from linkage_ros.tools.design import five_pairs, four_pairs, FreeZeros, prove
 from mpmath import mp, mpc, mpf
@@ -159,6 +159,7 @@ def check(case: Case) -> None:
         assert gap(one) <= 1e-12 * one.condition * size**2 / one.lengths[1]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.slow
 @pytest.mark.parametrize('mixed', [False, True], ids=['one assembly', 'both'])
 @pytest.mark.parametrize('free', [ROCKER, CRANK, BOTH])
@@ -174,6 +175,7 @@ def test_a_linkage_is_among_the_solutions_of_its_pairs(free, mixed):
     assert told > 0.9 * count
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(('free', 'spread'), [(ROCKER, 0.01), (CRANK, 0.01), (BOTH, 0.1)])
 def test_pairs_near_each_other_are_worth_what_is_told(free, spread):
     rng = np.random.default_rng(3)
@@ -188,7 +190,6 @@ def test_pairs_near_each_other_are_worth_what_is_told(free, spread):
     assert worst > 1e-7
 
 
-@settings(max_examples=100)
 @given(
     free=st.sampled_from([ROCKER, CRANK, BOTH]),
     a=st.floats(0.2, 5.0),

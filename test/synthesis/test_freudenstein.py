@@ -17,7 +17,7 @@ a general solver at 60 digits.
 from math import nan, pi, radians
 
 from campaigns.synthesis import FAMILIES, parts, run
-from hypothesis import assume, given, settings, strategies as st
+from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import SynthesisError
 from linkage_ros.tools.design import (
     exact_four_bar,
@@ -167,7 +167,6 @@ def test_linkages_that_no_double_tells_apart_are_flagged(tallies):
 angles = st.tuples(*[st.integers(-3141, 3141).map(lambda n: n / 1000)] * 3)
 
 
-@settings(max_examples=40)
 @given(angles, angles)
 def test_sensitivity_is_that_of_changes(crank, rocker):
     """The gradient against differences of solutions at 60 digits."""
@@ -232,7 +231,6 @@ SINES = {
 
 
 @pytest.mark.parametrize('kind', SINES)
-@settings(max_examples=200)
 @given(data=st.data())
 def test_sines_of_twofold_angles(kind, data):
     """Relative error below 2⁻⁶⁸, or what an error of 2⁻¹⁰⁴ of the angle makes of it."""

@@ -114,6 +114,7 @@ KINDS = [anywhere, crowded, far_away, nearly_on_a_line, near_a_pole]
 ROUTES = [(fixed_pivots, False), (moving_pivots, True)]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize(('find', 'fixed'), ROUTES)
 def test_pivots_are_right_to_what_rounding_the_poses_makes_of_them(find, fixed, kind):
@@ -190,6 +191,7 @@ def driven(generator):
             return (o2, o4), (a, b), poses, cranks, 'left' if side > 0 else 'right'
 
 
+@pytest.mark.sample(60)
 @pytest.mark.parametrize('seed', range(150))
 @pytest.mark.parametrize('way', ['fixed', 'moving'])
 def test_a_four_bar_is_found_again_from_its_poses(seed, way):

@@ -78,6 +78,7 @@ ROUND = np.arange(24) * 15.0
 HALF = np.linspace(80.0, 280.0, 21)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'degrees', 'closed', 'timed'),
     [
@@ -142,6 +143,7 @@ NEAR_A_CIRCLE = (
 ON_A_LINE = (0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0.78j)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('points', 'closed', 'error'),
     [
@@ -183,6 +185,7 @@ ARC = (3.0 + 3.0j, 2.759 + 3.363j, 2.372 + 3.663j, 1.890 + 3.862j, 1.355 + 3.943
 THIRTIES = tuple(radians(30.0 * i) for i in range(1, 6))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('zero_free', [True, False])
 @pytest.mark.parametrize(
     ('points', 'closed', 'timing'), [(EGG, True, TWENTIES), (ARC, False, THIRTIES)]
@@ -298,6 +301,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_other_ones():
     assert [done for done, _ in told] == sorted(done for done, _ in told)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(('size', 'at'), [(1e-3, 5.0 - 7.0j), (1e6, 1e6 + 0j), (1e-12, 0j)])
 def test_size_and_place_of_a_path_do_not_matter(size, at):
     points = tuple(size * point + at for point in ON_TWO_CIRCLES)

@@ -364,6 +364,7 @@ def test_zeros_are_found_again():
     assert found.pivots == true.pivots
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('number', range(12))
 @pytest.mark.parametrize('noise', [1e-3, 0.03])
 def test_pairs_that_none_has_are_met_better_than_by_the_equation(number, noise):
@@ -418,6 +419,7 @@ def test_free_zeros_come_nearer():
     assert root_mean_square(free) < 0.2 * root_mean_square(fit_angles(start))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('number', range(12))
 def test_no_linkage_comes_nearer_than_the_nearest(number):
     """Noise on eight pairs: the linkage that they were taken of is one that must be beaten."""

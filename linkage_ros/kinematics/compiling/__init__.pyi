@@ -16,6 +16,7 @@ from linkage_ros.kinematics.compiling.numpy_blocks import (
 )
 from linkage_ros.kinematics.compiling.python import (
     compile_line as compile_line,
+    python_body as python_body,
     python_source as python_source,
 )
 from linkage_ros.kinematics.compiling.real_program import (
@@ -31,7 +32,9 @@ from linkage_ros.kinematics.compiling.tape import (
 from linkage_ros.kinematics.compiling.trace import (
     DecisionBranch as DecisionBranch,
     motion_at as motion_at,
+    number_of as number_of,
     OutputSelection as OutputSelection,
+    Path as Path,
     SolvedLeaf as SolvedLeaf,
     TracedMotion as TracedMotion,
     Tree as Tree,

@@ -63,8 +63,12 @@ def python_source(path: Path) -> tuple[str, dict[str, Any]]:
     return '\n'.join([*text, f'    return {returned}', '']), bound
 
 
-def python_body(path: Path, bail_out: str) -> PythonBody:
-    """Return a path as lines of Python; ``bail_out`` is the statement if it is not valid."""
+def python_body(path: Path, bail_out: str, prefix: str = 'k') -> PythonBody:
+    """
+    Return a path as lines of Python; ``bail_out`` is the statement if it is not valid.
+
+    ``prefix`` begins the names of constants.
+    """
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
     outputs = [number for group in path.outputs for number in group]
@@ -72,7 +76,7 @@ def python_body(path: Path, bail_out: str) -> PythonBody:
     def write_constant(value: Any) -> str:
         if isinstance(value, int | float) and math.isfinite(value):
             return repr(value)
-        known = f'k{len(constants)}'
+        known = f'{prefix}{len(constants)}'
         constants[known] = value
         return known
 

@@ -9,6 +9,7 @@
 from linkage_ros.stages.drives.bag import BagParameters as BagParameters
 from linkage_ros.stages.drives.chirp import Chirp as Chirp, ChirpParameters as ChirpParameters
 from linkage_ros.stages.drives.clocked import LARGEST as LARGEST
+from linkage_ros.stages.drives.compiled_drive import compile_drive as compile_drive
 from linkage_ros.stages.drives.constant_rate import (
     ConstantRate as ConstantRate,
     ConstantRateParameters as ConstantRateParameters,

@@ -19,9 +19,8 @@ from collections.abc import Callable
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, list_names, quote
-from linkage_ros.generated_code import Lines
-from linkage_ros.kinematics import Closure, InputSweep
-from linkage_ros.stages.drives.drive import Context, CrankState, Drive
+from linkage_ros.kinematics import call, Closure, InputSweep
+from linkage_ros.stages.drives.drive import Context, CrankState, FormulaDrive
 
 LARGEST = 1e10
 """Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
@@ -81,11 +80,12 @@ def refuse_beyond(
             )
 
 
-class ClockedDrive(Drive):
+class ClockedDrive(FormulaDrive):
     """Inputs that follow curves, one for each input of the linkage, from the first tick on."""
 
-    __slots__ = ('_curve', '_curves', 'start')
+    __slots__ = ('_curves', 'start')
 
+    HELD = 'start'
     stamp = 0
     max_age = 0
     start: int | None
@@ -93,31 +93,27 @@ class ClockedDrive(Drive):
 
     def __init__(self, curves: tuple[Curve, ...]) -> None:
         self._curves = curves
-        self._curve = curves[0] if len(curves) == 1 else None
         self.start = None
 
-    def state(self, now: int) -> CrankState:
+    def usual(self, _inputs: int) -> tuple[int, Any]:
+        """Return the time of a tick and of the first one, in [ns]."""
+        return 1, 0
+
+    def state(self, now: int) -> CrankState | None:
         """Return the crank state at a time, in [ns]; the first call sets the time 0."""
         if self.start is None:
             self.start = now
-        if self._curve is not None:  # zip over one curve would double the time
-            value, rate, acceleration = self._curve(now - self.start)
-            return CrankState((value,), (rate,), (acceleration,), 0)
-        elapsed = now - self.start
-        values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
-        return CrankState(values, rates, accelerations, 0)
+        return self.crank_state(now, self.start)
 
-    def compile_state(self, inputs: int, bail_out: str) -> Lines:
-        """Return `state` as generated lines; a single input needs no function call."""
-        if self._curve is None:
-            return super().compile_state(inputs, bail_out)
-        lines = [
-            'if drive.start is None:',
-            '    drive.start = now',
-            'value, rate, acceleration = curve(now - drive.start)',
-            'angles, rates, accelerations, age = (value,), (rate,), (acceleration,), 0',
-        ]
-        return Lines(lines, {'drive': self, 'curve': self._curve})
+    def crank_state(self, now: int, held: int) -> CrankState:
+        """Return the crank state at a time, in [ns], by the time of the first tick."""
+        elapsed = now - held
+        if len(self._curves) == 1:  # a loop over one would double the time
+            found = call(self._curves[0], elapsed)
+            return CrankState((found[0],), (found[1],), (found[2],), 0)
+        several = [call(curve, elapsed) for curve in self._curves]
+        values, rates, accelerations = (tuple([one[i] for one in several]) for i in range(3))
+        return CrankState(values, rates, accelerations, 0)
 
 
 def build_clocked(

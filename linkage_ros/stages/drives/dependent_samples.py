@@ -28,10 +28,8 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
 
     Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
-    # Another solver has no branches.
-    closed: Closure = getattr(closure, 'closed', closure)
     try:
-        return closed.driven_by(joint, branch=number or None)
+        return closure.driven_by(joint, branch=number or None)
     except DefinitionError as error:
         key = 'drive.topic.branch' if number else 'drive.topic.joint'
         raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None

@@ -30,9 +30,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from random import Random
-from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
+from typing import Any, ClassVar, NamedTuple, Protocol, TYPE_CHECKING
 
-from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics import Closure, without_limits
 
 if TYPE_CHECKING:
@@ -79,9 +78,6 @@ class CrankState(NamedTuple):
     age: int
 
 
-_CRANK = ', '.join(CrankState._fields)
-
-
 class CrankBehindPlay(CrankState):
     """State of the inputs at a tick, after the play between them and their motors."""
 
@@ -116,20 +112,32 @@ class Drive(Protocol):
         """Return the number of steps in which motor and crank met and parted too often."""
         return 0
 
-    def compile_state(self, _inputs: int, bail_out: str) -> Lines:
-        """
-        Return `state` as generated lines that compute the fields of `CrankState` from ``now``.
 
-        Parameters
-        ----------
-        inputs
-            Number of inputs of the linkage.
-        bail_out
-            Statement that leaves the lines where there is no crank state.
+class FormulaDrive(Drive):
+    """
+    Drive whose crank state is a formula of the time and of the numbers that it holds.
 
-        """
-        lines = ['crank = state(now)', 'if crank is None:', f'    {bail_out}', f'{_CRANK} = crank']
-        return Lines(lines, {'state': self.state})
+    A compiled tick runs `crank_state` on symbols: it takes its functions from
+    `linkage_ros.kinematics`, and where it decides otherwise than usually, the tick is interpreted.
+    """
+
+    __slots__ = ()
+
+    HELD: ClassVar[str]
+    """Name of the attribute with the numbers that it holds; None as long as there are none."""
+
+    def usual(self, inputs: int) -> tuple[int, Any]:
+        """Return a time, in [ns], and held numbers for a number of inputs, in their types."""
+        raise NotImplementedError
+
+    def crank_state(self, now: int, held: Any) -> CrankState | None:
+        """Return the crank state at a time, in [ns], by the numbers that it holds."""
+        raise NotImplementedError
+
+    def state(self, now: int) -> CrankState | None:
+        """Return the crank state at a time, in [ns]; None if there is none."""
+        held = getattr(self, self.HELD)
+        return None if held is None else self.crank_state(now, held)
 
 
 def describe_chatter(steps: int) -> str:

@@ -28,13 +28,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import expm1, isfinite, isnan, nan, remainder, tau
+from typing import Any
 
 from linkage_ros.description import choice, flag, number, part_name, whole_number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics import Input
 from linkage_ros.messages import CrankSample, JointStateReader, NANOSECONDS, Rejection
-from linkage_ros.stages.drives.drive import Context, CrankState, Drive, LARGEST, Reader
+from linkage_ros.stages.drives.drive import Context, CrankState, FormulaDrive, LARGEST, Reader
 
 TOPIC = 'crank_states'
 
@@ -125,7 +125,7 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
     return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
 
 
-class TopicDrive(Drive):
+class TopicDrive(FormulaDrive):
     """
     Drive that keeps the newest good sample only.
 
@@ -147,6 +147,8 @@ class TopicDrive(Drive):
         'max_age',
         'sample',
     )
+
+    HELD = 'sample'
 
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
@@ -249,11 +251,15 @@ class TopicDrive(Drive):
         )
         return found if all(-LARGEST <= a <= LARGEST for a in found) else (0.0,) * len(rates)
 
-    def state(self, now: int) -> CrankState | None:
+    def usual(self, inputs: int) -> tuple[int, Any]:
+        """Return a time, in [ns], and a sample."""
+        return 1, (0, (0.5,) * inputs, (1.25,) * inputs, (0.75,) * inputs)
+
+    def crank_state(
+        self, now: int, held: tuple[int, _Values, _Values, _Values]
+    ) -> CrankState | None:
         """Return the crank state at a time, in [ns]; None if the newest sample is too old."""
-        if self.sample is None:
-            return None
-        stamp, angles, rates, accelerations = self.sample
+        stamp, angles, rates, accelerations = held
         age = now - stamp
         if age > self.max_age:
             return None
@@ -271,33 +277,6 @@ class TopicDrive(Drive):
                 pairs = zip(angles, rates, strict=True)
                 angles = tuple([angle + rate * seconds for angle, rate in pairs])
         return CrankState(angles, rates, accelerations, age)
-
-    def compile_state(self, inputs: int, bail_out: str) -> Lines:
-        """Return `state` as generated lines, without a function call."""
-        lines = [
-            'if drive.sample is None:',
-            f'    {bail_out}',
-            'stamp, angles, rates, accelerations = drive.sample',
-            'age = now - stamp',
-            f'if age > {self.max_age}:',
-            f'    {bail_out}',
-        ]
-        if self._carry_forward and self._estimate:
-            carried = [
-                f'angles[{i}] + (rates[{i}] + accelerations[{i}] * half) * seconds,'
-                for i in range(inputs)
-            ]
-            faster = [f'rates[{i}] + accelerations[{i}] * seconds,' for i in range(inputs)]
-            lines += [
-                'seconds = age * 1e-9',
-                'half = 0.5 * seconds',
-                f'angles = ({" ".join(carried)})',
-                f'rates = ({" ".join(faster)})',
-            ]
-        elif self._carry_forward:
-            carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
-            lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
-        return Lines(lines, {'drive': self})
 
 
 def _find_rejection(angles: _Values, rates: _Values) -> Rejection | None:

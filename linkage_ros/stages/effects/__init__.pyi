@@ -57,7 +57,6 @@ from linkage_ros.stages.effects.rate_limit import (
     RateLimitParameters as RateLimitParameters,
 )
 from linkage_ros.stages.effects.stage import (
-    DriveStage as DriveStage,
     EFFECTS as EFFECTS,
     FORCE_EFFECTS as FORCE_EFFECTS,
     MechanismState as MechanismState,

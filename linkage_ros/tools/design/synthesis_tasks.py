@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 from math import degrees, hypot, isfinite, pi, radians, remainder
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.cli import AngleUnit, ProgressCallback
+from linkage_ros.cli import DisplayUnits, ProgressCallback
 from linkage_ros.description import numbers_of
 from linkage_ros.errors import LinkageError, list_names
 from linkage_ros.tools.design.defects import assess, Assessment, Needs, unmet_needs
@@ -268,7 +268,7 @@ def _structural_facts(task: FunctionTask, error: StructuralError) -> Iterator[tu
         yield '', f'at x = {worst.x:.6g}, where y = {worst.y:.6g} is off by {part}'
 
 
-def _read_range(angles: AngleUnit, typed: Sequence[float]) -> tuple[float, float]:
+def _read_range(angles: DisplayUnits, typed: Sequence[float]) -> tuple[float, float]:
     start, end = map(angles.to_radians, typed)
     return start, end
 

@@ -22,20 +22,27 @@ from pathlib import Path
 from shlex import quote
 import sys
 from threading import Event
-from typing import Literal
+from typing import Any, Literal
 
 from linkage_ros.cli import (
     add_output,
     add_radians,
-    AngleUnit,
+    add_result,
     bounded_number,
+    Column,
+    DisplayUnits,
+    facts_table,
+    finite_or_none,
     LINKAGES,
     output_path,
     PICTURES,
-    print_tables,
     ProgressCallback,
+    Result,
+    RESULTS,
     show_progress,
-    TerminalTable,
+    show_result,
+    Table,
+    table_of_rows,
 )
 from linkage_ros.description import check_new, write_linkage
 from linkage_ros.errors import LinkageError
@@ -60,66 +67,103 @@ EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.y
 # Tables of a designed four-bar: its links, its proof, its quality.
 
 
-def solution_tables(
-    answer: DesignAnswer, title: str, needs: Needs, angles: AngleUnit
-) -> Iterator[TerminalTable]:
-    """Yield the tables of a solution."""
-    four_bar = answer.design.four_bar
-    yield TerminalTable(
-        angles.convert_text(title), ('link', '>length [m]', ''), list(_link_rows(four_bar))
+def _angle_text(angle: float | None, units: DisplayUnits) -> str:
+    return '' if angle is None else units.format_angle(angle)
+
+
+def _small_angle_text(angle: float | None, units: DisplayUnits) -> str:
+    return '' if angle is None else f'{units.convert(angle):+.2e}'
+
+
+_LINK = (Column('link', 'link'), Column('>length', 'length_m', 'm', '.10g'), Column('', 'note'))
+
+
+def _position_columns(answer: DesignAnswer, units: DisplayUnits) -> list[Column]:
+    """Return the columns of positions; optional ones only if they were asked for."""
+    rocker, coupler, place = (
+        any(getattr(one, what) is not None for one in answer.design.wanted)
+        for what in ('rocker', 'coupler', 'place')
     )
-    if answer.facts:
-        yield TerminalTable(
-            '', ('', ''), [tuple(map(angles.convert_text, fact)) for fact in answer.facts]
-        )
-    yield _positions_table(answer, angles)
-    yield TerminalTable('', ('', ''), list(_assessment_facts(answer.assessment, needs, angles)))
+    found = (
+        (True, Column('>', 'position')),
+        (True, Column('>crank', 'crank', 'rad', _angle_text)),
+        (place, Column('>x', 'x_m', 'm', '.6g')),
+        (place, Column('>y', 'y_m', 'm', '.6g')),
+        (rocker, Column('>rocker', 'rocker', 'rad', _angle_text)),
+        (coupler, Column('>coupler', 'coupler', 'rad', _angle_text)),
+        (True, Column('assembly', 'assembly')),
+        (place, Column('>off', 'off_m', 'm', '.2e')),
+        (rocker or coupler,
+         Column(f'>off [{units.angle}]', 'off_angle', 'rad', _small_angle_text)),
+    )  # fmt: skip
+    return [column for is_wanted, column in found if is_wanted]
 
 
-def _link_rows(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
+def _link_rows(four_bar: FourBar) -> Iterator[dict[str, Any]]:
     names = ('crank', 'coupler', 'rocker', 'ground')
     pins = (four_bar.crank, None, four_bar.rocker, None)
     for name, length, pin in zip(names, four_bar.lengths, pins, strict=True):
         note = ''
         if pin is not None and pin.imag == 0.0 and pin.real < 0.0:
             note = f'{pin.real:.10g}, reversed: it points away from its angle'
-        yield name, f'{length:.10g}', note
+        yield {'link': name, 'length_m': length, 'note': note}
 
 
-def _positions_table(answer: DesignAnswer, angles: AngleUnit) -> TerminalTable:
-    """Return how each position is met; optional columns appear only if they were asked for."""
-    wanted = answer.design.wanted
-    columns = ['>', '>crank']
-    rocker, coupler, place = (
-        any(getattr(one, what) is not None for one in wanted)
-        for what in ('rocker', 'coupler', 'place')
-    )
-    columns += ['>x [m]', '>y [m]'] if place else []
-    columns += ['>rocker'] if rocker else []
-    columns += ['>coupler'] if coupler else []
-    columns += ['assembly']
-    columns += ['>off [m]'] if place else []
-    columns += [f'>off [{angles.name}]'] if rocker or coupler else []
-    rows = []
-    for number, (one, met) in enumerate(zip(wanted, answer.assessment.met, strict=True), 1):
-        row = [str(number), angles.format_angle(one.crank)]
-        if place:
-            at = one.place
-            row += ['', ''] if at is None else [f'{at.real:.6g}', f'{at.imag:.6g}']
-        for asked, angle in ((rocker, one.rocker), (coupler, one.coupler)):
-            if asked:
-                row.append('' if angle is None else angles.format_angle(angle))
-        row.append(met.side if met.is_closed else f'open by {met.gap:.3g} m')
-        if place:
-            row.append(f'{met.distance:.2e}' if met.is_closed else '')
-        if rocker or coupler:
-            row.append(f'{angles.convert(met.angle):+.2e}' if met.is_closed else '')
-        rows.append(row)
-    return TerminalTable('Proof: each position, analysed again', columns, rows)
+def _position_rows(answer: DesignAnswer) -> Iterator[dict[str, Any]]:
+    """Yield how each position is met."""
+    pairs = zip(answer.design.wanted, answer.assessment.met, strict=True)
+    for number, (one, met) in enumerate(pairs, 1):
+        yield {
+            'position': number,
+            'crank': one.crank,
+            'x_m': None if one.place is None else one.place.real,
+            'y_m': None if one.place is None else one.place.imag,
+            'rocker': one.rocker,
+            'coupler': one.coupler,
+            'assembly': met.side if met.is_closed else f'open by {met.gap:.3g} m',
+            'off_m': finite_or_none(met.distance) if met.is_closed else None,
+            'off_angle': finite_or_none(met.angle) if met.is_closed else None,
+        }
+
+
+def _solution_json(answer: DesignAnswer, needs: Needs, units: DisplayUnits) -> dict[str, Any]:
+    """Return a solution as JSON holds it; angles in [rad], texts as they are printed."""
+    found = answer.assessment
+    return {
+        'title': units.convert_text(answer.title),
+        'links': [*_link_rows(answer.design.four_bar)],
+        'facts': [
+            {'name': units.convert_text(name), 'value': units.convert_text(value)}
+            for name, value in answer.facts
+        ],
+        'positions': [*_position_rows(answer)],
+        'kind': found.kind.name,
+        'crank_turns': found.turns,
+        'travel': found.travel and list(found.travel),
+        'least_transmission': finite_or_none(found.transmission),
+        'link_ratio': finite_or_none(found.link_ratio),
+        'defects': [
+            {'name': one.name, 'text': units.convert_text(one.text)} for one in found.defects
+        ],
+        'missing': [units.convert_text(missed) for missed in unmet_needs(found, needs)],
+    }
+
+
+def _solution_tables(
+    answer: DesignAnswer, solution: dict[str, Any], title: str, needs: Needs, units: DisplayUnits
+) -> Iterator[Table]:
+    """Yield the tables of a solution."""
+    yield table_of_rows(units.convert_text(title), 'links', _LINK, solution['links'])
+    if answer.facts:
+        yield facts_table('', [(fact['name'], fact['value']) for fact in solution['facts']])
+    columns = _position_columns(answer, units)
+    title = 'Proof: each position, analysed again'
+    yield table_of_rows(title, 'positions', columns, solution['positions'])
+    yield facts_table('', _assessment_facts(answer.assessment, needs, units))
 
 
 def _assessment_facts(
-    assessment: Assessment, needs: Needs, angles: AngleUnit
+    assessment: Assessment, needs: Needs, angles: DisplayUnits
 ) -> Iterator[tuple[str, str]]:
     kind = assessment.kind
     turns = 'the crank turns fully' if assessment.turns else 'the crank does not turn fully'
@@ -169,7 +213,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     needs.add_argument('--usable', action='store_true', help='no order, branch or circuit defect')
     written = parser.add_argument_group('what is written')
-    add_output(written, LINKAGES, 'no linkage file is written')
+    add_result(written, output=False)
+    add_output(
+        written,
+        (*LINKAGES, *RESULTS),
+        'the result is printed; a .yaml file is the linkage of a solution',
+    )
     written.add_argument(
         '--pick', type=int, default=1, metavar='N', help='the solution to write (default: 1)'
     )
@@ -302,15 +351,23 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 def _run_design(arguments: argparse.Namespace) -> int:
     with show_progress('candidates') as advance:
         found, meeting = find_solutions(arguments, advance)
-    if not meeting:
-        print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
-    needs = needs_of(arguments)
+    needs, units = needs_of(arguments), arguments.angles
     shown = found[: arguments.best]
-    _print_solutions(shown, needs, arguments.angles)
+    solutions = [_solution_json(answer, needs, units) for answer in shown]
+    parts: list[Table | str] = []
+    if not meeting:
+        parts.append(f'None of {len(found)} solution(s) has what is needed. Nearest to it:')
+    for number, (answer, solution) in enumerate(zip(shown, solutions, strict=True), 1):
+        title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
+        parts += _solution_tables(answer, solution, title, needs, units)
+    account = {'meets_needs': meeting, 'solutions': solutions}
+    show_result(Result(account, parts), arguments, units)
     _draw_solutions(arguments.draw, shown, force=arguments.force)
     if not meeting:
         return _NOT_MET
-    if arguments.output is not None:
+    if arguments.output is not None and arguments.output.suffix.lower() in LINKAGES:
+        if not arguments.json and not arguments.csv:
+            print()
         _write_solution(arguments, shown)
     return 0
 
@@ -337,14 +394,6 @@ def needs_of(typed: argparse.Namespace) -> Needs:
     )
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())
-
-
-def _print_solutions(shown: Sequence[DesignAnswer], needs: Needs, angles: AngleUnit) -> None:
-    for number, answer in enumerate(shown, 1):
-        title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
-        for table in solution_tables(answer, title, needs, angles):
-            print_tables(table)
-            print()
 
 
 def _draw_solutions(file: Path | None, shown: Sequence[DesignAnswer], *, force: bool) -> None:

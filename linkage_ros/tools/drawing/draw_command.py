@@ -23,6 +23,7 @@ from linkage_ros.cli import (
     add_file,
     add_output,
     bounded_number,
+    DEGREES,
     output_or,
     PICTURES,
     read_inputs,
@@ -30,8 +31,9 @@ from linkage_ros.cli import (
 from linkage_ros.description import (
     atomic_write,
     find_assemblies,
-    load,
+    linkage_content,
     pose_text,
+    read_closure,
     read_yaml,
     written_linkage,
 )
@@ -72,13 +74,16 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
     if arguments.assemblies:
         return _draw_assemblies(arguments)
-    closure = load(arguments.file)
+    named = named_file(arguments.file, 'linkages')
+    content = linkage_content(named)
+    closure = read_closure(content, named.stem)
     if arguments.output and arguments.output.suffix.lower() == '.dxf':
         return _write_parts(closure, arguments)
     for option in ('width', 'hole'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
-    typed = [read_inputs(closure.linkage, at, '--at') for at in arguments.at]
+    units = DEGREES.of_file(content.units)
+    typed = [read_inputs(closure.linkage, at, '--at', units) for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
@@ -101,8 +106,11 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
     """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
     found = list(find_assemblies(arguments.file).values())
     first = found[0]
+    content, _ = read_yaml(named_file(arguments.file, 'linkages'))
+    written_linkage(content)  # it sets the units
     if arguments.at:
-        pose = read_inputs(first.linkage, arguments.at[0], '--at')
+        units = DEGREES.of_file(content.units)
+        pose = read_inputs(first.linkage, arguments.at[0], '--at', units)
         closed = [each for each in found if each.position(*pose).joints]
         # If it closes in no assembly there, `prepare_view` says so.
         views = [prepare_view(each, pose) for each in closed or [first]]
@@ -113,8 +121,6 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
             for each in found
         ]
     file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
-    content, _ = read_yaml(named_file(arguments.file, 'linkages'))
-    written_linkage(content)  # it sets the units
     texts = [
         pose_text(one.closure.linkage, read_drawn_pose(one.closure, one.position), content.units)
         for one in views

@@ -113,7 +113,7 @@ def draw_bag(
     for at, recorded, _, tick in replay_ticks(bag, scene):
         if stop.is_set():
             raise StoppedError
-        crank_state = tick.full_states[0].crank
+        crank_state = tick.states[0].crank
         if crank_state is None or not recorded:
             continue
         sample = reader.read(recorded)

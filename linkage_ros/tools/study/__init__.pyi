@@ -26,12 +26,11 @@ from linkage_ros.tools.study.budget import (
 from linkage_ros.tools.study.budget_text import (
     ALL_TOGETHER as ALL_TOGETHER,
     budget_json as budget_json,
+    budget_table as budget_table,
     change_text as change_text,
     closing_lines as closing_lines,
-    COLUMNS as COLUMNS,
     error_knobs as error_knobs,
     error_text as error_text,
-    heads_of as heads_of,
     lead_lines as lead_lines,
     neighbours_of as neighbours_of,
     NOISE as NOISE,

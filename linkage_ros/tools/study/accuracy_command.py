@@ -18,32 +18,33 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-import json
 from pathlib import Path
 from threading import Event
 from typing import NamedTuple
 
 from linkage_ros.cli import (
     add_output,
+    add_result,
     add_set,
     bounded_number,
     LINKAGES,
     open_bag,
     output_path,
-    print_tables,
+    Result,
+    RESULTS,
     scene_of,
     show_progress,
-    TerminalTable,
+    show_result,
+    Table,
 )
 from linkage_ros.description import atomic_write, load_scene, Scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
 from linkage_ros.tools.study.budget_text import (
     budget_json,
+    budget_table,
     closing_lines,
-    heads_of,
     lead_lines,
-    rows_of,
 )
 from linkage_ros.tools.study.measure import EFFECTS, measure_budget, PARTS, RECORDING
 from linkage_ros.tools.study.need import answer_need, answers_of
@@ -69,7 +70,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='RAD',
         help='print the cheapest settings with no more error than this, or what prevents it',
     )
-    add_output(parser, LINKAGES, 'the lines are printed; with it, the scene that meets --need')
+    add_output(
+        parser,
+        (*LINKAGES, *RESULTS),
+        'the result is printed; a .yaml file is the scene that meets --need',
+    )
     parser.add_argument(
         '--horizon',
         type=bounded_number(0.1, 1000.0),
@@ -92,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--quick', action='store_true', help='take 20 s at most, and print what is left out'
     )
-    parser.add_argument('--json', action='store_true', help='the same as JSON, in rad and µs')
+    add_result(parser, output=False)
     parser.add_argument(
         '--page',
         type=output_path(('.html', '.htm')),
@@ -125,7 +130,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     _check_options(arguments, parts)
     scene, like, is_bag = _load_source(arguments, stop)
     _check_content(scene, parts)
-    if is_bag and arguments.output:
+    if is_bag and _names_scene(arguments.output):
         raise LinkageError('-o', 'the scene is in a bag', 'write the lines into its file by hand')
     try:
         with show_progress(f'accuracy of {scene.name}, percent') as advance:
@@ -147,20 +152,23 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         return 1
     answer = None if arguments.need is None else answer_need(budget, arguments.need)
     _write_files(arguments, scene, budget, answer)
-    if arguments.json:
-        said = budget_json(budget)
-        if answer is not None:
-            said['need'] = {
-                'rad': arguments.need,
-                'is_met': answer.is_met,
-                'error': answer.error,
-                'write': dict(answer.changes),
-                'answer': answer.text,
-            }
-        print(json.dumps(said, indent=2, allow_nan=False))
-    else:
-        _print_answer(budget, answer)
+    account = budget_json(budget)
+    if answer is not None:
+        account['need'] = {
+            'rad': arguments.need,
+            'is_met': answer.is_met,
+            'error': answer.error,
+            'write': dict(answer.changes),
+            'answer': answer.text,
+        }
+    shown: list[Table | str] = [answer.text] if answer is not None else []
+    shown += [*lead_lines(budget), budget_table(budget), *closing_lines(budget)]
+    show_result(Result(account, shown), arguments)
     return 0 if answer is None or answer.is_met else 1
+
+
+def _names_scene(output: Path | None) -> bool:
+    return output is not None and output.suffix.lower() in LINKAGES
 
 
 def _read_parts(text: str) -> list[str]:
@@ -174,7 +182,7 @@ def _read_parts(text: str) -> list[str]:
 
 def _check_options(arguments: argparse.Namespace, parts: Sequence[str]) -> None:
     """Raise if options do not fit together, before anything is measured."""
-    if arguments.output and arguments.need is None:
+    if _names_scene(arguments.output) and arguments.need is None:
         raise LinkageError('-o', 'is the scene that meets a need', 'add --need 1e-3')
     if arguments.need is not None and 'errors' not in parts:
         raise LinkageError('--need', 'is for errors', f'write --only errors,{arguments.only}')
@@ -209,7 +217,7 @@ def _write_files(
     arguments: argparse.Namespace, scene: Scene, budget: Budget, answer: NeedAnswer | None
 ) -> None:
     """Write the files that were asked for."""
-    if arguments.output and answer is not None and answer.is_met:
+    if _names_scene(arguments.output) and answer is not None and answer.is_met:
         folder = arguments.output.resolve().parent
         text = tune_scene(scene, arguments.scene, answer.changes, folder)
         atomic_write(arguments.output, text)
@@ -220,12 +228,3 @@ def _write_files(
         if not svg:
             raise LinkageError('--picture', 'shows errors, and none were measured', 'leave it out')
         atomic_write(arguments.picture, svg.encode())
-
-
-def _print_answer(budget: Budget, answer: NeedAnswer | None) -> None:
-    if answer is not None:
-        print(answer.text)
-    print(*lead_lines(budget), sep='\n')
-    print()
-    print_tables(TerminalTable('', heads_of(budget), rows_of(budget)))
-    print(*closing_lines(budget), sep='\n')

@@ -19,18 +19,9 @@ from collections.abc import Sequence
 from math import floor, isfinite, log10
 from typing import Any, NamedTuple
 
+from linkage_ros.cli import Column, Table
 from linkage_ros.tools.study.budget import Budget, Knob, Price, RecordingLoss, Setting
 from linkage_ros.tools.study.measuring import Spread
-
-COLUMNS = (
-    'error of the published joints',
-    '>rms [rad]',
-    '>worst [rad]',
-    '>costs a tick [µs]',
-    '>core',
-    'cheaper',
-    'better',
-)
 
 NOISE = 'within noise'
 
@@ -339,9 +330,18 @@ def closing_lines(budget: Budget) -> list[str]:
     return [said, *notes, *(f'left out: {each}' for each in budget.left_out)]
 
 
-def heads_of(budget: Budget) -> list[str]:
-    """Return the heads of the table."""
-    return [f'>core at {rate_text(budget.rate)}' if each == '>core' else each for each in COLUMNS]
+def budget_table(budget: Budget) -> Table:
+    """Return the table of errors and what each setting costs, as text."""
+    columns = (
+        Column('error of the published joints', 'name'),
+        Column('>rms [rad]', 'rms'),
+        Column('>worst [rad]', 'worst'),
+        Column('>costs a tick [µs]', 'cost'),
+        Column(f'>core at {rate_text(budget.rate)}', 'core'),
+        Column('cheaper', 'cheaper'),
+        Column('better', 'better'),
+    )
+    return Table('', columns, rows_of(budget), 'sources')
 
 
 def rate_text(rate: float) -> str:

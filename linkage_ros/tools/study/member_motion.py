@@ -54,7 +54,6 @@ class LinkageMotion(NamedTuple):
     scene_linkage: SceneLinkage
     closure: Closure  # The closed form of its linkage, with the deviations of its parts
     context: Context
-    solution: Closure  # What the scene solves it with: the same, or another solver
     path: Path | None  # Its inputs at any time; None for a torque drive
     commands: Sequence[Command] = ()
     # When the samples of a topic drive are taken and when they come, after the first tick, in

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
-from linkage_ros.tools.study.budget_text import closing_lines, heads_of, lead_lines, rows_of
+from linkage_ros.tools.study.budget_text import budget_table, closing_lines, lead_lines
 from linkage_ros.tools.study.picture import budget_svg
 from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 
@@ -50,13 +50,8 @@ def _page_body(budget: Budget, *, has_field: bool) -> Iterator[str]:
     picture = budget_svg(budget)
     if picture:
         yield f'<figure><figcaption>Error against cost</figcaption>{picture}</figure>'
-    heads = heads_of(budget)
-    yield from table_html(
-        'Where the error comes from, and what each setting costs',
-        [head.lstrip('>') for head in heads],
-        rows_of(budget),
-        [head.startswith('>') for head in heads],
-    )
+    title = 'Where the error comes from, and what each setting costs'
+    yield from table_html(budget_table(budget)._replace(title=title))
     yield '</figure>'
     yield from (f'<p class="note">{escape(line)}</p>' for line in closing_lines(budget))
     yield '</main><footer>'

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 import gc
 from itertools import islice
 import json
-from math import cos, sin, tau
+from math import cos, pi, sin, tau
 from random import Random
 from statistics import fmean, median
 from time import perf_counter
@@ -43,6 +43,9 @@ USUAL_RATE = 1000.0
 _BEGIN = 1_000_000_000
 _CRANK_RATE = 1.0
 """Turns, or oscillations, of the crank per second."""
+
+_PART = 0.4
+"""Amplitude of a crank that does not turn fully, as a fraction of its range."""
 
 _BLOCK = 100
 """Ticks of a block: enough to warm the caches, few compared with a drift of the machine."""
@@ -110,23 +113,30 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
 def _input_paths(linkage: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
     closure, joint = linkage.closure, linkage.scene_linkage.dependent_joint
-    speed = tau * _CRANK_RATE
-    if joint:
-        branch = sampled_inverse(closure, joint, linkage.scene_linkage.drive[1].branch).branch
-        return [
-            _oscillation_path(
-                0.5 * (branch.low + branch.high), 0.4 * (branch.high - branch.low), speed
-            )
-        ]
+    if not joint:
+        widest = InputSweep(closure).widest_range
+        if len(closure.linkage.inputs) == 1 and (widest is None or widest.is_whole):
+            speed = tau * _CRANK_RATE
+            return [lambda seconds: (speed * seconds, speed)]
+        return swinging_inputs(closure, _CRANK_RATE)
+    branch = sampled_inverse(closure, joint, linkage.scene_linkage.drive[1].branch).branch
+    middle, width = 0.5 * (branch.low + branch.high), branch.high - branch.low
+    return [_oscillation_path(middle, _PART * width, tau * _CRANK_RATE)]
+
+
+def swinging_inputs(closure: Closure, frequency: float) -> list[Path]:
+    """Return sines of all inputs, at a frequency in [Hz], within the range where they close."""
     centers = usual_inputs(closure)
-    if len(centers) > 1:
-        sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
-        return [_oscillation_path(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
-    widest = InputSweep(closure).widest_range
-    if widest is None or widest.is_whole:
-        return [lambda seconds: (speed * seconds, speed)]
-    middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
-    return [_oscillation_path(middle, 0.4 * width, speed)]
+    sizes = [0.01 * (closure.scale if each.slider else 1.0) for each in closure.linkage.inputs]
+    if len(centers) == 1:
+        widest = InputSweep(closure).widest_range
+        assert widest is not None, 'reading the file has proved that it closes somewhere'
+        sizes = [pi]
+        if not widest.is_whole:
+            centers = (0.5 * (widest.lowest + widest.highest),)
+            sizes = [min(pi, _PART * (widest.highest - widest.lowest))]
+    speed = tau * frequency
+    return [_oscillation_path(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
 
 
 def _oscillation_path(center: float, amplitude: float, speed: float) -> Path:

@@ -17,11 +17,11 @@ those of a bag, or a sine of effort; without either it moves by its start, weigh
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, pi, sin, tau
+from math import sin, tau
 
 from linkage_ros.bag import Bag, read_bag
 from linkage_ros.description import Scene
-from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
+from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.stages.drives import CrankState
 from linkage_ros.tick import LinkagePipeline, Pipeline
@@ -33,7 +33,7 @@ from linkage_ros.tools.study.member_motion import (
     LinkageMotion,
     Path,
 )
-from linkage_ros.tools.study.prices import USUAL_RATE
+from linkage_ros.tools.study.prices import swinging_inputs, USUAL_RATE
 from linkage_ros.tools.study.recorded_motion import follow_commands, follow_samples
 
 SINE = 'sine'
@@ -42,12 +42,8 @@ SINE = 'sine'
 COMMAND_PERIOD = 0.05
 """Longest time between two commands of a torque drive, in [s]."""
 
-_FREQUENCY, _AMPLITUDE, _PART = 0.5, pi, 0.4
-"""
-Of the sine of a crank, in [Hz] and [rad]; for a limited one, as a fraction of its range.
-
-So a crank that turns passes through all its poses, some 1.6 turns a second at most.
-"""
+_FREQUENCY = 0.5
+"""Of the sine of a crank, in [Hz]: one that turns makes 1.6 turns a second at most."""
 
 _LOOK = 0.1
 """Time between two looks whether anything moves, in [s]."""
@@ -86,10 +82,7 @@ def _linkage_motion(
     scene: Scene, linkage: LinkagePipeline, like: str | None, bag: Bag | None, horizon: float
 ) -> LinkageMotion:
     scene_linkage, context = linkage.scene_linkage, linkage.context
-    closure = linkage.closure
-    if type(closure) is not Closure:
-        closure = Closure(closure.linkage)
-    motion = LinkageMotion(scene_linkage, closure, context, linkage.closure, None)
+    motion = LinkageMotion(scene_linkage, linkage.closure, context, None)
     drive, parameters = scene_linkage.drive
     if drive == 'torque':
         return _commanded_motion(motion, like, bag, horizon)
@@ -108,7 +101,7 @@ def _linkage_motion(
             'choose a motion of its crank: --like sine, or --like BAG with its samples',
         )
     return motion._replace(
-        path=_sine_path(closure),
+        path=_sine_path(motion.closure),
         sample_rate=scene.rate or USUAL_RATE,
         note=f'the crank moves by a sine of {_FREQUENCY:g} Hz',
     )
@@ -128,21 +121,11 @@ def _path_of(linkage: LinkagePipeline) -> Path:
 
 def _sine_path(closure: Closure) -> Path:
     """Return sines of all inputs, within the range where the loops close."""
-    speed = tau * _FREQUENCY
-    centers = usual_inputs(closure)
-    sizes = [0.01 * (closure.scale if each.slider else 1.0) for each in closure.linkage.inputs]
-    if len(centers) == 1:
-        widest = InputSweep(closure).widest_range
-        assert widest is not None, 'reading the file has proved that it closes somewhere'
-        sizes = [_AMPLITUDE]
-        if not widest.is_whole:
-            centers = (0.5 * (widest.lowest + widest.highest),)
-            sizes = [min(_AMPLITUDE, _PART * (widest.highest - widest.lowest))]
+    paths = swinging_inputs(closure, _FREQUENCY)
 
     def crank_at(time: int) -> Crank:
-        s, c = sin(speed * time * 1e-9), cos(speed * time * 1e-9)
-        values = tuple(at + size * s for at, size in zip(centers, sizes, strict=True))
-        return values, tuple(size * speed * c for size in sizes)
+        values, rates = zip(*[path(time * 1e-9) for path in paths], strict=True)
+        return values, rates
 
     return crank_at
 

@@ -24,7 +24,15 @@ from typing import Any, NamedTuple
 
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics import Closure, InputSweep, Linkage, RevoluteJoint, slide_bound, Status
+from linkage_ros.kinematics import (
+    Closure,
+    InputSweep,
+    is_iterated,
+    Linkage,
+    RevoluteJoint,
+    slide_bound,
+    Status,
+)
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.budget_text import error_text
@@ -102,7 +110,7 @@ def measure_solving(
         unproved += len(states) - len(known)
         if not known:
             continue
-        own = _scene_solver(motion.solution)
+        own = _scene_solver(motion.closure)
         errors.append(compare_solver(linkage, own.solve, known, exact)[0])
         progress(0.2)
         if index:
@@ -195,9 +203,6 @@ def largest_distance(linkage: Linkage, joints: Sequence[Any], balls: Sequence[An
 
 def _scene_solver(closure: Closure) -> SolvingMethod:
     """Return what a scene solves with, as a tick does."""
-    if type(closure) is not Closure:
-        kind = type(closure).__name__.removesuffix('Closure').lower()
-        return SolvingMethod(kind, lambda *inputs: closure.position(*inputs).joints)
     compiled = closure.compile_linkage(0)
     fast, plain = compiled.fast, compiled.run_interpreted
 
@@ -205,7 +210,7 @@ def _scene_solver(closure: Closure) -> SolvingMethod:
         (joints,) = fast(*inputs) or plain(*inputs).values or ((),)
         return joints
 
-    return SolvingMethod(CLOSED_FORM if closure.by_steps else ITERATED, position)
+    return SolvingMethod(ITERATED if is_iterated(closure) else CLOSED_FORM, position)
 
 
 def comparison_solvers(closure: Closure) -> Iterator[SolvingMethod]:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-import json
 from math import nan, pi, remainder, tau
 from pathlib import Path
 from threading import Event
@@ -26,13 +25,16 @@ from typing import Any, NamedTuple
 from linkage_ros.bag import Bag
 from linkage_ros.cli import (
     add_output,
+    add_result,
     BagReading,
     deviations_account,
     joints_table,
     open_bag,
     PICTURES,
-    print_tables,
+    Result,
+    RESULTS,
     run_or_blank,
+    show_result,
 )
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, MessageValues, POSITION
@@ -137,8 +139,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             name, type=Path, metavar=name.upper(), help=f'{what}: its folder or its .mcap file'
         )
-    add_output(parser, PICTURES, 'no picture is written')
-    parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_output(parser, (*PICTURES, *RESULTS), 'the result is printed, and no picture is written')
+    add_result(parser, output=False)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -165,18 +167,16 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         'stopped': stop.is_set(),
         'joints': deviations_account(differences.deviations, turning),
     }
-    if arguments.output is not None:
+    picture = arguments.output is not None and arguments.output.suffix.lower() in PICTURES
+    if picture:
         _draw_differences(differences, turning, arguments.output)
-    if arguments.json:
-        print(json.dumps(account, indent=1, allow_nan=False))
-    else:
-        print(
-            f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
-            f'{account["seconds"]:.3f} s\n'
-        )
-        print_tables(joints_table(account, 0))
-        if arguments.output is not None:
-            print(arguments.output)
+    head = (
+        f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
+        f'{account["seconds"]:.3f} s'
+    )
+    show_result(Result(account, [head, joints_table(account, 0)]), arguments)
+    if picture and not arguments.json and not arguments.csv:
+        print(arguments.output)
     return int(stop.is_set() or bool(account['damage']))
 
 

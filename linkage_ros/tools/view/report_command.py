@@ -29,12 +29,12 @@ from linkage_ros.cli import (
     add_output,
     bag_json,
     bag_tables,
-    DEGREES,
     describe_gaps,
     open_bag,
     output_or,
     path_beside,
     scene_json,
+    Table,
 )
 from linkage_ros.description import atomic_write, Scene
 from linkage_ros.errors import check_installed, LinkageError
@@ -45,7 +45,6 @@ from linkage_ros.tools.view.report import (
     ReportHeader,
     run_html,
     seconds_text,
-    TableOf,
     Window,
 )
 
@@ -114,8 +113,8 @@ def _raise_if_stopped(stop: Event) -> None:
         raise StoppedError
 
 
-def _page_tables(account: dict[str, Any]) -> list[TableOf]:
-    bag, *others = (TableOf(*table) for table in bag_tables(account, DEGREES))
+def _page_tables(account: dict[str, Any]) -> list[Table]:
+    bag, *others = bag_tables(account)
     return [bag._replace(title='Bag'), *others]
 
 

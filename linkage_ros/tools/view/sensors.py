@@ -96,7 +96,7 @@ class Sensors:
             now = round(time * _NANOSECONDS)
             assert isinstance(line.drive, TopicDrive)
             line.drive.sample = now, angles, tuple(rates), (0.0,) * self.count
-            self._reading = line.complete_state(line.compute_state(now)).reading
+            self._reading = line.interpret(now).reading
         return self._readings_content(inputs)
 
     def _tick_times(self, since: float, until: float) -> Iterator[float]:

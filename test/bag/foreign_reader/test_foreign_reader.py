@@ -162,6 +162,7 @@ RUNS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(('linkage', 'text', 'how', 'topics'), RUNS.values(), ids=RUNS.keys())
 def test_a_run(tmp_path, linkage, text, how, topics):
     rate = 100 if 'split' in how else 1000
@@ -237,6 +238,7 @@ def test_a_bag_without_a_message(tmp_path, topics, compression):
     assert list(assert_agreement(tmp_path / 'bag').messages()) == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])
 def test_a_killed_bag_before_and_after_its_recovery(
     tmp_path, topics, messages, compression, capsys

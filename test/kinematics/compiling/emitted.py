@@ -25,6 +25,8 @@ from linkage_ros.kinematics.compiling import motion_at
 from linkage_ros.tools.models.source_code import C, FUNCTIONS, STATUSES, Subject, write_source
 import pytest
 
+from ...support.sampling import sample_count
+
 COMPILERS = {'C99': ('cc', '-x', 'c', '-std=c99'), 'C++': ('c++', '-x', 'c++', '-std=c++11')}
 
 needs = {
@@ -33,7 +35,7 @@ needs = {
 }
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Werror', '-ffp-contract=off')
 NUMBERS = list(STATUSES)
-COUNT = int(os.environ.get('LINKAGE_STATES', '400'))
+COUNT = int(os.environ.get('LINKAGE_STATES') or sample_count(400, 150))
 """States of each linkage; `make compiled` takes 100,000."""
 
 State = tuple[float, ...]

@@ -33,6 +33,8 @@ from linkage_ros.kinematics.compiling import (
 import numpy as np
 import pytest
 
+from ...support.sampling import sample_count
+
 # Code of a path for arrays: what it computes, what it keeps, and how it writes constants.
 
 
@@ -90,7 +92,7 @@ def test_a_row_is_used_again_when_nobody_needs_what_is_in_it():
 
 LINKAGES = sorted((Path(__file__).parents[3] / 'config' / 'linkages').glob('*.yaml'))
 ITERATED = {'class_3'}
-STATES = 10_000
+STATES = sample_count(10_000, 3_000)
 """Of a linkage of the gallery; one that is iterated takes a hundred times as long for each."""
 
 
@@ -120,6 +122,7 @@ def answered(call: Any, *numbers: float) -> str:
         return f'{type(error).__name__}: {error}'
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES])
 def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
     closure = closure_of(name)
@@ -135,6 +138,7 @@ def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
     assert left < 0.01 * closed, 'so many states leave the compiled way'
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize('family', FAMILIES)
 def test_random_linkages_of_every_topology_have_them(family):
     seen = set()

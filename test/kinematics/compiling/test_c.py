@@ -50,6 +50,7 @@ def told_of(
     return told
 
 
+@pytest.mark.sample(6)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
@@ -57,6 +58,7 @@ def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
     assert sum(one.status == 'CLOSED' for one in told) > COUNT / 3
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize('family', COMPILED)
 def test_any_topology_says_what_the_steps_say(family, tmp_path):
     topology = FAMILIES[family].make(random.Random(family))
@@ -149,6 +151,7 @@ def test_what_is_not_finite_is_indeterminate(odd, place, tmp_path):
     ]
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
 @pytest.mark.parametrize('header', [False, True])
 @pytest.mark.parametrize('name', GALLERY)
@@ -175,6 +178,7 @@ def test_links_iterated_with_several_inputs_are_refused():
         write_source(subject(closure), C('linkage', header=False))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['class III', 'class III sliders', 'class III chain'])
 def test_iterated_links_say_what_the_steps_say_in_many_linkages(name, tmp_path):
     closed = 0

@@ -48,6 +48,7 @@ def right(name: str, given: Sequence[State]) -> list[Told]:
     ]
 
 
+@pytest.mark.sample(5)
 @needs['C99']
 @pytest.mark.parametrize('name', GALLERY)
 def test_c_says_what_the_steps_say(name, tmp_path):
@@ -57,6 +58,7 @@ def test_c_says_what_the_steps_say(name, tmp_path):
     assert max(abs(value) for one in told for value in one.values) > 1e120
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', GALLERY)
 def test_python_says_what_the_steps_say(name):
     given = huge_states(name)
@@ -64,6 +66,7 @@ def test_python_says_what_the_steps_say(name):
     assert [told_by(solve, state) for state in given] == right(name, given)
 
 
+@pytest.mark.sample(5)
 @needs['JavaScript']
 @pytest.mark.parametrize('name', GALLERY)
 def test_javascript_says_what_the_steps_say(name, tmp_path):

@@ -54,6 +54,7 @@ def told_by(solve: Solve, state: State) -> Told:
     return Told(NUMBERS[status], tuple(value for group in groups for value in group))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_python_has_the_bits_of_the_steps(name):
@@ -179,6 +180,7 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
     return worst
 
 
+@pytest.mark.sample(6)
 @needs['JavaScript']
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)

@@ -303,7 +303,7 @@ class SteppedScene:
 
     def _run_tick(self) -> None:
         tick = self._pipeline.tick(self._tick_time())
-        for outputs, look in zip(self.outputs, tick.full_states, strict=True):
+        for outputs, look in zip(self.outputs, tick.states, strict=True):
             outputs.set_state(look)
         for motor in self.motors:
             motor.set_messages(tick.extras)
@@ -341,12 +341,6 @@ def _refuse_scene(scene: Scene) -> None:
                 'loads.wrenches',
                 'come on topics, for which an FMU has no inputs',
                 'leave them out',
-            )
-        if scene_linkage.accuracy is not None:
-            raise scene_linkage.content.error(
-                'accuracy',
-                'lets every machine choose its own solver',
-                'name a solver instead',
             )
         for effect in scene_linkage.effects:
             if '.' in effect:

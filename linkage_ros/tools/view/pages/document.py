@@ -21,6 +21,7 @@ from importlib.resources import files
 import json
 from typing import Any
 
+from linkage_ros.cli import Table
 from linkage_ros.errors import check_installed, escape_unprintable
 
 POLICY = (
@@ -127,20 +128,21 @@ def _within_script(text: str) -> str:
     return text.replace('</script', r'<\/script')
 
 
-def table_html(
-    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
-) -> Iterator[str]:
+def table_html(table: Table) -> Iterator[str]:
     """
     Yield a table within a figure, which the caller closes; columns of numbers align to the right.
 
     If all headings are empty, none is written.
     """
-    yield f'<figure><figcaption>{escape(title)}</figcaption>'
+    table = table.as_texts()
+    columns = [head.removeprefix('>') for head in table.heads]
+    numbers = [head.startswith('>') for head in table.heads]
+    yield f'<figure><figcaption>{escape(table.title)}</figcaption>'
     yield '<div class="scroll" tabindex="0"><table>'
     if any(columns):
         yield f'<thead><tr>{"".join(map(_head_cell, columns, numbers))}</tr></thead>'
     yield '<tbody>'
-    for row in rows:
+    for row in table.rows:
         yield f'<tr>{"".join(map(_body_cell, row, numbers))}</tr>'
     yield '</tbody></table></div>'
 

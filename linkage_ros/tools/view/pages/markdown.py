@@ -10,19 +10,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from linkage_ros.cli import Table
 
 
-def table_lines(
-    heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool] = ()
-) -> list[str]:
-    """
-    Return the lines of a table of Markdown cells.
-
-    ``numbers`` marks the columns that hold numbers and are aligned to the right; by default none.
-    """
-    rule = ['---:' if number else '---' for number in numbers or (False,) * len(heads)]
-    return [f'| {" | ".join(line)} |' for line in (heads, rule, *rows)]
+def table_lines(table: Table) -> list[str]:
+    """Return the lines of a table whose cells are Markdown; a title is left out."""
+    table = table.as_texts()
+    heads = [head.removeprefix('>') for head in table.heads]
+    rule = ['---:' if head.startswith('>') else '---' for head in table.heads]
+    return [f'| {" | ".join(line)} |' for line in (heads, rule, *table.rows)]
 
 
 def part_marks(name: str) -> tuple[str, str]:

@@ -49,7 +49,6 @@ from linkage_ros.tools.view.report.diagnostics_summary import (
 from linkage_ros.tools.view.report.html import (
     ReportHeader as ReportHeader,
     run_html as run_html,
-    TableOf as TableOf,
 )
 from linkage_ros.tools.view.report.joint_states import (
     JointStates as JointStates,

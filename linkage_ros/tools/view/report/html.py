@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import NamedTuple
 
+from linkage_ros.cli import Table
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.view.pages import facts_html, html_document, table_html
 from linkage_ros.tools.view.report.data import (
@@ -71,22 +72,13 @@ _ANGLE_CONTROLS = (
 )
 
 
-class TableOf(NamedTuple):
-    """A table, which may be collapsed at first; a leading ``>`` marks a column of numbers."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    folded: bool = False
-
-
-def tables_html(tables: Sequence[TableOf]) -> Iterator[str]:
+def tables_html(tables: Sequence[Table]) -> Iterator[str]:
     """Yield tables as HTML within the size limit; say how much is left out."""
     space = TABLE_BYTES
-    for index, table in enumerate(tables):
+    for index, table in enumerate(each.as_texts() for each in tables):
         if not table.rows:
             continue
-        space -= _BESIDE_TABLE + _row_size([shorten_text(table.title), *table.columns])
+        space -= _BESIDE_TABLE + _row_size([shorten_text(table.title), *table.heads])
         if space < 0:
             yield f'<p class="note">No room for {len(tables) - index} more tables.</p>'
             return
@@ -107,26 +99,24 @@ def _row_size(cells: Sequence[str]) -> int:
     return _BESIDE_ROW + sum(_BESIDE_CELL + len(each) for each in written)
 
 
-def _run_table_html(table: TableOf) -> Iterator[str]:
-    columns = [column.lstrip('>') for column in table.columns]
-    numbers = [column.startswith('>') for column in table.columns]
+def _run_table_html(table: Table) -> Iterator[str]:
     if table.folded:
         yield f'<details><summary>{escape(table.title)}</summary>'
-        yield from table_html('', columns, table.rows, numbers)
+        yield from table_html(table._replace(title=''))
         yield '</figure></details>'
     else:
-        yield from table_html(table.title, columns, table.rows, numbers)
+        yield from table_html(table)
         yield '</figure>'
 
 
-def run_tables(run: ReportedRun) -> Iterator[TableOf]:
+def run_tables(run: ReportedRun) -> Iterator[Table]:
     """Yield the tables of a run."""
-    yield TableOf(
+    yield Table(
         'Curves',
         ('joint', 'quantity', '>least', '>greatest', 'unit', 'on'),
         [row for curves in run.curves for row in _curve_ranges(curves)],
     )
-    yield TableOf(
+    yield Table(
         'Events',
         ('kind', '>count', '>first at [s]', 'what it is'),
         [
@@ -139,17 +129,17 @@ def run_tables(run: ReportedRun) -> Iterator[TableOf]:
             for key, lane in event_tracks(run).items()
         ],
     )
-    yield TableOf(
+    yield Table(
         'Samples rejected',
         ('reason', '>count'),
         [(reason, f'{count:,}') for reason, count in run.rejected.items()],
     )
-    yield TableOf(
+    yield Table(
         'Left out of the curves',
         ('of', 'reason', '>count'),
         [(of, reason, f'{count:,}') for (of, reason), count in run.left_out.items()],
     )
-    yield TableOf(
+    yield Table(
         'What the diagnostics said last',
         ('of', 'key', 'value'),
         [(task, key, value) for (task, key), value in run.last_values.items()],
@@ -175,7 +165,7 @@ class ReportHeader(NamedTuple):
     title: str
     facts: Sequence[tuple[str, str]]
     warnings: Sequence[str]
-    tables: Sequence[TableOf]
+    tables: Sequence[Table]
     wrapped: bool = False
 
 

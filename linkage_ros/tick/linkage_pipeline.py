@@ -1,0 +1,364 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Compute the state of one linkage at a tick: crank, closure, mechanism, sensors.
+
+Only the stages that the scene names are built; a tick never reads the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from importlib import import_module
+from operator import add
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.description import Scene, SceneLinkage
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics import Closure, Position, Status
+from linkage_ros.messages import Rejection
+from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
+from linkage_ros.stages.effects import (
+    Continuous,
+    first_values,
+    MechanismState,
+    SensorReading,
+    SensorStage,
+    wrap_all,
+    WriterStage,
+)
+from linkage_ros.tick.linkage_state import LinkageState
+from linkage_ros.tick.wanted_effects import choose_effects, WantedEffects
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics import AppliedForces, HeldWrench
+    from linkage_ros.stages.faults import Injection
+
+_FORCES_ONLY = {'pin_forces'}
+"""Effects whose messages contain joint forces only."""
+
+
+class AuxiliaryOutput(NamedTuple):
+    """A message published beside the joint states."""
+
+    effect: str  # The effect that asks for it
+    # Name and type (package/msg/Type) of the topic.
+    topic: str
+    message: str
+    writer: WriterStage  # Serializes the message
+
+    @property
+    def forces_only(self) -> bool:
+        """Return whether the message contains joint forces only."""
+        return self.effect in _FORCES_ONLY
+
+
+class LinkagePipeline:
+    """
+    The pipeline of one linkage. To reset it, build it again.
+
+    A given closure is reused: it has no state. Raise `FileError` if parts of the scene do not fit
+    together, or if the linkage does not close.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        scene_linkage: SceneLinkage,
+        closure: Closure | None,
+        injection: Injection | None,
+    ) -> None:
+        self.scene_linkage = scene_linkage
+        try:
+            self._build_stages(scene, closure, injection)
+        except DefinitionError as error:
+            of_linkage = error.where.startswith('masses')
+            content = scene_linkage.linkage_content if of_linkage else scene_linkage.content
+            raise content.locate_error(error) from None
+
+    def _build_stages(
+        self, scene: Scene, closure: Closure | None, injection: Injection | None
+    ) -> None:
+        scene_linkage = self.scene_linkage
+        self.wanted = wanted = choose_effects(scene_linkage)
+        self.effect_names = tuple(effect.name for effect in wanted.effects)
+        """Names of the computed effects, in physical order."""
+        seed = f'{scene.seed}/{scene_linkage.name}'
+        self.closure = closure or _make_closure(scene_linkage, wanted, seed)
+        friction = wanted.parameters.get('friction')
+        self.context = Context(
+            closure=self.closure,
+            rate=scene.rate,
+            needs_rate='velocity' in self.effect_names,
+            seed=seed,
+            loads=scene_linkage.loads,
+            friction=friction.friction if friction is not None else None,
+            prefix=scene_linkage.prefix,
+            dependent=scene.dependent_joints,
+            effects=frozenset(scene_linkage.effects),
+            moves_by_rates=wanted.moves_by_rates,
+        )
+        self._build_drive(wanted, injection)
+        self._build_mechanism(wanted, injection)
+        self._build_sensors(wanted, injection, wrapped=scene.wrapped)
+        self._build_outputs(wanted)
+
+    def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
+        """Build what gives the crank state: the drive, its messages and the effects on it."""
+        drive, parameters = self.scene_linkage.drive
+        module = import_module(DRIVES[drive])
+        self.topic: str = getattr(module, 'TOPIC', '')
+        """Topic of the drive; '' for none."""
+        self.drive: Drive = module.build(parameters, self.context)
+        self._parse_sample = module.reader(parameters, self.context) if self.topic else None
+        self._message_faults = (
+            injection.build_functions('message') if injection is not None else []
+        )
+        if self._message_faults and not self.topic:
+            raise DefinitionError(
+                'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
+            )
+        self.drive_stages = [*wanted.build('drive_stage', self.context).values()]
+
+    def _build_mechanism(self, wanted: WantedEffects, injection: Injection | None) -> None:
+        """Build what gives the motion: the closure, the wrenches, the faults and the effects."""
+        loads = self.scene_linkage.loads if wanted.computes_forces else None
+        self.changing_loads: AppliedForces | None = None
+        """Loads that change with the time or by messages; None without any."""
+        self.wrenches: dict[str, HeldWrench] = {}
+        """The wrenches that messages give, by the name of the link."""
+        if loads is not None and (loads.applied.changes_with_time or loads.applied.wrenches):
+            self.changing_loads = self.context.mechanics.applied
+            assert self.changing_loads is not None
+            self.wrenches = self.changing_loads.wrenches
+        self._solve_loops = self.closure.position
+        if self.scene_linkage.silent_beyond_limits and self.closure.bounds:
+            self._solve_loops = _suppress_beyond_limits(self._solve_loops, self.closure)
+        self.mechanism_faults = (
+            injection.build_functions('mechanism', self.context) if injection is not None else []
+        )
+        self.mechanism_stages = [*wanted.build('stage', self.context).values()]
+
+    def _build_sensors(
+        self, wanted: WantedEffects, injection: Injection | None, *, wrapped: bool
+    ) -> None:
+        """Build what makes the published reading of the ideal one."""
+        sensors = wanted.build('sensor', self.context)
+        if {'encoder', 'rate_limit'} <= set(sensors):
+            sensors['rate_limit'].read_by(sensors['encoder'])
+        joints = self.scene_linkage.joint_names
+        broken = injection.build_functions('sensor', joints) if injection is not None else []
+        angles = Continuous(self.closure.turning, first_values(self.closure))
+        behind = [*sensors.values(), *broken]
+        self.running = angles if behind or not wrapped else None
+        self.observed_effects = wanted.named
+        if behind and 'velocity' in self.effect_names and 'velocity' not in wanted.named:
+            # Only used between readings; not published.
+            self.observed_effects |= {'velocity'}
+            behind.append(_remove_rates)
+        if wrapped:
+            behind.append(wrap_all(self.closure.turning))
+        running = [] if self.running is None else [self.running]
+        self._sensor_stages = [SensorStage.from_sensor(sensor) for sensor in (*running, *behind)]
+        self.apply_later_sensors = (
+            partial(self._apply_sensors, first=len(running)) if behind else None
+        )
+
+    def _build_outputs(self, wanted: WantedEffects) -> None:
+        """Build the messages beside the joint states: of the effects, and of the drive."""
+        scene_linkage = self.scene_linkage
+        writers = wanted.build('writer', self.context, wanted.named)
+        self.extras = [
+            _make_output(
+                effect.name,
+                effect.topic,
+                effect.message,
+                writers[effect.name],
+                scene_linkage.name,
+                of_reading=effect.of_reading,
+            )
+            for effect in wanted.effects
+            if effect.name in writers
+        ]
+        """The topics beside the joint states."""
+        drive, parameters = scene_linkage.drive
+        module = import_module(DRIVES[drive])
+        if (of_drive := getattr(module, 'writer', None)) is not None:
+            written = of_drive(parameters, self.context, self.drive)
+            if written is not None:
+                topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
+                self.extras.append(
+                    _make_output(
+                        drive, topic, message, written, scene_linkage.name, of_reading=True
+                    )
+                )
+
+    def interpret(self, now: int) -> LinkageState:
+        """Return the state of the linkage at a time, in [ns], step by step."""
+        crank = self.drive.state(now)
+        if crank is not None:
+            for stage in self.drive_stages:
+                crank = stage(crank)
+        return self.interpret_from(now, crank)
+
+    def interpret_from(self, now: int, crank: CrankState | None) -> LinkageState:
+        """Return the state of the linkage, step by step from the crank state on."""
+        if crank is None:
+            reading = self._apply_sensors_in_gap(now)
+            return LinkageState(self.solve_mechanism, None, reading, solution=(None, None))
+        position = self._solve_loops(*crank.angles)
+        for fault in self.mechanism_faults:
+            position = fault(position)
+        if not position.joints:
+            reading = self._apply_sensors_in_gap(now)
+            return LinkageState(self.solve_mechanism, crank, reading, solution=(position, None))
+        # The time of the loads begins here: a bag does not know of ticks before the first pose.
+        given = self.changing_loads.given_at(now) if self.changing_loads is not None else ()
+        motion = self._mechanism_motion(crank, position, given)
+        reading = self._apply_sensors(now, self.observe(now, motion))
+        return LinkageState(self.solve_mechanism, crank, reading, (), given, (position, motion))
+
+    def solve_mechanism(
+        self, crank: CrankState, given: tuple[float, ...]
+    ) -> tuple[Position, MechanismState]:
+        """Return position and motion of the linkage for a crank state of a compiled tick."""
+        position = self._solve_loops(*crank.angles)
+        return position, self._mechanism_motion(crank, position, given)
+
+    def _mechanism_motion(
+        self, crank: CrankState, position: Position, given: tuple[float, ...]
+    ) -> MechanismState:
+        """Return the motion of the mechanism in a pose."""
+        motion = MechanismState(crank, position, None, None, (), (), (), given)
+        for stage in self.mechanism_stages:
+            motion = stage(motion)
+        return motion
+
+    def observe(self, now: int, motion: MechanismState) -> SensorReading:
+        """Return the ideal reading of a motion, with the values that the scene asks for."""
+        position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
+        efforts: tuple[float, ...] = ()
+        if 'effort' in self.observed_effects and motion.efforts:
+            # Efforts of the inputs, which are published first; 0 for the other joints.
+            efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
+        return SensorReading(
+            now,
+            tuple(map(add, position.joints, motion.deflection))
+            if motion.deflection
+            else position.joints,
+            velocity.joints if velocity and 'velocity' in self.observed_effects else (),
+            acceleration.joints
+            if acceleration and 'acceleration' in self.observed_effects
+            else (),
+            efforts,
+        )
+
+    def _apply_sensors(
+        self, now: int, ideal: SensorReading, first: int = 0
+    ) -> SensorReading | None:
+        """Apply the sensor stages, from index `first` on, to an ideal reading."""
+        reading: SensorReading | None = ideal
+        gap = False
+        for sensor in self._sensor_stages[first:]:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+                gap = sensor.gap is not None
+            elif sensor.silence is not None:
+                reading = sensor.silence(now, gap)
+        return reading
+
+    def _apply_sensors_in_gap(self, now: int) -> SensorReading | None:
+        """Return the sensor reading where the linkage has no pose."""
+        reading: SensorReading | None = None
+        for sensor in self._sensor_stages:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+            elif sensor.gap is not None:
+                reading = sensor.gap(now)
+        return reading
+
+    def write_extras(self, now: int, state: LinkageState) -> list[bytes]:
+        """Return the auxiliary messages at a time, in [ns]; b'' for none."""
+        return [_write_extra(extra, now, state) for extra in self.extras]
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether a gap in the readings began at the last tick, if that had no pose."""
+        return any(sensor.gap_begins for sensor in self._sensor_stages)
+
+    def is_stale(self, now: int) -> bool:
+        """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
+        return now - self.drive.stamp > self.drive.max_age > 0
+
+    def offer(self, message: bytes, now: int) -> Rejection | None:
+        """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
+        if self._parse_sample is None:
+            return Rejection.MISSING
+        for spoil in self._message_faults:
+            message = spoil(message)
+        sample = self._parse_sample(message)
+        if isinstance(sample, Rejection):
+            return sample
+        rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
+        return rejection
+
+
+def _write_extra(extra: AuxiliaryOutput, now: int, state: LinkageState) -> bytes:
+    writer, reading = extra.writer, state.reading
+    if writer.due is not None and not writer.due(now):
+        return b''
+    if writer.of_reading:
+        return b'' if reading is None else writer.write(now, None, reading)
+    if state.is_compiled and extra.forces_only:
+        return b'' if reading is None else writer.write(now, state, reading)
+    if state.motion is not None:
+        return b'' if reading is None else writer.write(now, state.motion, reading)
+    if state.position is None or writer.no_pose is None:
+        return b''
+    return writer.no_pose(now, state.position)
+
+
+def _make_output(
+    name: str, topic: str, message: str, writer: Any, linkage_name: str, *, of_reading: bool
+) -> AuxiliaryOutput:
+    within = f'~/{linkage_name}/{topic[2:]}' if linkage_name else topic
+    return AuxiliaryOutput(
+        name, within, message, WriterStage.from_writer(writer, of_reading=of_reading)
+    )
+
+
+def _remove_rates(_now: int, reading: SensorReading) -> SensorReading:
+    """Remove the rates, which were only used between readings."""
+    return reading._replace(rates=())
+
+
+def _suppress_beyond_limits(
+    close: Callable[..., Position], closure: Closure
+) -> Callable[..., Position]:
+    """Wrap a closure function so that a pose beyond the joint limits publishes no joints."""
+
+    def close_within(*inputs: float) -> Position:
+        position = close(*inputs)
+        if position.joints and closure.bounds.first_exceeded(inputs, position.joints) is not None:
+            return replace(position, status=Status.LIMITED, joints=())
+        return position
+
+    return close_within
+
+
+def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
+    """Return the closure of a linkage as its effects alter it."""
+    linkage = scene_linkage.linkage
+    for effect in wanted.effects:
+        if effect.alter is not None:
+            random = Context.generator(seed, effect.name)
+            linkage = effect.alter(wanted.parameters[effect.name], linkage, random)
+    return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)
