@@ -335,13 +335,13 @@ class SingleDofMechanism:
         resisted = self.friction_effort(value, copysign(_BEGINNING, push), time, 0.0, 0.0)
         return inf if resisted is None else most + resisted
 
-    def _reach_value(self, value: float, rate: float) -> Motion | None:
+    def _reach_value(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
             return None
         terms = self.terms(value)
         if terms is None or terms.inertia < _LEAST:
             return None
-        return Motion(value, rate, terms)
+        return Motion(value, rate, terms, ahead)
 
     def _find_event(
         self,
