@@ -65,7 +65,6 @@ from linkage_ros.kinematics.equations import (
     evaluate_constraints as evaluate_constraints,
     OnLine as OnLine,
     Parallel as Parallel,
-    point_in_line_frame as point_in_line_frame,
 )
 from linkage_ros.kinematics.grashof import (
     CHANGE_POINTS as CHANGE_POINTS,

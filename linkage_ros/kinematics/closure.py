@@ -616,12 +616,12 @@ class Closure:
         limited to them.
         """
         found = closing_ranges(self)
-        return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
+        return without_mirrored(self.linkage, self.structure, found) if found else ()
 
     @BuiltProperty
     def zero_length(self) -> float | None:
         """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
-        return zero_length(self.linkage, self.structure, 0)
+        return zero_length(self.linkage, self.structure)
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
         """Return how near a closed position is to a singularity."""

@@ -43,6 +43,59 @@ class End(NamedTuple):
     arm: complex
     pin: int = -1
 
+    def rotated_arm(self, unknowns: Sequence[float]) -> complex:
+        """Return the arm on a body, in the frame of the ground."""
+        return self.arm * unit_vector(unknowns[3 * self.body]) if self.arm else 0j
+
+    def place_and_arm(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[complex, complex]:
+        """Return the point, and its arm in the frame of the ground."""
+        if self.body < 0:
+            return solved.pins[self.pin], 0j
+        k = 3 * self.body
+        arm = self.rotated_arm(unknowns)
+        return add(make_vector(unknowns[k + 1], unknowns[k + 2]), arm), arm
+
+    def differentiate(self, motion: GroupMotion) -> tuple[complex, ...]:
+        """Return the point, its velocity, and its acceleration if the motion has some."""
+        if self.body < 0:
+            states = motion.solved, motion.solved_rates, motion.solved_accelerations
+            return tuple(state.pins[self.pin] for state in states if state is not None)
+        k = 3 * self.body
+        place, arm = self.place_and_arm(motion.unknowns, motion.solved)
+        turn = motion.rates[k]
+        velocity = make_vector(motion.rates[k + 1], motion.rates[k + 2])
+        # Where the links stand still, or the point is that of the link, nothing is to be computed.
+        velocity = add(velocity, multiply(make_vector(0.0, turn), arm))
+        if motion.solved_accelerations is None:
+            return place, velocity
+        change, *pull = motion.accelerations[k : k + 3]
+        swirl = multiply(make_vector(-turn * turn, change), arm)
+        return place, velocity, add(make_vector(*pull), swirl)
+
+
+class GroupMotion(NamedTuple):
+    """
+    The unknowns and the links solved before them, their rates, and their accelerations if wanted.
+
+    The highest derivatives of the unknowns may be 0: the constraints then tell what these lack.
+    """
+
+    unknowns: Sequence[Any]
+    solved: LinkState
+    rates: Sequence[Any]
+    solved_rates: LinkState
+    accelerations: Sequence[Any] = ()
+    solved_accelerations: LinkState | None = None
+
+    @property
+    def highest(self) -> tuple[Sequence[Any], LinkState]:
+        """Return the highest derivatives by time."""
+        if self.solved_accelerations is None:
+            return self.rates, self.solved_rates
+        return self.accelerations, self.solved_accelerations
+
 
 class BodyDirection(NamedTuple):
     """A direction: the angle of ``body``, or a coordinate, plus a constant, in [rad]."""
@@ -51,12 +104,73 @@ class BodyDirection(NamedTuple):
     coordinate: int
     direction: float
 
+    def angle(self, unknowns: Sequence[float], solved: LinkState) -> float:
+        """Return the angle of the direction."""
+        return self.rate(unknowns, solved) + self.direction
+
+    def rate(self, values: Sequence[float], state: LinkState) -> float:
+        """Return its derivative, from derivatives of the unknowns and of the solved links."""
+        return values[3 * self.body] if self.body >= 0 else state.coordinates[self.coordinate]
+
+    def measure(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[float, dict[int, float]]:
+        """Return the angle, and its derivatives by the unknowns."""
+        slopes = {3 * self.body: 1.0} if self.body >= 0 else {}
+        return self.angle(unknowns, solved), slopes
+
+    def measured_change(self, motion: GroupMotion) -> float:
+        """Return the highest derivative of the angle by time."""
+        return self.rate(*motion.highest)
+
 
 class CoincidentPoints(NamedTuple):
     """Two points coincide."""
 
     one: End
     other: End
+
+    def evaluate(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[list[float], list[list[float]]]:
+        """Return the residuals, and the rows of their derivatives by the unknowns."""
+        across, along = [0.0] * len(unknowns), [0.0] * len(unknowns)
+        (one, turn), (other, back) = (end.place_and_arm(unknowns, solved) for end in self)
+        apart = one - other
+        if self.one.body >= 0:
+            k, end = 3 * self.one.body, 3 * self.one.body + 3
+            across[k:end] = -turn.imag, 1.0, 0.0
+            along[k:end] = turn.real, 0.0, 1.0
+        if self.other.body >= 0:
+            k, end = 3 * self.other.body, 3 * self.other.body + 3
+            across[k:end] = back.imag, -1.0, 0.0
+            along[k:end] = -back.real, 0.0, -1.0
+        return [apart.real, apart.imag], [across, along]
+
+    def differentiate(self, motion: GroupMotion) -> list[float]:
+        """Return the highest derivative of the residuals by time."""
+        one, other = (end.differentiate(motion)[-1] for end in self)
+        apart = subtract(one, other)
+        return [apart.real, apart.imag]
+
+    def bound_change(
+        self,
+        unknowns: Sequence[float],
+        solved: LinkState,
+        moved: Sequence[float],
+        known_moved: LinkState,
+    ) -> list[list[float]]:
+        """Return a bound of the change of the rows; see `bound_jacobian_change`."""
+        across, along = [0.0] * len(unknowns), [0.0] * len(unknowns)
+        for end in self:
+            if end.body >= 0:
+                k = 3 * end.body
+                turn, arm = moved[k], end.place_and_arm(unknowns, solved)[1]
+                # |d(r·sin)| ≤ |r·cos|·|dφ| + |r|·dφ²/2, and likewise for the cosine.
+                curved = 0.5 * abs(end.arm) * turn * turn
+                across[k] += abs(arm.real) * turn + curved
+                along[k] += abs(arm.imag) * turn + curved
+        return [across, along]
 
 
 class Parallel(NamedTuple):
@@ -67,6 +181,30 @@ class Parallel(NamedTuple):
     angle: float
     turn: int = 0
 
+    def evaluate(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[list[float], list[list[float]]]:
+        """Return the residual, and the row of its derivatives by the unknowns."""
+        turned = solved.coordinates[self.turn] if self.turn else 0.0
+        angle = self.one.angle(unknowns, solved) - self.other.angle(unknowns, solved)
+        row = [0.0] * len(unknowns)
+        for direction, sign in ((self.one, 1.0), (self.other, -1.0)):
+            if direction.body >= 0:
+                row[3 * direction.body] += sign
+        return [remainder(angle - self.angle - turned, tau)], [row]
+
+    def differentiate(self, motion: GroupMotion) -> list[float]:
+        """Return the highest derivative of the residual by time."""
+        values, state = motion.highest
+        driven = state.coordinates[self.turn] if self.turn else 0.0
+        return [self.one.rate(values, state) - self.other.rate(values, state) - driven]
+
+    def bound_change(
+        self, unknowns: Sequence[float], *_: Sequence[float] | LinkState
+    ) -> list[list[float]]:
+        """Return a bound of the change of the row: it is constant."""
+        return [[0.0] * len(unknowns)]
+
 
 class OnLine(NamedTuple):
     """A point on a line through another one; at the distance of the input ``slide``, if not 0."""
@@ -76,6 +214,95 @@ class OnLine(NamedTuple):
     line: BodyDirection
     slide: int = 0
 
+    def place(self, unknowns: Any, solved: LinkState) -> complex:
+        """Return the point in the frame of the line."""
+        point, through = (e.place_and_arm(unknowns, solved)[0] for e in (self.point, self.through))
+        return (point - through) * unit_vector(-self.line.angle(unknowns, solved))
+
+    def slopes(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[complex, dict[int, complex]]:
+        """Return the point in the frame of the line, and its derivatives by the unknowns."""
+        back = unit_vector(-self.line.angle(unknowns, solved))
+        place = self.place(unknowns, solved)
+        columns: dict[int, complex] = {}
+        for end, sign in ((self.point, 1.0), (self.through, -1.0)):
+            if end.body >= 0:
+                k = 3 * end.body
+                arm = end.place_and_arm(unknowns, solved)[1]
+                for column, slope in ((k, 1j * arm), (k + 1, 1.0 + 0j), (k + 2, 1j)):
+                    columns[column] = columns.get(column, 0j) + sign * slope * back
+        if self.line.body >= 0:
+            k = 3 * self.line.body
+            columns[k] = columns.get(k, 0j) - 1j * place
+        return place, columns
+
+    def move(self, motion: GroupMotion) -> tuple[complex, ...]:
+        """Return the derivatives of the point by time, in the frame of the line, from the 0th."""
+        ends = (end.differentiate(motion) for end in (self.point, self.through))
+        back = unit_vector(-self.line.angle(motion.unknowns, motion.solved))
+        place, velocity, *pull = ((one - other) * back for one, other in zip(*ends, strict=True))
+        turn = self.line.rate(motion.rates, motion.solved_rates)
+        velocity -= make_vector(0.0, turn) * place
+        if motion.solved_accelerations is None:
+            return place, velocity
+        change = self.line.rate(*motion.highest)
+        swirl = make_vector(0.0, 2.0 * turn) * velocity + make_vector(-turn * turn, change) * place
+        return place, velocity, pull[0] - swirl
+
+    def measure(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[float, dict[int, float]]:
+        """Return the slide, and its derivatives by the unknowns."""
+        place, slopes = self.slopes(unknowns, solved)
+        return place.real, {column: slope.real for column, slope in slopes.items()}
+
+    def measured_change(self, motion: GroupMotion) -> float:
+        """Return the highest derivative of the slide by time."""
+        return self.move(motion)[-1].real
+
+    def evaluate(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[list[float], list[list[float]]]:
+        """Return the residual, and the row of its derivatives by the unknowns."""
+        place, slopes = self.slopes(unknowns, solved)
+        row = [0.0] * len(unknowns)
+        for column, slope in slopes.items():
+            row[column] = slope.real if self.slide else slope.imag
+        return [place.real - solved.coordinates[self.slide] if self.slide else place.imag], [row]
+
+    def differentiate(self, motion: GroupMotion) -> list[float]:
+        """Return the highest derivative of the residual by time."""
+        moved = self.move(motion)[-1]
+        if not self.slide:
+            return [moved.imag]
+        return [moved.real - motion.highest[1].coordinates[self.slide]]
+
+    def bound_change(
+        self,
+        unknowns: Sequence[float],
+        solved: LinkState,
+        moved: Sequence[float],
+        known_moved: LinkState,
+    ) -> list[list[float]]:
+        """Return a bound of the change of the row; see `bound_jacobian_change`."""
+        row = [0.0] * len(unknowns)
+        turn = self.line.rate(moved, known_moved)
+        far = 0.0
+        for end in (self.point, self.through):
+            if end.body < 0:
+                far += float(abs(known_moved.pins[end.pin]))
+                continue
+            k = 3 * end.body
+            reach = abs(end.arm)
+            far += hypot(moved[k + 1], moved[k + 2]) + reach * moved[k]
+            row[k] += reach * (moved[k] + turn)
+            row[k + 1] += turn
+            row[k + 2] += turn
+        if self.line.body >= 0:
+            row[3 * self.line.body] += abs(self.place(unknowns, solved)) * turn + far
+        return [row]
+
 
 class Geared(NamedTuple):
     """A sum of factors times angles or slides, and a constant, is a multiple of the period."""
@@ -83,6 +310,30 @@ class Geared(NamedTuple):
     terms: tuple[tuple[float, BodyDirection | OnLine], ...]
     constant: float
     period: float  # Infinite if the sum is 0
+
+    def evaluate(
+        self, unknowns: Sequence[float], solved: LinkState
+    ) -> tuple[list[float], list[list[float]]]:
+        """Return the residual, and the row of its derivatives by the unknowns."""
+        total, row = self.constant, [0.0] * len(unknowns)
+        for factor, of in self.terms:
+            value, slopes = of.measure(unknowns, solved)
+            total += factor * value
+            for column, slope in slopes.items():
+                row[column] += factor * slope
+        return [remainder(total, self.period) if self.period else total], [row]
+
+    def differentiate(self, motion: GroupMotion) -> list[float]:
+        """Return the highest derivative of the residual by time."""
+        return [sum(factor * of.measured_change(motion) for factor, of in self.terms)]
+
+    def bound_change(self, unknowns: Sequence[float], *given: Any) -> list[list[float]]:
+        """Return a bound of the change of the row; see `bound_jacobian_change`."""
+        row = np.zeros(len(unknowns))
+        for factor, of in self.terms:
+            if isinstance(of, OnLine):
+                row += abs(factor) * np.array(of.bound_change(unknowns, *given)[0])
+        return [row.tolist()]
 
 
 Constraint = CoincidentPoints | Parallel | OnLine | Geared
@@ -92,69 +343,15 @@ def evaluate_constraints(
     constraints: Sequence[Constraint], unknowns: Sequence[float], solved: LinkState
 ) -> tuple[list[float], list[list[float]]]:
     """Return the residuals of the constraints, and their derivatives by the unknowns, as rows."""
-    n = len(unknowns)
-    errors: list[float] = []
-    rows: list[list[float]] = []
-    x = solved.coordinates
-    for constraint in constraints:
-        if isinstance(constraint, CoincidentPoints):
-            (one, turn), (other, back) = (point_and_arm(e, unknowns, solved) for e in constraint)
-            apart = one - other
-            errors += [apart.real, apart.imag]
-            across, along = [0.0] * n, [0.0] * n
-            if constraint.one.body >= 0:
-                k, end = 3 * constraint.one.body, 3 * constraint.one.body + 3
-                across[k:end] = -turn.imag, 1.0, 0.0
-                along[k:end] = turn.real, 0.0, 1.0
-            if constraint.other.body >= 0:
-                k, end = 3 * constraint.other.body, 3 * constraint.other.body + 3
-                across[k:end] = back.imag, -1.0, 0.0
-                along[k:end] = -back.real, 0.0, -1.0
-            rows += [across, along]
-        elif isinstance(constraint, Parallel):
-            turned = x[constraint.turn] if constraint.turn else 0.0
-            angle = _direction_angle(constraint.one, unknowns, x) - _direction_angle(
-                constraint.other, unknowns, x
-            )
-            errors.append(remainder(angle - constraint.angle - turned, tau))
-            row = [0.0] * n
-            for end_facing, sign in ((constraint.one, 1.0), (constraint.other, -1.0)):
-                if end_facing.body >= 0:
-                    row[3 * end_facing.body] += sign
-            rows.append(row)
-        elif isinstance(constraint, Geared):
-            total, row = constraint.constant, [0.0] * n
-            for factor, of in constraint.terms:
-                if isinstance(of, BodyDirection):
-                    total += factor * _direction_angle(of, unknowns, x)
-                    slopes = {3 * of.body: 1.0 + 0j} if of.body >= 0 else {}
-                else:
-                    place, slopes = _line_slopes(of, unknowns, solved)
-                    total += factor * place.real
-                for column, slope in slopes.items():
-                    row[column] += factor * slope.real
-            errors.append(remainder(total, constraint.period) if constraint.period else total)
-            rows.append(row)
-        else:
-            place, slopes = _line_slopes(constraint, unknowns, solved)
-            row = [0.0] * n
-            for column, slope in slopes.items():
-                row[column] = slope.real if constraint.slide else slope.imag
-            driven = constraint.slide
-            errors.append(place.real - x[driven] if driven else place.imag)
-            rows.append(row)
-    return errors, rows
+    parts = [constraint.evaluate(unknowns, solved) for constraint in constraints]
+    return [e for errors, _ in parts for e in errors], [row for _, rows in parts for row in rows]
 
 
-def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
-    """Return whether the residuals of ratios are off by less than a part of their periods."""
-    row = 0
-    for constraint in constraints:
-        period = constraint.period if isinstance(constraint, Geared) else 0.0
-        if period and not off[row] < part * period:
-            return False
-        row += 2 if isinstance(constraint, CoincidentPoints) else 1
-    return True
+def differentiate_constraints(
+    constraints: Sequence[Constraint], motion: GroupMotion
+) -> list[float]:
+    """Return the highest derivative of the constraints by time."""
+    return [value for constraint in constraints for value in constraint.differentiate(motion)]
 
 
 def bound_jacobian_change(
@@ -170,237 +367,19 @@ def bound_jacobian_change(
     ``moved`` is the largest change of each unknown, in either direction; ``known_moved`` the
     largest change of each known coordinate and pin.
     """
-    n = len(unknowns)
-    rows = []
-    values, ways = unknowns.tolist(), moved.tolist()
+    given = unknowns.tolist(), solved, moved.tolist(), known_moved
+    return np.array([row for constraint in constraints for row in constraint.bound_change(*given)])
+
+
+def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:
+    """Return whether the residuals of ratios are off by less than a part of their periods."""
+    row = 0
     for constraint in constraints:
-        if isinstance(constraint, CoincidentPoints):
-            across, along = [0.0] * n, [0.0] * n
-            for end in constraint:
-                if end.body >= 0:
-                    k = 3 * end.body
-                    turn, arm = ways[k], point_and_arm(end, values, solved)[1]
-                    # |d(r·sin)| ≤ |r·cos|·|dφ| + |r|·dφ²/2, and likewise for the cosine.
-                    curved = 0.5 * abs(end.arm) * turn * turn
-                    across[k] += abs(arm.real) * turn + curved
-                    along[k] += abs(arm.imag) * turn + curved
-            rows += [across, along]
-        elif isinstance(constraint, Parallel):
-            rows.append([0.0] * n)
-        elif isinstance(constraint, Geared):
-            row = np.zeros(n)
-            for factor, of in constraint.terms:
-                if isinstance(of, OnLine):
-                    row += abs(factor) * np.array(
-                        _line_spread(of, values, solved, ways, known_moved)
-                    )
-            rows.append(row.tolist())
-        else:
-            rows.append(_line_spread(constraint, values, solved, ways, known_moved))
-    return np.array(rows)
-
-
-def _line_spread(
-    line: OnLine,
-    values: Sequence[float],
-    solved: LinkState,
-    ways: Sequence[float],
-    moved: LinkState,
-) -> list[float]:
-    row = [0.0] * len(values)
-    rail = line.line
-    turn = ways[3 * rail.body] if rail.body >= 0 else moved.coordinates[rail.coordinate]
-    far = 0.0
-    for end in (line.point, line.through):
-        if end.body < 0:
-            far += float(abs(moved.pins[end.pin]))
-            continue
-        k = 3 * end.body
-        reach = abs(end.arm)
-        far += hypot(ways[k + 1], ways[k + 2]) + reach * ways[k]
-        row[k] += reach * (ways[k] + turn)
-        row[k + 1] += turn
-        row[k + 2] += turn
-    if rail.body >= 0:
-        row[3 * rail.body] += abs(point_in_line_frame(line, solved, values)) * turn + far
-    return row
-
-
-def differentiate_constraints(
-    constraints: Sequence[Constraint],
-    unknowns: Sequence[float],
-    solved: LinkState,
-    solved_velocities: LinkState,
-    rates: Sequence[float],
-    solved_accelerations: LinkState | None,
-    accelerations: Sequence[float],
-) -> list[float]:
-    """Return the first derivative of the constraints; the second if changes are given."""
-    order = 1 if solved_accelerations is None else 2
-    derivatives: list[float] = []
-    for constraint in constraints:
-        if isinstance(constraint, CoincidentPoints):
-            one, other = (
-                _point_motion(
-                    e,
-                    unknowns,
-                    solved,
-                    solved_velocities,
-                    rates,
-                    solved_accelerations,
-                    accelerations,
-                )[order]
-                for e in constraint
-            )
-            apart = subtract(one, other)
-            derivatives += [apart.real, apart.imag]
-        elif isinstance(constraint, Parallel):
-            state = solved_velocities if solved_accelerations is None else solved_accelerations
-            values = rates if solved_accelerations is None else accelerations
-            one, other = (
-                _direction_rate(f, values, state) for f in (constraint.one, constraint.other)
-            )
-            driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
-            derivatives.append(one - other - driven)
-        elif isinstance(constraint, Geared):
-            state = solved_velocities if solved_accelerations is None else solved_accelerations
-            values = rates if solved_accelerations is None else accelerations
-            given = unknowns, solved, solved_velocities, rates, solved_accelerations, accelerations
-            derivatives.append(
-                sum(
-                    factor
-                    * (
-                        _direction_rate(of, values, state)
-                        if isinstance(of, BodyDirection)
-                        else line_motion(of, *given)[order].real
-                    )
-                    for factor, of in constraint.terms
-                )
-            )
-        else:
-            moved = line_motion(
-                constraint,
-                unknowns,
-                solved,
-                solved_velocities,
-                rates,
-                solved_accelerations,
-                accelerations,
-            )[order]
-            if constraint.slide:
-                state = solved_velocities if solved_accelerations is None else solved_accelerations
-                derivatives.append(moved.real - state.coordinates[constraint.slide])
-            else:
-                derivatives.append(moved.imag)
-    return derivatives
-
-
-def _direction_angle(of: BodyDirection, unknowns: Sequence[float], x: Sequence[float]) -> float:
-    base = unknowns[3 * of.body] if of.body >= 0 else x[of.coordinate]
-    return base + of.direction
-
-
-def _direction_rate(of: BodyDirection, values: Sequence[float], state: LinkState) -> float:
-    return values[3 * of.body] if of.body >= 0 else state.coordinates[of.coordinate]
-
-
-def end_arm(end: End, unknowns: Sequence[float]) -> complex:
-    """Return the arm of an end on a body, in the frame of the ground."""
-    return end.arm * unit_vector(unknowns[3 * end.body]) if end.arm else 0j
-
-
-def point_and_arm(
-    end: End, unknowns: Sequence[float], solved: LinkState
-) -> tuple[complex, complex]:
-    """Return a point, and its arm in the frame of the ground."""
-    if end.body < 0:
-        return solved.pins[end.pin], 0j
-    k = 3 * end.body
-    arm = end_arm(end, unknowns)
-    return add(make_vector(unknowns[k + 1], unknowns[k + 2]), arm), arm
-
-
-def point_in_line_frame(line: OnLine, solved: LinkState, unknowns: Any) -> complex:
-    """Return a point in the frame of its line."""
-    point, through = (point_and_arm(e, unknowns, solved)[0] for e in (line.point, line.through))
-    return (point - through) * unit_vector(
-        -_direction_angle(line.line, unknowns, solved.coordinates)
-    )
-
-
-def _line_slopes(
-    line: OnLine, unknowns: Sequence[float], solved: LinkState
-) -> tuple[complex, dict[int, complex]]:
-    """Return a point in the frame of its line, and its derivatives by the unknowns."""
-    back = unit_vector(-_direction_angle(line.line, unknowns, solved.coordinates))
-    place = point_in_line_frame(line, solved, unknowns)
-    columns: dict[int, complex] = {}
-    for end, sign in ((line.point, 1.0), (line.through, -1.0)):
-        if end.body >= 0:
-            k = 3 * end.body
-            arm = point_and_arm(end, unknowns, solved)[1]
-            for column, slope in ((k, 1j * arm), (k + 1, 1.0 + 0j), (k + 2, 1j)):
-                columns[column] = columns.get(column, 0j) + sign * slope * back
-    if line.line.body >= 0:
-        k = 3 * line.line.body
-        columns[k] = columns.get(k, 0j) - 1j * place
-    return place, columns
-
-
-def _point_motion(
-    end: End,
-    unknowns: Sequence[float],
-    solved: LinkState,
-    solved_velocities: LinkState,
-    rates: Sequence[float],
-    solved_accelerations: LinkState | None,
-    accelerations: Sequence[float],
-) -> tuple[complex, complex, complex]:
-    """Return place, velocity and acceleration of a point."""
-    if end.body < 0:
-        pull = solved_accelerations.pins[end.pin] if solved_accelerations is not None else 0j
-        return solved.pins[end.pin], solved_velocities.pins[end.pin], pull
-    k = 3 * end.body
-    place, arm = point_and_arm(end, unknowns, solved)
-    turn = rates[k]
-    velocity = make_vector(rates[k + 1], rates[k + 2])
-    pull = make_vector(accelerations[k + 1], accelerations[k + 2])
-    # Where the links stand still, or the point is that of the link, nothing is to be computed.
-    return (
-        place,
-        add(velocity, multiply(make_vector(0.0, turn), arm)),
-        add(pull, multiply(make_vector(-turn * turn, accelerations[k]), arm)),
-    )
-
-
-def line_motion(
-    line: OnLine,
-    unknowns: Sequence[float],
-    solved: LinkState,
-    solved_velocities: LinkState,
-    rates: Sequence[float],
-    solved_accelerations: LinkState | None,
-    accelerations: Sequence[float],
-) -> tuple[complex, complex, complex]:
-    """Return place, velocity and acceleration of a point in the frame of its line."""
-    point, through = (
-        _point_motion(
-            e, unknowns, solved, solved_velocities, rates, solved_accelerations, accelerations
-        )
-        for e in (line.point, line.through)
-    )
-    back = unit_vector(-_direction_angle(line.line, unknowns, solved.coordinates))
-    turn = _direction_rate(line.line, rates, solved_velocities)
-    change = (
-        _direction_rate(line.line, accelerations, solved_accelerations)
-        if solved_accelerations is not None
-        else 0.0
-    )
-    place = (point[0] - through[0]) * back
-    velocity = (point[1] - through[1]) * back - make_vector(0.0, turn) * place
-    pull = (point[2] - through[2]) * back
-    pull -= make_vector(0.0, 2.0 * turn) * velocity + make_vector(-turn * turn, change) * place
-    return place, velocity, pull
+        period = constraint.period if isinstance(constraint, Geared) else 0.0
+        if period and not off[row] < part * period:
+            return False
+        row += 2 if isinstance(constraint, CoincidentPoints) else 1
+    return True
 
 
 class Constraints:

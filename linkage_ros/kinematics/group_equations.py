@@ -26,9 +26,8 @@ from linkage_ros.kinematics.equations import (
     Constraint,
     differentiate_constraints,
     End,
-    end_arm,
     evaluate_constraints,
-    point_and_arm,
+    GroupMotion,
 )
 from linkage_ros.kinematics.step import LinkState
 
@@ -69,7 +68,7 @@ class GroupEquations:
             unknowns[k] = value
         for _, end, other in self._placed:
             k = 3 * end.body
-            place = subtract(point_and_arm(other, unknowns, solved)[0], end_arm(end, unknowns))
+            place = subtract(other.place_and_arm(unknowns, solved)[0], end.rotated_arm(unknowns))
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
@@ -82,37 +81,11 @@ class GroupEquations:
         step = eliminated.solve(right)
         return [step[k] for k in self.free], eliminated.divisors
 
-    def rates(
-        self, unknowns: Sequence[Any], solved: LinkState, velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the unknowns."""
-        still = [0.0] * self._count
-        drift = differentiate_constraints(
-            self._constraints, unknowns, solved, velocities, still, None, still
-        )
-        return self._cancel_drift(unknowns, solved, drift)
-
-    def accelerations(
-        self,
-        unknowns: Sequence[Any],
-        solved: LinkState,
-        velocities: LinkState,
-        rates: Sequence[Any],
-        accelerations: LinkState,
-    ) -> list[Any]:
-        """Return the accelerations of the unknowns."""
-        still = [0.0] * self._count
-        drift = differentiate_constraints(
-            self._constraints, unknowns, solved, velocities, rates, accelerations, still
-        )
-        return self._cancel_drift(unknowns, solved, drift)
-
-    def _cancel_drift(
-        self, unknowns: Sequence[Any], solved: LinkState, drift: Sequence[Any]
-    ) -> list[Any]:
-        """Return the rates of the unknowns that cancel the drift of the constraints."""
-        # On a tape the matrix is that of `rates` and of `accelerations`, and is there only once.
-        jacobian = evaluate_constraints(self._constraints, unknowns, solved)[1]
+    def solve_motion(self, motion: GroupMotion) -> list[Any]:
+        """Return the highest derivatives of the unknowns, for a motion that has 0 for them."""
+        drift = differentiate_constraints(self._constraints, motion)
+        # On a tape the matrix is that of rates and of accelerations, and is there only once.
+        jacobian = evaluate_constraints(self._constraints, motion.unknowns, motion.solved)[1]
         right = [0.0 if is_zero(each) else -each for each in drift]
         return Elimination(jacobian, self._unit_pivots).solve(right)
 

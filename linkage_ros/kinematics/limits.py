@@ -149,9 +149,9 @@ def _make_bound(name: str, number: int, limits: Limits, *, turning: bool = False
 # every pose has a second one that no machine has.
 
 
-def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | None:
-    """Return the slide in [m] at which the pins of a cylinder meet; None for other inputs."""
-    name = linkage.inputs[index].slider
+def zero_length(linkage: Linkage, structure: Structure) -> float | None:
+    """Return the first input, in [m], at which the pins of a cylinder meet; or None."""
+    name = linkage.inputs[0].slider
     if not name:
         return None
     slider = linkage.sliders[name]
@@ -178,15 +178,15 @@ def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | N
 
 
 def without_mirrored(
-    linkage: Linkage, structure: Structure, index: int, ranges: tuple[InputRange, ...]
+    linkage: Linkage, structure: Structure, ranges: tuple[InputRange, ...]
 ) -> tuple[InputRange, ...]:
     """
-    Return the ranges of an input; for a cylinder only the ranges of positive length.
+    Return the ranges of the first input; for a cylinder only the ranges of positive length.
 
     The ranges of negative length are returned if its pose or its limits lie there, or if there
     are no others.
     """
-    zero = zero_length(linkage, structure, index)
+    zero = zero_length(linkage, structure)
     if zero is None:
         return ranges
     positive = tuple(
@@ -195,7 +195,7 @@ def without_mirrored(
     negative = tuple(
         one._replace(highest=min(one.highest, zero)) for one in ranges if one.lowest < zero
     )
-    pose, limits = linkage.pose, linkage.inputs[index].limits
-    if limits.high <= zero or (pose and pose.inputs[index] < zero):
+    pose, limits = linkage.pose, linkage.inputs[0].limits
+    if limits.high <= zero or (pose and pose.inputs[0] < zero):
         return negative or positive
     return positive or negative

@@ -48,9 +48,8 @@ from linkage_ros.kinematics.equations import (
     Constraints,
     differentiate_constraints,
     evaluate_constraints,
-    line_motion,
+    GroupMotion,
     OnLine,
-    point_in_line_frame,
 )
 from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
@@ -207,7 +206,7 @@ class Iteration:
             angle + turns * more if more else angle
             for angle, more in zip(unknowns[0::3], gained, strict=True)
         ]
-        slides = [point_in_line_frame(slide, solved, unknowns).real for slide in self._slides]
+        slides = [slide.place(unknowns, solved).real for slide in self._slides]
         return Status.CLOSED, [*unknowns, *angles, *slides]
 
     def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
@@ -296,7 +295,7 @@ class Iteration:
     ) -> IteratedPose:
         """Append a solution, and return its pose."""
         values = unknowns.tolist()
-        slides = [point_in_line_frame(slide, solved, values).real for slide in self._slides]
+        slides = [slide.place(values, solved).real for slide in self._slides]
         self._append_solution(solved, [*values, *(unknowns + turned)[0::3].tolist(), *slides])
         return IteratedPose(status, 0.0, values, solved)
 
@@ -357,13 +356,9 @@ class Iteration:
     ) -> list[Any]:
         """Return the rates of the unknowns and of the slides."""
         unknowns = pose.coordinates
-        rates = self._equations.rates(unknowns, solved, velocities)
-        still = [0.0] * len(rates)
-        motions = (
-            line_motion(slide, unknowns, solved, velocities, rates, None, still)
-            for slide in self._slides
-        )
-        return [*rates, *(rate.real for _, rate, _ in motions)]
+        motion = GroupMotion(unknowns, solved, [0.0] * len(unknowns), velocities)
+        motion = motion._replace(rates=self._equations.solve_motion(motion))
+        return [*motion.rates, *(slide.measured_change(motion) for slide in self._slides)]
 
     def accelerations(
         self,
@@ -393,12 +388,11 @@ class Iteration:
     ) -> list[Any]:
         """Return the accelerations of the unknowns and of the slides."""
         unknowns, rates = pose.coordinates, pose_rates.coordinates
-        found = self._equations.accelerations(unknowns, solved, velocities, rates, accelerations)
-        motions = (
-            line_motion(slide, unknowns, solved, velocities, rates, accelerations, found)
-            for slide in self._slides
-        )
-        return [*found, *(change.real for _, _, change in motions)]
+        still = [0.0] * len(unknowns)
+        motion = GroupMotion(unknowns, solved, rates, velocities, still, accelerations)
+        found = self._equations.solve_motion(motion)
+        motion = motion._replace(accelerations=found)
+        return [*found, *(slide.measured_change(motion) for slide in self._slides)]
 
     def _straight_solution(self, solved: LinkState) -> list[Any]:
         """Return the unknowns, the angles with their turns, and the slides."""
@@ -478,10 +472,8 @@ class Iteration:
     ) -> list[float]:
         unknowns = pose.coordinates
         errors, rows = evaluate_constraints(self._constraints, unknowns, solved)
-        still = [0.0] * len(unknowns)
-        drift = differentiate_constraints(
-            self._constraints, unknowns, solved, velocities, still, None, still
-        )
+        motion = GroupMotion(unknowns, solved, [0.0] * len(unknowns), velocities)
+        drift = differentiate_constraints(self._constraints, motion)
         return [*errors, *(x for row, d in zip(rows, drift, strict=True) for x in (*row, d))]
 
     def _known_part(self, state: LinkState) -> LinkState:

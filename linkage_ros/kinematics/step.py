@@ -78,20 +78,18 @@ class Step(Protocol):
         """Append to the accelerations."""
 
 
-@dataclass(frozen=True, slots=True)
-class FixedPoint:
-    """A point of the ground, at ``place`` in the frame of the ground."""
+class LinearStep:
+    """A step that appends to rates as to accelerations: it is linear, with constant factors."""
 
-    place: complex
+    __slots__ = ()
 
-    def close(self, solved: LinkState) -> StepPose:
-        """Append the point."""
-        solved.pins.append(self.place)
-        return PLACED
+    def append_derivative(self, state: LinkState) -> None:
+        """Append to rates or to accelerations."""
+        raise NotImplementedError
 
     def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
-        """Append a velocity of zero."""
-        velocities.pins.append(0j)
+        """Append to the rates."""
+        self.append_derivative(velocities)
 
     def accelerations(
         self,
@@ -101,8 +99,24 @@ class FixedPoint:
         _velocities: LinkState,
         accelerations: LinkState,
     ) -> None:
-        """Append an acceleration of zero."""
-        accelerations.pins.append(0j)
+        """Append to the accelerations."""
+        self.append_derivative(accelerations)
+
+
+@dataclass(frozen=True, slots=True)
+class FixedPoint(LinearStep):
+    """A point of the ground, at ``place`` in the frame of the ground."""
+
+    place: complex
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the point."""
+        solved.pins.append(self.place)
+        return PLACED
+
+    def append_derivative(self, state: LinkState) -> None:
+        """Append 0."""
+        state.pins.append(0j)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +195,7 @@ class PointOnRail:
 
 
 @dataclass(frozen=True, slots=True)
-class RelativeAngle:
+class RelativeAngle(LinearStep):
     """The angle of a link that a driven joint turns against another."""
 
     # Indices, among the coordinates, of the other link's angle and of the joint.
@@ -191,31 +205,17 @@ class RelativeAngle:
 
     def close(self, solved: LinkState) -> StepPose:
         """Append the angle."""
-        self._append_angle(solved)
+        self.append_derivative(solved)
         return PLACED
 
-    def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
-        """Append its rate."""
-        self._append_angle(velocities)
-
-    def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        _solved: LinkState,
-        _velocities: LinkState,
-        accelerations: LinkState,
-    ) -> None:
-        """Append its acceleration."""
-        self._append_angle(accelerations)
-
-    def _append_angle(self, state: LinkState) -> None:
+    def append_derivative(self, state: LinkState) -> None:
+        """Append the angle or its derivative."""
         values = state.coordinates
         values.append(values[self.arm] + self.sign * values[self.joint])
 
 
 @dataclass(frozen=True, slots=True)
-class FollowerJoint:
+class FollowerJoint(LinearStep):
     """
     The value of a joint that follows another: ratio·(x[one] − x[other] + constant) + offset.
 
@@ -242,20 +242,7 @@ class FollowerJoint:
         x.append(self.ratio * followed + self.offset)
         return PLACED
 
-    def rates(self, _pose: StepPose, _solved: LinkState, velocities: LinkState) -> None:
-        """Append its rate."""
-        self._append_derivative(velocities.coordinates)
-
-    def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        _solved: LinkState,
-        _velocities: LinkState,
-        accelerations: LinkState,
-    ) -> None:
-        """Append its acceleration."""
-        self._append_derivative(accelerations.coordinates)
-
-    def _append_derivative(self, values: list[float]) -> None:
+    def append_derivative(self, state: LinkState) -> None:
+        """Append the derivative of the value."""
+        values = state.coordinates
         values.append(self.ratio * (values[self.one] - values[self.other]))

@@ -137,34 +137,23 @@ class SweptCurve(NamedTuple):
     lowest: Extreme
     highest: Extreme
 
-    @property
-    def is_constant(self) -> bool:
-        """Whether it does not change."""
-        return self.highest.value - self.lowest.value < _SAME
-
 
 class InputSweep:
     """
-    A linkage as a function of one of its inputs; the others are held.
+    A linkage as a function of its first input; the others are held.
 
-    ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input;
-    ``index`` is the number of the input that moves.
+    ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input.
     """
 
-    def __init__(
-        self, closure: LoopClosure, held: Sequence[float] = (0.0,), index: int = 0
-    ) -> None:
+    def __init__(self, closure: LoopClosure, held: Sequence[float] = (0.0,)) -> None:
         self.closure = closure
-        self._held = tuple(held)
-        self._index = index
-        self.input = closure.linkage.inputs[index]
+        self._others = tuple(held[1:])
+        self.input = closure.linkage.inputs[0]
         self.turning = not self.input.slider
 
     def inputs_at(self, value: float) -> tuple[float, ...]:
         """Return the values of all inputs."""
-        held = list(self._held)
-        held[self._index] = value
-        return tuple(held)
+        return value, *self._others
 
     def position_at(self, value: float) -> Position:
         """Return the position at a value of the input."""
@@ -193,7 +182,6 @@ class InputSweep:
             found = without_mirrored(
                 self.closure.linkage,
                 self.closure.structure,
-                self._index,
                 tuple(self._name_ends(*ends) for ends in self._search_intervals()),
             )
         return tuple(map(self._usual_range, found))

@@ -48,7 +48,7 @@ class PythonBody(NamedTuple):
     bound: dict[str, Any]  # The names that the lines and expressions use, with their values
 
 
-def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
+def python_source(path: Path) -> tuple[str, dict[str, Any]]:
     """
     Return a path as the source of a Python function, and the names that it uses.
 
@@ -58,7 +58,7 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
     lines, outputs, bound = python_body(path, 'return None')
     groups = [f'({", ".join(group)},)' if group else '()' for group in outputs]
     parameters = ', '.join(given.name for given in path.inputs)
-    text = [f'def {name}({parameters}):', *(f'    {line}' for line in lines)]
+    text = [f'def solve({parameters}):', *(f'    {line}' for line in lines)]
     returned = f'{", ".join(groups)},' if groups else '()'
     return '\n'.join([*text, f'    return {returned}', '']), bound
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from shlex import quote
 import sys
 from threading import Event
-from typing import Any
+from typing import Any, Literal
 
 from linkage_ros.cli import (
     add_output,
@@ -232,22 +232,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_tasks(parser: argparse.ArgumentParser) -> None:
-    _add_pairs(parser)
-    _add_function(parser)
-    _add_curve(parser)
-    _add_dead_centres(parser)
-    _add_poses(parser)
-
-
-def _add_pairs(parser: argparse.ArgumentParser) -> None:
     pairs = parser.add_argument_group('pairs of crank and rocker angles')
-    pairs.add_argument(
+    _add_numbers(
+        pairs,
         '--pair',
-        nargs=2,
-        type=float,
+        ('CRANK', 'ROCKER'),
+        'angles of crank and rocker in one position; three or more times',
         action='append',
-        metavar=('CRANK', 'ROCKER'),
-        help='angles of crank and rocker in one position; three or more times',
     )
     pairs.add_argument(
         '--pairs', type=Path, metavar='CSV', help='the same as a CSV of two columns'
@@ -256,36 +247,17 @@ def _add_pairs(parser: argparse.ArgumentParser) -> None:
         '--ground', type=float, default=1.0, metavar='M', help='length of the ground (default: 1)'
     )
 
-
-def _add_function(parser: argparse.ArgumentParser) -> None:
     function = parser.add_argument_group('a function')
     function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
-    function.add_argument('--range', nargs=2, type=float, metavar=('X0', 'X1'), help='of x')
+    _add_numbers(function, '--range', ('X0', 'X1'), 'of x')
     for link in ('crank', 'rocker'):
-        function.add_argument(
-            f'--{link}-range',
-            nargs=2,
-            type=float,
-            metavar=('FROM', 'TO'),
-            help=f"the {link}'s angles over the range",
-        )
-    function.add_argument(
-        '--points',
-        type=bounded_number(0, 2**53 - 1, int),
-        default=3,
-        metavar='N',
-        help='points, by Chebyshev (default: 3)',
-    )
-    function.add_argument(
-        '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
-    )
+        text = f"the {link}'s angles over the range"
+        _add_numbers(function, f'--{link}-range', ('FROM', 'TO'), text)
+    _add_count(function, '--points', 0, 3, 'points, by Chebyshev (default: 3)')
+    _add_numbers(function, '--at', 'X', 'points of your own, instead')
 
-
-def _add_curve(parser: argparse.ArgumentParser) -> None:
     path = parser.add_argument_group('a traced curve')
-    path.add_argument(
-        '--point', nargs=2, type=float, action='append', metavar=('X', 'Y'), help='in metres'
-    )
+    _add_numbers(path, '--point', ('X', 'Y'), 'in metres', action='append')
     path.add_argument(
         '--path',
         type=Path,
@@ -293,16 +265,8 @@ def _add_curve(parser: argparse.ArgumentParser) -> None:
         help='columns x, y in metres, and the crank angle where that is wanted too',
     )
     path.add_argument('--closed', action='store_true', help='the last point leads to the first')
-    path.add_argument(
-        '--timing',
-        nargs='+',
-        type=float,
-        metavar='CRANK',
-        help="the crank's angle at each point",
-    )
+    _add_numbers(path, '--timing', 'CRANK', "the crank's angle at each point")
 
-
-def _add_dead_centres(parser: argparse.ArgumentParser) -> None:
     rocker = parser.add_argument_group('the dead centres of a crank-rocker')
     rocker.add_argument('--swing', type=float, metavar='ANGLE', help='of the rocker')
     rocker.add_argument(
@@ -312,26 +276,36 @@ def _add_dead_centres(parser: argparse.ArgumentParser) -> None:
         help='longer stroke to shorter one, as 10/9 or 1.2',
     )
 
-
-def _add_poses(parser: argparse.ArgumentParser) -> None:
     motion = parser.add_argument_group('poses of the coupler')
-    motion.add_argument(
-        '--pose',
-        nargs=3,
-        type=float,
-        action='append',
-        metavar=('X', 'Y', 'ANGLE'),
-        help='place in metres, and angle; three times',
-    )
+    text = 'place in metres, and angle; three times'
+    _add_numbers(motion, '--pose', ('X', 'Y', 'ANGLE'), text, action='append')
     for kind, frame in (('fixed', 'ground'), ('moving', 'coupler')):
-        motion.add_argument(
-            f'--{kind}-pivot',
-            nargs=2,
-            type=float,
-            action='append',
-            metavar=('X', 'Y'),
-            help=f"in the {frame}'s frame; twice: crank's and rocker's",
-        )
+        text = f"in the {frame}'s frame; twice: crank's and rocker's"
+        _add_numbers(motion, f'--{kind}-pivot', ('X', 'Y'), text, action='append')
+
+
+def _add_numbers(
+    group: argparse._ArgumentGroup,
+    option: str,
+    names: str | tuple[str, ...],
+    text: str,
+    action: Literal['store', 'append'] = 'store',
+) -> None:
+    """Declare an option that takes as many numbers as there are names; one or more for a text."""
+    count: int | str = '+' if isinstance(names, str) else len(names)
+    group.add_argument(option, nargs=count, type=float, action=action, metavar=names, help=text)
+
+
+def _add_count(
+    group: argparse._ArgumentGroup,
+    option: str,
+    least: int,
+    default: int | None,
+    text: str,
+) -> None:
+    """Declare an option that takes an integer of at least 0 or 1."""
+    kind = bounded_number(least, 2**53 - 1, int)
+    group.add_argument(option, type=kind, default=default, metavar='N', help=text)
 
 
 def _read_ratio(text: str) -> float:
@@ -350,26 +324,11 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
         help='only how far crank and rocker turn matters, not from where: with three pairs the '
         'best are searched for, with four and five all are listed, with more they are fitted',
     )
-    freedoms.add_argument(
-        '--seed',
-        type=bounded_number(0, 2**53 - 1, int),
-        default=0,
-        metavar='N',
-        help='of the search (default: 0)',
-    )
-    freedoms.add_argument(
-        '--candidates',
-        type=bounded_number(1, 2**53 - 1, int),
-        default=CANDIDATES,
-        metavar='N',
-        help=f'how many are tried in a search (default: {CANDIDATES})',
-    )
-    freedoms.add_argument(
-        '--best',
-        type=bounded_number(1, 2**53 - 1, int),
-        metavar='N',
-        help=f'how many are listed (of a search {_LISTED}, else all)',
-    )
+    _add_count(freedoms, '--seed', 0, 0, 'of the search (default: 0)')
+    text = f'how many are tried in a search (default: {CANDIDATES})'
+    _add_count(freedoms, '--candidates', 1, CANDIDATES, text)
+    text = f'how many are listed (of a search {_LISTED}, else all)'
+    _add_count(freedoms, '--best', 1, None, text)
     freedoms.add_argument(
         '--dask',
         default='',

@@ -43,6 +43,9 @@ GHOST = '#cfcfcf'
 LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+
+_FONT_SIZE = 7.0
+"""Of names beside lines, in points."""
 STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
 _SETTINGS: Any = {
     'font.size': 8.0,
@@ -206,7 +209,7 @@ def spread_places(places: Sequence[float], gap: float) -> list[float]:
     return found
 
 
-def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> None:
+def label_ends(axes: Any, lines: Sequence[Any]) -> None:
     """
     Write the names of lines at their right ends, beside the axes.
 
@@ -214,13 +217,13 @@ def label_ends(axes: Any, lines: Sequence[Any], *, fontsize: float = 7.0) -> Non
     """
     low, high = axes.get_ylim()
     height = axes.get_window_extent().height / axes.figure.dpi * 72.0  # in points, as the font
-    gap = 1.25 * fontsize / height
+    gap = 1.25 * _FONT_SIZE / height
     lasts = [next((y for y in reversed(line.get_ydata()) if not isnan(y)), low) for line in lines]
     ends = [(last - low) / (high - low) for last in lasts]
     for line, place in zip(lines, spread_places(ends, gap), strict=True):
         axes.text(
             1.01, place, line.get_label(), transform=axes.transAxes, va='center', ha='left',
-            fontsize=fontsize, color=line.get_color(),
+            fontsize=_FONT_SIZE, color=line.get_color(),
         )  # fmt: skip
 
 

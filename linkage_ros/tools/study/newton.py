@@ -30,7 +30,6 @@ from linkage_ros.kinematics import (
     LinkState,
     OnLine,
     Parallel,
-    point_in_line_frame,
     RevoluteJoint,
 )
 import numpy as np
@@ -87,7 +86,7 @@ class ConstraintEquations:
         return tuple(
             link_angle(joint.child) - link_angle(joint.parent)
             if isinstance(joint, RevoluteJoint)
-            else point_in_line_frame(self._slides[joint.slider], known, values).real
+            else self._slides[joint.slider].place(values, known).real
             for joint in self._linkage.joints.values()
         )
 
