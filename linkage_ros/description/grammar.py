@@ -115,7 +115,7 @@ class ListOf(Kind):
 
 
 @dataclass(frozen=True, slots=True)
-class Interval(NumberList):
+class LimitPair(NumberList):
     """Two numbers [low, high]; infinite for no limit on a side."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:

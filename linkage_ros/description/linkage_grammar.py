@@ -19,8 +19,8 @@ from typing import Any
 
 from linkage_ros.description.grammar import (
     DIALECT,
-    Interval,
     LENGTH_UNIT,
+    LimitPair,
     ListOf,
     Named,
     OneOrMore,
@@ -142,14 +142,14 @@ def _length(meaning: str) -> Any:
     return number(meaning, unit='m', above=0.0, most=FARTHEST)
 
 
-def _bounded(meaning: str, default: float, unit: str = '') -> Any:
+def _coordinate(meaning: str, default: float, unit: str = '') -> Any:
     return number(meaning, default, unit=unit, least=-FARTHEST, most=FARTHEST)
 
 
 _LEFT, _AHEAD = ('left', 'right'), ('ahead', 'behind')
 _LIMITS = {
     'limits': declare(
-        Interval(
+        LimitPair(
             'limits of the joint: [low, high] [rad or m]; -.inf or .inf for no limit on a side',
             'rad or m',
             FARTHEST,
@@ -209,7 +209,7 @@ _SLIDER = Keys(
             'direction of the line, in the frame of `along`: [x, y]', most=FARTHEST
         ),
         'block': text('the link that slides without turning', '', pattern=f'^{CHARACTER}*$'),
-        'angle': _bounded('angle of the block relative to `along`', 0.0, 'rad'),
+        'angle': _coordinate('angle of the block relative to `along`', 0.0, 'rad'),
     },
     (OnlyWith('angle', 'block'),),
 )
@@ -218,10 +218,10 @@ _RATIO = Keys(
     Ratio,
     {
         'of': text('an input or a published joint, which this one follows'),
-        'ratio': _bounded(
+        'ratio': _coordinate(
             'its displacement [rad or unit of length] when the other joint moves by 1', 1.0
         ),
-        'offset': _bounded('its value where the other joint is at 0', 0.0, 'rad or m'),
+        'offset': _coordinate('its value where the other joint is at 0', 0.0, 'rad or m'),
     },
 )
 _POSE = Keys(
@@ -262,7 +262,7 @@ _MASS = Keys(
 _PLACE = Point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
 
 
-def _named(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
+def _by_name(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
     return declare(Named(meaning, ParameterGroup(of.meaning, of), **rules), default)
 
 
@@ -282,10 +282,10 @@ WRITTEN_OUT = {
         ),
         None,
     ),
-    'sliders': _named(
+    'sliders': _by_name(
         'Points that stay on lines of other links, by name.', _SLIDER, most=_MOST_LINKS
     ),
-    'joints': _named(
+    'joints': _by_name(
         'Published joints, in this order, by name.',
         _JOINT,
         MISSING,
@@ -293,12 +293,12 @@ WRITTEN_OUT = {
         most=_MOST_LINKS,
         check=_refuse_input,
     ),
-    'ratios': _named(
+    'ratios': _by_name(
         'Joints that follow others: gears, belts, racks, mimic.', _RATIO, most=_MOST_LINKS
     ),
     'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
     'pose': optional_keys(_POSE),
-    'masses': _named('Masses of the links, by link name.', _MASS, check=_refuse_mass),
+    'masses': _by_name('Masses of the links, by link name.', _MASS, check=_refuse_mass),
 }
 
 

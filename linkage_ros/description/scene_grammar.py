@@ -89,7 +89,7 @@ class _Prefix(TextOf):
         return prefix
 
 
-class _Drive(Kind):
+class _DriveChoice(Kind):
     """One drive, read as its name and parameters."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, Any]:
@@ -196,7 +196,7 @@ _LOADS = Keys(
         **{entry.name: entry for entry in fields(AppliedLoads)},
     },
 )
-DRIVE = _Drive('Source of the crank: one drive.')
+DRIVE = _DriveChoice('Source of the crank: one drive.')
 EFFECTS_BY_NAME = _Effects('What to compute beyond positions.')
 OF_A_LINKAGE = Keys(
     'What a scene may say for all linkages, and each linkage for itself.',
