@@ -108,7 +108,6 @@ from linkage_ros.kinematics.ranges import (
     is_iterated as is_iterated,
     link_lengths as link_lengths,
     sample_inputs as sample_inputs,
-    slide_bound as slide_bound,
 )
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,

@@ -16,6 +16,7 @@ from math import hypot, inf, isfinite, isnan
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.linkage import (
+    AnyLinkage,
     GROUND,
     Input,
     Limits,
@@ -58,7 +59,7 @@ def check_linkage(linkage: Linkage) -> None:
             _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
     for name in linkage.ratios:
         _check_ratio(linkage, name)
-    _check_all_limits(linkage)
+    check_all_limits(linkage)
     points = {point for carried in linkage.links.values() for point in carried}
     for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
         if point not in points:
@@ -214,7 +215,8 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
             )
 
 
-def _check_all_limits(linkage: Linkage) -> None:
+def check_all_limits(linkage: AnyLinkage) -> None:
+    """Refuse limits that allow no motion, and a pose beyond those of its inputs."""
     for given in linkage.inputs:
         _check_limits('input', given.limits, given.joint, given.unit)
     for name, joint in linkage.joints.items():

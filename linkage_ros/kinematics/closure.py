@@ -6,74 +6,35 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""
-The loop closure of a linkage: from its inputs to its joints, and to every point of its links.
-
-Position first; what a scene calls for beyond it starts from the position and repeats nothing.
-"""
+"""The loop closure of a planar linkage: from its inputs to its joints and its points."""
 
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Sequence
-from math import inf
-from operator import mul
-from typing import Any, overload, TYPE_CHECKING
+from collections.abc import Sequence
+from typing import overload, TYPE_CHECKING
 
-from linkage_ros.errors import escape_unprintable, list_names, quote
-from linkage_ros.kinematics.arithmetic import all_finite
+from linkage_ros.errors import quote
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.checks import check_linkage
-from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
-from linkage_ros.kinematics.limits import Bounds, limit_status, without_mirrored, zero_length
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.doubles import to_double
+from linkage_ros.kinematics.limits import without_mirrored, zero_length
+from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
-from linkage_ros.kinematics.ranges import closing_ranges, input_ranges
-from linkage_ros.kinematics.results import (
-    Acceleration,
-    InputRange,
-    PointMotion,
-    Position,
-    SingularInput,
-    SingularityMargin,
-    Velocity,
-)
-from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
-from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState, StepPose
-from linkage_ros.kinematics.topology import assur_groups, Structure
+from linkage_ros.kinematics.ranges import closing_ranges, link_lengths
+from linkage_ros.kinematics.results import Acceleration, InputRange, PointMotion, Position, Velocity
+from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+from linkage_ros.kinematics.topology import assur_groups, Driven, Dyad, links_of, Structure
 
 if TYPE_CHECKING:
     from linkage_ros import InverseClosure, LinkagePage
-    from linkage_ros.kinematics.batch import Batch
-    from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
     from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.link_frames import LinkFrames
     from linkage_ros.kinematics.point_tracker import PointTracker
-    from numpy.typing import ArrayLike
 
 
-def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
-    if not status.has_rates:
-        return ValueError(f'{what}: a linkage that is {status.value} has none; check its status')
-    return ValueError(f'{what}: {list(given)} is not finite')
-
-
-def _multiply(
-    found: Velocity | Acceleration, factor: float
-) -> tuple[tuple[float, ...], LinkState]:
-    """Return joints and state of a velocity or an acceleration times a factor."""
-    coordinates, pins = found.state
-    return (
-        tuple(value * factor for value in found.joints),
-        LinkState(
-            [value * factor for value in coordinates],
-            [complex(pin.real * factor, pin.imag * factor) for pin in pins],
-        ),
-    )
-
-
-class Closure:
+class Closure(StepwiseClosure):
     """
     A linkage, ready to be solved.
 
@@ -102,34 +63,21 @@ class Closure:
 
     """
 
-    gap_unit: str = 'm'
-    """Unit of the gap of an open position."""
-
     def __init__(self, linkage: Linkage, name: str = '') -> None:
         if not isinstance(linkage, Linkage):
             raise TypeError(f'linkage: {quote(linkage)} is not a Linkage; load() reads files')
         check_linkage(linkage)
-        self.linkage = linkage
-        self.name = name
-        self.input_names = tuple(given.joint for given in linkage.inputs)
-        self.joint_names = tuple(linkage.joints)
         self.structure: Structure = assur_groups(linkage)
         planner = SolutionPlan(linkage, self.structure)
-        self.scale = planner.scale
-        """Metres in the unit of length of the steps."""
+        self._set_linkage(linkage, name, planner.scale)
         steps = tuple(planner.steps)
         self._known = planner
         self.step_groups = tuple(planner.step_groups)
-        """For each step the number of the group that it belongs to."""
-        self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
-        """For each published joint: whether it turns (an angle) or slides (a length)."""
         self.angles, self.slides = planner.angles, planner.slides
         self.turns_with = planner.turns_with
         """For each coordinate that is a sum of inputs, how often each input is in it."""
         self.ratio_turns = planner.ratio_turns
-        """Whole turns of a single input after which its ratios repeat; 0 if they never do."""
         self._terms = tuple(self._joint_term(joint) for joint in linkage.joints.values())
-        self._rate_terms = tuple((i, j, factor) for i, j, factor, _ in self._terms)
         self._point_index = {
             (link, name): planner.place_point(link, point)
             for link, points in planner.points.items()
@@ -138,25 +86,7 @@ class Closure:
         self.steps = steps
         needed = len(steps)
         self._more_steps = tuple(planner.steps[needed:])
-        factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
-        self._factors = None if set(factors) == {1.0} else factors
-        self._single = factors == [1.0]
-        self.bounds = Bounds(linkage)
-        """The limits between which its joints stay."""
-        if self.bounds:
-            self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
-        self._compiled: list[Compiled] = []
         self._inverses: dict[str, Inverse] = {}
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
-        return type(self), (self.linkage, self.name)
-
-    def __repr__(self) -> str:
-        counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
-        has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
-        named = ' '.join(filter(None, (type(self).__name__, escape_unprintable(self.name))))
-        return f'<{named}: {has}>'
 
     def _repr_svg_(self) -> str:
         from linkage_ros import svg  # local import: only a notebook asks for pictures
@@ -176,214 +106,6 @@ class Closure:
         from linkage_ros import LinkagePage  # local import: only a notebook asks for pages
 
         return LinkagePage(self)
-
-    def position(self, *inputs: float) -> Position:
-        """
-        Close the loops.
-
-        Parameters
-        ----------
-        *inputs
-            One value for each driven joint, in [rad] or [m]. If one is not finite, the position
-            is indeterminate.
-
-        Returns
-        -------
-        position : Position
-            Its status says whether the loops close.
-
-        Raises
-        ------
-        ValueError
-            If there is not one input for each driven joint.
-        TypeError
-            If an input is not a number.
-
-        """
-        x = self._input_coordinates('inputs', inputs, 0.0, inf)
-        if x is None:
-            numbers = self._as_doubles('inputs', inputs)
-            state = LinkState([0.0, *self._scale_inputs(numbers)], [])
-            return Position(Status.INDETERMINATE, 0.0, (), state, [], self)
-        state = LinkState(x, [])
-        poses: list[StepPose] = []
-        status = Status.CLOSED
-        for step in self.steps:
-            pose = step.close(state)
-            poses.append(pose)
-            found = pose.status
-            if found is not Status.CLOSED:
-                if not found.has_pose:
-                    return Position(found, pose.gap * self.scale, (), state, poses, self)
-                if status.has_rates:
-                    status = found
-        joints: tuple[float, ...] = ()
-        for i, j, factor, constant in self._terms:
-            joints += (factor * (x[i] - x[j]) + constant,)
-        return Position(status, 0.0, joints, state, poses, self)
-
-    def initial_state(self, *inputs: float) -> LinkState:
-        """Return the state before the first step: the coordinates of the ground and the inputs."""
-        return LinkState(self._input_coordinates('inputs', inputs, 0.0, inf) or [], [])
-
-    def close_unlimited(self, *inputs: float) -> Position:
-        """Close the loops as `position` does, without limits."""
-        return type(self).position(self, *inputs)
-
-    def velocity(self, position: Position, *rates: float) -> Velocity:
-        """
-        Return the rates of the linkage at a position.
-
-        Parameters
-        ----------
-        position
-            A position that this closure found, with ``position.status.has_rates``.
-        *rates
-            One rate for each driven joint, in [rad/s] or [m/s].
-
-        Raises
-        ------
-        ValueError
-            If the position has no rates, as at a toggle, if a rate is not finite, or if there is
-            not one for each driven joint.
-        TypeError
-            If a rate is not a number, or the position is one of another linkage.
-
-        """
-        if getattr(position, 'closure', None) is not self:
-            self._check_own('position', position)
-        v = self._input_coordinates('rates', rates)
-        if v is None or not position.status.has_rates:
-            return self._huge_velocity(position, self._as_doubles('rates', rates))
-        velocities = LinkState(v, [])
-        found = []
-        for step, pose in zip(self.steps, position.poses, strict=True):
-            found.append(step.rates(pose, position.state, velocities))
-        return Velocity(self._joint_rates(v), velocities, found, self)
-
-    def acceleration(
-        self, position: Position, velocity: Velocity, *accelerations: float
-    ) -> Acceleration:
-        """
-        Return the accelerations of the linkage at a position.
-
-        Parameters
-        ----------
-        position, velocity
-            A position and a velocity that this closure found.
-        *accelerations
-            One acceleration for each driven joint, in [rad/s²] or [m/s²].
-
-        Raises
-        ------
-        ValueError, TypeError
-            As `velocity`.
-
-        """
-        if getattr(velocity, 'closure', None) is not self:
-            self._check_own('velocity', velocity)
-        a = self._input_coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
-        if a is None or type(velocity.rates) is Velocity:
-            numbers = self._as_doubles('accelerations', accelerations)
-            return self._huge_acceleration(position, velocity, numbers)
-        state_accelerations = LinkState(a, [])
-        for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
-            step.accelerations(pose, rate, position.state, velocity.state, state_accelerations)
-        return Acceleration(self._joint_rates(a), state_accelerations, self)
-
-    def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
-        """Return the velocity at rates of which one is huge: infinite where it overflows."""
-        if not (position.status.has_rates and all_finite(rates)):
-            raise _no_motion('rates', rates, position.status)
-        found = self.velocity(position, *(rate * SHRINK for rate in rates))
-        return Velocity(*_multiply(found, 1.0 / SHRINK), found, self)
-
-    def _huge_acceleration(
-        self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
-    ) -> Acceleration:
-        if not all_finite(accelerations):
-            raise _no_motion('accelerations', accelerations, position.status)
-        scaled = velocity.rates
-        if not isinstance(scaled, Velocity):
-            rates = self.inputs_of(velocity.state)
-            scaled = self.velocity(position, *(rate * SHRINK for rate in rates))
-        changes = (change * SHRINK * SHRINK for change in accelerations)
-        found = self.acceleration(position, scaled, *changes)
-        once = Acceleration(*_multiply(found, 1.0 / SHRINK), self)
-        return Acceleration(*_multiply(once, 1.0 / SHRINK), self)
-
-    def compile_linkage(
-        self, derivatives: int, wanted: OutputSelection | None = None, given_count: int = 0
-    ) -> Compiled:
-        """
-        Return the linkage compiled; for the same numbers it is compiled once.
-
-        ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
-        selects the numbers, by the motion and ``given_count`` numbers beside it; without it they
-        are all published joints.
-        """
-        from linkage_ros.kinematics.compiling import (
-            linkage,  # local import: they trace
-            trace,  # local import: they trace
-        )
-
-        wanted = wanted or trace.published_joints
-        with BUILD_LOCK:
-            for compiled in self._compiled:
-                if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
-                    return compiled
-            compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
-            self._compiled.append(compiled)
-            return compiled
-
-    def solve(
-        self,
-        *inputs: ArrayLike,
-        rates: Any = None,
-        accelerations: Any = None,
-        derivatives: int = 2,
-        out: Batch | None = None,
-    ) -> Batch:
-        """
-        Solve many states at once, as `position`, `velocity` and `acceleration` solve one.
-
-        The memory beyond the results does not grow with the number of states. Links that need
-        iteration are solved state by state, as slowly as `position` solves them.
-
-        Parameters
-        ----------
-        *inputs
-            For each driven joint an array (N,) of its values, in [rad] or [m]. A state with a
-            value that is not finite is indeterminate.
-        rates, accelerations
-            For each driven joint a number or an array (N,); with one driven joint, without a list.
-            Without ``rates`` the rate of a single driven joint is 1; several driven joints need
-            them. Without ``accelerations`` these are 0.
-        derivatives
-            0 solves for positions, 1 also for velocities, 2 also for accelerations.
-        out
-            Arrays that take the results, and that are returned.
-
-        Returns
-        -------
-        batch : Batch
-            With a row for each published joint, in the order of `joint_names`: arrays (joints, N).
-
-        Raises
-        ------
-        ValueError
-            If the arrays do not fit each other, the linkage or ``out``, or values are masked.
-        TypeError
-            If a value is not a number.
-
-        """
-        return self._solver.solve(inputs, rates, accelerations, derivatives, out)
-
-    @BuiltProperty
-    def _solver(self) -> SolverOutline:
-        from linkage_ros.kinematics.compiling import SolverOutline  # local import: numpy
-
-        return SolverOutline(self, len(self.linkage.joints))
 
     @overload
     def driven_by(
@@ -499,6 +221,10 @@ class Closure:
         places = self._with_all_points(position).pins
         return {key: places[i] * self.scale for key, i in self._point_index.items()}
 
+    def named_points(self, position: Position) -> dict[str, complex]:
+        """Return every point by its name, as `Position.points`."""
+        return {point: place for (_, point), place in self.points(position).items()}
+
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> dict[tuple[str, str], PointMotion]:
@@ -550,27 +276,6 @@ class Closure:
             for name, slide in self.slides.items()
         }
 
-    def limit_exceeded(self, position: Position) -> str:
-        """Return which joint of a pose is beyond its limits, as text; '' if none is."""
-        inputs = position.inputs
-        joints = position.joints or self.position(*inputs).joints
-        bound = self.bounds.first_exceeded(inputs, joints) if joints else None
-        if bound is None:
-            return ''
-        driven_one = bound in self.bounds.inputs
-        number = bound.number
-        value = bound.turn_to_middle((inputs if driven_one else joints)[number])
-        turns = not self.linkage.inputs[number].slider if driven_one else self.turning[number]
-        unit = 'rad' if turns else 'm'
-        limits = self.linkage.limits[bound.name]
-        return f'{bound.name} at {value:.6g} {unit}, limits {limits} {unit}'
-
-    def inputs_of(self, state: LinkState) -> tuple[float, ...]:
-        """Return the driven joints in a state, or their rates, in [rad] or [m]."""
-        factors = self._factors or [1.0] * len(self.input_names)
-        driven = zip(state.coordinates[1:], factors, strict=False)
-        return tuple(value / factor for value, factor in driven)
-
     def residual(self, position: Position) -> float:
         """
         Return the closure error of a closed position, in [m].
@@ -594,20 +299,6 @@ class Closure:
         return worst
 
     @BuiltProperty
-    def input_ranges(self) -> tuple[InputRange, ...]:
-        """
-        Ranges of a single input, in [rad] or [m]; empty for several inputs.
-
-        Every loop closes there, and no joint is beyond its limits.
-        """
-        return input_ranges(self)
-
-    @BuiltProperty
-    def singular_inputs(self) -> tuple[SingularInput, ...]:
-        """Toggles and change points of a single input; empty for several inputs."""
-        return singular_inputs(self)
-
-    @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:
         """
         Ranges in which a single input closes every loop, without limits; empty for several.
@@ -615,17 +306,47 @@ class Closure:
         A cylinder has only the ranges of positive length, unless it starts in the others or is
         limited to them.
         """
-        found = closing_ranges(self)
-        return without_mirrored(self.linkage, self.structure, found) if found else ()
+        return self.keep_usual(closing_ranges(self))
 
     @BuiltProperty
     def zero_length(self) -> float | None:
         """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
         return zero_length(self.linkage, self.structure)
 
-    def singularity_margin(self, position: Position) -> SingularityMargin:
-        """Return how near a closed position is to a singularity."""
-        return singularity_margin(self, position)
+    @property
+    def slide_bound(self) -> float:
+        """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
+        return sum(link_lengths(self.structure.links))
+
+    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
+        """Return the ranges of the first input that a user expects: cylinders of one sign."""
+        return without_mirrored(self.linkage, self.structure, ranges) if ranges else ()
+
+    def needed_groups(self, number: int) -> set[int]:
+        """Return the numbers of a group and of the groups that it starts from."""
+        groups = self.structure.groups
+        owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
+        needed: set[int] = set()
+        asked = [number]
+        while asked:
+            i = asked.pop()
+            if i not in needed:
+                needed.add(i)
+                group = groups[i]
+                if isinstance(group, Driven):
+                    starts = [group.joint.to]
+                elif isinstance(group, Dyad):
+                    starts = [joint.to for joint in group.outer]
+                else:
+                    return set(range(number + 1))
+                asked += [owner[link] for link in starts if link != GROUND]
+        return needed
+
+    def links_of_group(self, number: int) -> list[str]:
+        """Return the links of a group; a block has the name of its slider."""
+        sliders = {block: f'slider {name}' for name, block in self.structure.blocks.items()}
+        links = links_of(self.structure.groups[number])
+        return [sliders.get(link, link) for link in links]
 
     def _with_all_points(self, position: Position) -> LinkState:
         """Return a position with all points placed, also those that no loop needs."""
@@ -633,57 +354,6 @@ class Closure:
         for step in self._more_steps:
             step.close(state)
         return state
-
-    def _input_coordinates(
-        self, what: str, values: tuple[float, ...], zero: float = -0.0, most: float = HUGE
-    ) -> list[float] | None:
-        """
-        Return the coordinates of the ground and the inputs, as doubles.
-
-        Each is a value plus ``zero``: 0.0 makes 0.0 of −0.0, which is the same input, and −0.0
-        changes nothing. None if a value is not between ``-most`` and ``most``.
-        """
-        if self._single and len(values) == 1:
-            (value,) = values
-            if type(value) is float and -most < value < most:
-                return [0.0, value + zero]
-        if len(values) != len(self.input_names):
-            names = list_names(self.input_names)
-            raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
-        numbers = self._as_doubles(what, values)
-        x = [0.0, *self._scale_inputs([number + zero for number in numbers])]
-        if any(hasattr(number, 'apply') for number in numbers):
-            return x if all_finite(numbers) else None
-        return x if all(-most < number < most for number in (*numbers, *x)) else None
-
-    def _as_doubles(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
-        """Return values of any type as doubles; symbols as they are."""
-        return tuple(
-            value
-            if type(value) is float or hasattr(value, 'apply')
-            else to_double(what, value, '; solve() takes arrays')
-            for value in values
-        )
-
-    def _scale_inputs(self, values: Sequence[float]) -> Iterable[float]:
-        """Return values of the inputs, or their rates, in the unit of the steps."""
-        factors = self._factors
-        return values if factors is None else map(mul, values, factors)
-
-    def _check_own(self, what: str, found: Position | Velocity) -> None:
-        """Refuse a result of another linkage: the steps would read its numbers."""
-        closure = getattr(found, 'closure', None)
-        linkage = getattr(closure, 'linkage', None)
-        if linkage is not self.linkage and linkage != self.linkage:
-            message = f'{what}: {quote(found)} is not from {self!r}; give one that it returned'
-            raise TypeError(message)
-
-    def _joint_rates(self, values: list[float]) -> tuple[float, ...]:
-        """Return the derivatives of the published joints."""
-        joints: tuple[float, ...] = ()
-        for i, j, factor in self._rate_terms:
-            joints += (factor * (values[i] - values[j]),)
-        return joints
 
     def _joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
         """Return a published joint as factor·(x[i] − x[j]) + constant, in [rad] or [m]."""

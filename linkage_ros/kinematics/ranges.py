@@ -85,7 +85,7 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
         # Each branch is followed only where those before it close: the last one lies within all.
         return tuple(_on_a_branch(closure, branches[-1]))
     if closure.linkage.inputs[0].slider:
-        far = slide_bound(closure)
+        far = closure.slide_bound
         return tuple(
             InputRange(low, high, False, (low > -far, high < far))
             for low, high in _search_intervals(closure, -far, far, 4 * _SAMPLES)
@@ -226,11 +226,6 @@ def link_lengths(links: Mapping[str, Mapping[str, Point]]) -> list[float]:
         max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
         for points in links.values()
     ]
-
-
-def slide_bound(closure: LoopClosure) -> float:
-    """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
-    return sum(link_lengths(closure.structure.links))
 
 
 def sample_inputs(interval: InputRange, count: int = _SAMPLES) -> list[float]:

@@ -20,10 +20,9 @@ from math import tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.errors import list_names, quote
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.linkage import AnyLinkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
-from linkage_ros.kinematics.topology import Structure
 
 
 class InputRange(NamedTuple):
@@ -139,8 +138,11 @@ class LoopClosure(Protocol):
     `Closure` imports them. Its docstrings describe the members.
     """
 
-    linkage: Linkage
-    structure: Structure
+    @property
+    def linkage(self) -> AnyLinkage: ...
+    @property
+    def slide_bound(self) -> float: ...
+
     input_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     scale: float
@@ -152,19 +154,16 @@ class LoopClosure(Protocol):
     ratio_turns: int
     bounds: Any
 
+    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]: ...
+    def needed_groups(self, number: int) -> set[int]: ...
+    def links_of_group(self, number: int) -> list[str]: ...
     def initial_state(self, *inputs: float) -> LinkState: ...
     def position(self, *inputs: float) -> Position: ...
     def close_unlimited(self, *inputs: float) -> Position: ...
     def velocity(self, position: Position, *rates: float) -> Velocity: ...
     def acceleration(self, position: Position, velocity: Velocity, *a: float) -> Acceleration: ...
     def inputs_of(self, state: LinkState) -> tuple[float, ...]: ...
-    def points(self, position: Position) -> dict[tuple[str, str], complex]: ...
-
-    def point_motion(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
-    ) -> dict[tuple[str, str], PointMotion]: ...
-    def slide_values(self, position: Position) -> dict[str, float]: ...
-    def link_angles(self, position: Position) -> dict[str, float]: ...
+    def named_points(self, position: Position) -> dict[str, Any]: ...
     def residual(self, position: Position) -> float: ...
     def singularity_margin(self, position: Position) -> SingularityMargin: ...
 
@@ -266,9 +265,9 @@ class Position(_JointValues):
         return self.closure.inputs_of(self.state)
 
     @property
-    def points(self) -> dict[str, complex]:
+    def points(self) -> dict[str, Any]:
         """
-        Every named point in the frame of the ground, as x + iy, in [m].
+        Every named point in the frame of the ground, as x + iy, or (x, y, z) in space, in [m].
 
         Raises
         ------
@@ -276,7 +275,7 @@ class Position(_JointValues):
             If the linkage has no pose.
 
         """
-        return {point: place for (_, point), place in self.closure.points(self).items()}
+        return self.closure.named_points(self)
 
     @property
     def _repr_title(self) -> str:

@@ -28,11 +28,12 @@ class LinkState(NamedTuple):
     """
     The known coordinates and pins; or their rates; or their accelerations.
 
-    Angles are in [rad]; pins have their places in the frame of the ground.
+    Angles are in [rad]; pins have their places in the frame of the ground. In space the pins are
+    vectors of points, and frames or motions of links.
     """
 
     coordinates: list[float]
-    pins: list[complex]
+    pins: list[Any]
 
 
 class StepPose(Protocol):

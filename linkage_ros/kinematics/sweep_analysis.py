@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.limits import Bound, without_mirrored
-from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.kinematics.limits import Bound
+from linkage_ros.kinematics.linkage import AnyLinkage
 from linkage_ros.kinematics.ranges import (
     describe_ranges,
     even_samples,
@@ -27,7 +27,6 @@ from linkage_ros.kinematics.ranges import (
     is_iterated,
     joints_repeat,
     sample_inputs,
-    slide_bound,
     through_the_end,
     turns_to_repeat,
     within_own,
@@ -36,7 +35,6 @@ from linkage_ros.kinematics.ranges import (
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
-from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
@@ -71,7 +69,7 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
     If a crank drives a hundred independent loops, it closes only one. ``inputs`` are inputs at
     which the linkage closes: they show where each step appends its results.
     """
-    needed = _needed_groups(closure, closure.step_groups[number])
+    needed = closure.needed_groups(closure.step_groups[number])
     walked = closure.initial_state(*inputs)
     plan: list[tuple[Callable[[LinkState], StepPose], int, int]] = []
     for step, group in zip(closure.steps[: number + 1], closure.step_groups, strict=False):
@@ -93,27 +91,6 @@ def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..
         return found
 
     return pose_at
-
-
-def _needed_groups(closure: LoopClosure, number: int) -> set[int]:
-    """Return the numbers of a group and of the groups that it starts from."""
-    groups = closure.structure.groups
-    owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
-    needed: set[int] = set()
-    asked = [number]
-    while asked:
-        i = asked.pop()
-        if i not in needed:
-            needed.add(i)
-            group = groups[i]
-            if isinstance(group, Driven):
-                starts = [group.joint.to]
-            elif isinstance(group, Dyad):
-                starts = [joint.to for joint in group.outer]
-            else:
-                return set(range(number + 1))
-            asked += [owner[link] for link in starts if link != GROUND]
-    return needed
 
 
 class Extreme(NamedTuple):
@@ -179,10 +156,8 @@ class InputSweep:
         if len(self.closure.linkage.inputs) == 1:
             found = self.closure.input_ranges
         else:
-            found = without_mirrored(
-                self.closure.linkage,
-                self.closure.structure,
-                tuple(self._name_ends(*ends) for ends in self._search_intervals()),
+            found = self.closure.keep_usual(
+                tuple(self._name_ends(*ends) for ends in self._search_intervals())
             )
         return tuple(map(self._usual_range, found))
 
@@ -236,7 +211,7 @@ class InputSweep:
 
     def _search_intervals(self) -> list[tuple[float, float]]:
         """Return the intervals in which every loop closes, for several inputs."""
-        far = pi if self.turning else slide_bound(self.closure)
+        far = pi if self.turning else self.closure.slide_bound
         limits = self.input.limits
         if limits.is_bounded:
             low, high = max(limits.low, -far), min(limits.high, far)
@@ -316,7 +291,7 @@ def grid_positions(
     for given in closure.linkage.inputs:
         low, high = given.limits.low, given.limits.high
         if given.slider:
-            farthest = slide_bound(closure)
+            farthest = closure.slide_bound
             low, high = max(low, -farthest), min(high, farthest)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
             ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
@@ -517,9 +492,7 @@ def check_closes(closure: LoopClosure) -> None:
     step = abs(states[1][0] - states[0][0])
     between = golden_section(lambda at: closure.position(at).gap, value - step, value + step)[1]
     nearest = min(nearest, closure.position(between), key=miss_distance)
-    group = closure.structure.groups[closure.step_groups[len(nearest.poses) - 1]]
-    sliders = {block: f'slider {name}' for name, block in closure.structure.blocks.items()}
-    links = [sliders.get(link, link) for link in links_of(group)]
+    links = closure.links_of_group(closure.step_groups[len(nearest.poses) - 1])
     if len(links) == 1:
         links.append('the rest')
     raise DefinitionError(
@@ -636,6 +609,6 @@ def _limits_text(closure: LoopClosure, bound: Bound) -> str:
     return f'{limits} {_joint_unit(closure.linkage, bound)}'
 
 
-def _joint_unit(linkage: Linkage, bound: Bound) -> str:
+def _joint_unit(linkage: AnyLinkage, bound: Bound) -> str:
     driven = {given.joint: given.unit for given in linkage.inputs}
     return driven.get(bound.name) or linkage.joints[bound.name].unit

@@ -26,7 +26,6 @@ from linkage_ros.kinematics import (
     convex_hull,
     GROUND,
     link_lengths,
-    slide_bound,
     SlideJoint,
 )
 from linkage_ros.tools.models.orientation import AngleSpan, named_joints
@@ -90,7 +89,7 @@ def link_bodies(
 def bar_width(closure: Closure) -> float:
     """Return the width of bars, in [m]: a fraction of the typical length of links."""
     lengths = [length for length in link_lengths(closure.linkage.links) if length > 0.0]
-    longest = max(lengths, default=0.0) or slide_bound(closure) or 1.0
+    longest = max(lengths, default=0.0) or closure.slide_bound or 1.0
     common = median(lengths or [longest])
     return min(0.12 * common, 0.05 * longest)
 
@@ -164,5 +163,5 @@ def slider_travel(
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
             return ranges[name].lowest, ranges[name].highest
-    far = 0.5 * slide_bound(closure)
+    far = 0.5 * closure.slide_bound
     return -far, far

@@ -30,7 +30,6 @@ from linkage_ros.kinematics import (
     Linkage,
     RevoluteJoint,
     sample_inputs,
-    slide_bound,
     SlideJoint,
     usual_inputs,
 )
@@ -139,7 +138,7 @@ def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     """Return the range of each joint that has a name in messages."""
     joints = named_joints(closure.linkage)
     if len(closure.linkage.inputs) > 1:
-        far = slide_bound(closure)
+        far = closure.slide_bound
         return {
             name: AngleSpan(-far, far) if isinstance(joint, SlideJoint) else _ROUND
             for name, joint in joints.items()
@@ -151,7 +150,7 @@ def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
         zip(closure.linkage.joints, _published_spans(closure, start, interval), strict=True)
     )
     (given,) = closure.linkage.inputs
-    margin = _MARGIN * (1.0 if interval.turning else slide_bound(closure))
+    margin = _MARGIN * (1.0 if interval.turning else closure.slide_bound)
     own = AngleSpan(interval.lowest - margin, interval.highest + margin)
     if interval.is_whole or (interval.turning and own.passes_pi):
         own = _ROUND
@@ -185,7 +184,7 @@ def _joint_span(
     low, high = int(row.argmin()), int(row.argmax())
     if turning and interval.is_whole and abs(row[-1] - row[0]) > pi:
         return _ROUND
-    margin = _MARGIN * (1.0 if turning else slide_bound(closure))
+    margin = _MARGIN * (1.0 if turning else closure.slide_bound)
 
     def highest_beyond(i: int) -> float:
         sides = [abs(row[j] - row[i]) for j in (i - 1, i + 1) if 0 <= j < len(row)]

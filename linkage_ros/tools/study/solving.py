@@ -30,7 +30,6 @@ from linkage_ros.kinematics import (
     is_iterated,
     Linkage,
     RevoluteJoint,
-    slide_bound,
     Status,
 )
 from linkage_ros.resources import shipped_path
@@ -318,7 +317,7 @@ def compare_hard_cases() -> Iterator[HardCase]:
 def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'it has one'
-    unit = 1.0 if interval.turning else slide_bound(closure)
+    unit = 1.0 if interval.turning else closure.slide_bound
     return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
 
 

@@ -1,0 +1,247 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""The loop closure of a spatial linkage: from its inputs to its joints, points and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import dist, sqrt
+from typing import Any
+
+from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.linkage import SlideJoint
+from linkage_ros.kinematics.results import InputRange, Position
+from linkage_ros.kinematics.space.freedom import check_freedom, find_freedom, Freedom
+from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage
+from linkage_ros.kinematics.space.plan import SpacePlan
+from linkage_ros.kinematics.space.vectors import (
+    cross,
+    dot,
+    Frame,
+    length,
+    minus,
+    scale,
+    Vector,
+)
+from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+
+Quaternion = tuple[float, float, float, float]
+
+_MET = 1e-4
+"""Largest gap of a redundant equation, relative to the size: CAD rounds."""
+
+
+class SpaceClosure(StepwiseClosure):
+    """
+    A spatial linkage, ready to be solved.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    name
+        Its name, which messages show; `load` takes it from the file.
+
+    Attributes
+    ----------
+    linkage, name
+        As given.
+    input_names, joint_names
+        Names of the driven and of the published joints, in the order of their values.
+
+    Raises
+    ------
+    DefinitionError
+        If the parts do not form a linkage, or the inputs do not move all of it.
+
+    """
+
+    turns_with: Mapping[int, Any] = {}
+
+    def __init__(self, linkage: SpaceLinkage, name: str = '') -> None:
+        if not isinstance(linkage, SpaceLinkage):
+            raise TypeError(f'linkage: {quote(linkage)} is not a SpaceLinkage; load() reads files')
+        check_space_linkage(linkage)
+        self._plan = plan = SpacePlan(linkage)
+        self._set_linkage(linkage, name, plan.scale)
+        self.freedom: Freedom = find_freedom(linkage, plan)
+        check_freedom(linkage, plan, self.freedom)
+        self.groups = plan.groups
+        self.idle = plan.idle
+        """Rods that may turn about themselves."""
+        self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
+        self.ratio_turns = plan.ratio_turns
+        self._terms = tuple(
+            (plan.coordinates[name], 0, plan.scale if isinstance(joint, SlideJoint) else 1.0, 0.0)
+            for name, joint in linkage.joints.items()
+        )
+
+    def points(self, position: Position) -> dict[str, Vector]:
+        """
+        Return every point in the frame of the ground, as (x, y, z), in [m].
+
+        Raises
+        ------
+        ValueError
+            If the linkage has no pose.
+
+        """
+        self._check_pose('points', position)
+        places = {}
+        for point in self.linkage.points:
+            if point in self._plan.points:
+                place = position.state.pins[self._plan.points[point]]
+            else:
+                link = next(one for one in self._plan.carriers[point] if one in self._plan.frames)
+                place = self._carried_place(position, link, point)
+            places[point] = scale(self.scale, place)
+        return places
+
+    named_points = points
+
+    def frames(self, position: Position) -> dict[str, tuple[Vector, Quaternion]]:
+        """
+        Return the frame of every link: the place of its origin, and how far it has turned.
+
+        In the pose of the file the frames are parallel to that of the ground, and have their
+        origins at a hinge or a point of the link. A rod that may turn about itself does not.
+
+        Returns
+        -------
+        frames : dict
+            For each link the place (x, y, z) in [m] and the quaternion (x, y, z, w).
+
+        Raises
+        ------
+        ValueError
+            If the linkage has no pose.
+
+        """
+        self._check_pose('frames', position)
+        plan, found = self._plan, {}
+        for link in self.linkage.link_names:
+            if link in plan.frames:
+                frame, drawn = position.state.pins[plan.frames[link]], plan.pose_frames[link]
+                # The columns of the rotation from the pose.
+                columns = [frame.turn(drawn.resolve(axis)) for axis in plan.pose_frames['ground'][:3]]
+                found[link] = (scale(self.scale, frame.origin), _quaternion_of(columns))
+            else:
+                points = self.points(position)
+                one, other, *_ = self.linkage.links[link]
+                drawn_way = minus(self.linkage.points[other], self.linkage.points[one])
+                way = minus(points[other], points[one])
+                found[link] = (points[one], _shortest_turn(drawn_way, way))
+        return found
+
+    def residual(self, position: Position) -> float:
+        """
+        Return the closure error of a closed position, in [m].
+
+        It is the largest by which a point of two links has two places, a rod another length, or a
+        joint between known links, redundant or not, another axis (times the size).
+        """
+        plan, worst = self._plan, 0.0
+        state = position.state
+        known = {name: state.pins[index] for name, index in plan.points.items()}
+        for point, links in plan.carriers.items():
+            places = [self._carried_place(position, one, point) for one in links if one in plan.frames]
+            places += [known[point]] if point in known else []
+            worst = max(worst, *(dist(places[0], place) for place in places), 0.0) if places else worst
+            known.setdefault(point, places[0]) if places else None
+        for link in plan.idle:
+            points = plan.carried[link]
+            for one, other in zip(points, points[1:]):
+                size = dist(plan.places[one], plan.places[other])
+                worst = max(worst, abs(dist(known[one], known[other]) - size))
+        for name in self.linkage.slides:
+            joint = self.linkage.slides[name]
+            if joint.parent in plan.frames and joint.child in plan.frames:
+                worst = max(worst, self._slide_error(position, joint.parent, joint.child, name))
+        return worst * self.scale
+
+    def _slide_error(self, position: Position, parent: str, child: str, name: str) -> float:
+        """Return by how much a link turns, or leaves the axis, of which it may only slide."""
+        plan, errors = self._plan, []
+        now = [position.state.pins[plan.frames[link]] for link in (parent, child)]
+        drawn = [plan.pose_frames[link] for link in (parent, child)]
+        for axis in range(3):
+            one, other = (pair[0].resolve(pair[1][axis]) for pair in (now, drawn))
+            errors.append(dist(one, other))
+        moved, before = (pair[0].locate(pair[1].origin) for pair in (now, drawn))
+        axis_now = drawn[0].resolve(plan.axis_of(name))
+        errors.append(length(cross(axis_now, minus(moved, before))))
+        return max(errors)
+
+    def _carried_place(self, position: Position, link: str, point: str) -> Vector:
+        frame: Frame = position.state.pins[self._plan.frames[link]]
+        return frame.place(self._plan.pose_frames[link].locate(self._plan.places[point]))
+
+    def _check_pose(self, what: str, position: Position) -> None:
+        if not position.status.has_pose:
+            raise ValueError(f'{what}: {position!r} has none; check its status first')
+
+    @property
+    def slide_bound(self) -> float:
+        """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
+        return 4.0 * self.scale
+
+    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
+        """Return the ranges of the first input as they are."""
+        return ranges
+
+    def needed_groups(self, number: int) -> set[int]:
+        """Return the numbers of the groups up to one."""
+        return set(range(number + 1))
+
+    def links_of_group(self, number: int) -> list[str]:
+        """Return the links of a group."""
+        return list(self.groups[number].links)
+
+    @BuiltProperty
+    def worst_gap(self) -> tuple[float, tuple[float, ...]]:
+        """The greatest residual over the range of a single input, or in the pose; its inputs."""
+        pose = self.linkage.pose.inputs
+        return self.residual(self.close_unlimited(*pose)), pose
+
+
+def check_pose(closure: SpaceClosure) -> None:
+    """Refuse a linkage that its own pose does not close, or whose equations are not met."""
+    pose = closure.linkage.pose.inputs
+    position = closure.close_unlimited(*pose)
+    if not position.status.has_rates:
+        raise DefinitionError(
+            'points', f'the linkage is {position.status.value} in the pose', 'draw another pose'
+        )
+
+
+def _quaternion_of(columns: list[Vector]) -> Quaternion:
+    """Return the quaternion (x, y, z, w) of a rotation by its columns, by the largest part."""
+    (a, b, c), (d, e, f), (g, h, i) = zip(*columns, strict=True)
+    parts = (
+        (1.0 + a - e - i, b + d, c + g, h - f),
+        (b + d, 1.0 - a + e - i, f + h, c - g),
+        (c + g, f + h, 1.0 - a - e + i, d - b),
+        (h - f, c - g, d - b, 1.0 + a + e + i),
+    )
+    number = max(range(4), key=lambda k: parts[k][k])
+    factor = 0.5 / sqrt(parts[number][number])
+    x, y, z, w = (factor * part for part in parts[number])
+    return x, y, z, w
+
+
+def _shortest_turn(one: Vector, other: Vector) -> Quaternion:
+    """Return the quaternion of the shortest rotation from one direction to another."""
+    one, other = scale(1.0 / length(one), one), scale(1.0 / length(other), other)
+    half = sqrt(max(0.5 * (1.0 + dot(one, other)), 0.0))
+    if half < 1e-9:
+        return 0.0, 0.0, 0.0, 1.0
+    x, y, z = scale(0.5 / half, cross(one, other))
+    return x, y, z, half
+
+

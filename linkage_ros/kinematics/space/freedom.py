@@ -1,0 +1,141 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Degrees of freedom of a spatial linkage in its pose: which links its inputs move, and how.
+
+To first order every link has a spin and a velocity. Joints and balls are linear equations in them;
+the rank says how many of these are needed. Equations beyond are redundant: the linkage moves only
+if its dimensions meet them everywhere.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from linkage_ros.errors import DefinitionError, list_names
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.space.linkage import SpaceLinkage
+from linkage_ros.kinematics.space.plan import SpacePlan
+from linkage_ros.kinematics.space.vectors import Vector
+import numpy as np
+
+_RANK = 1e-9
+"""Singular values below this, relative to the largest, are rounding."""
+
+
+class Freedom(NamedTuple):
+    """How free a linkage is in its pose."""
+
+    mobility: int  # Degrees of freedom, without the turns of rods about themselves
+    redundant: int  # Equations beyond those that are needed
+    free: tuple[str, ...]  # Links that the inputs leave free
+    dependent: int  # Inputs beyond the degrees of freedom
+
+
+def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
+    """Return the degrees of freedom in the pose."""
+    links = {name: number for number, name in enumerate(linkage.link_names)}
+    places, count = plan.places, 6 * len(links)
+    rows: list[np.ndarray] = []
+
+    def spin(link: str) -> np.ndarray:
+        found = np.zeros((3, count))
+        found[:, 6 * links[link] : 6 * links[link] + 3] = np.eye(3)
+        return found
+
+    def velocity(link: str, place: Vector) -> np.ndarray:
+        x, y, z = place
+        first = 6 * links[link]
+        found = np.zeros((3, count))
+        # v + ω × place
+        found[:, first : first + 3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+        found[:, first + 3 : first + 6] = np.eye(3)
+        return found
+
+    def rate(name: str) -> np.ndarray:
+        """Return the row of a joint's rate, in the unit of the file."""
+        if name in linkage.struts:
+            one, other = linkage.struts[name]
+            between = np.subtract(places[other], places[one])
+            ends = (velocity(plan.carriers[point][0], places[point]) for point in (other, one))
+            return plan.scale * (between / np.linalg.norm(between)) @ np.subtract(*ends)
+        joint = linkage.between[name]
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        if name in linkage.hinges:
+            return axis @ (spin(joint.child) - spin(joint.parent))
+        at = (0.0, 0.0, 0.0)
+        return plan.scale * axis @ (velocity(joint.child, at) - velocity(joint.parent, at))
+
+    for name, joint in linkage.between.items():
+        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
+        across = np.eye(3) - np.outer(axis, axis)
+        turning = spin(joint.child) - spin(joint.parent)
+        x, y, z = joint.at
+        at = (x / plan.scale, y / plan.scale, z / plan.scale)
+        moving = velocity(joint.child, at) - velocity(joint.parent, at)
+        hinge = name in linkage.hinges
+        rows += [across @ turning, moving] if hinge else [turning, across @ moving]
+    needed = 5 * len(linkage.between)
+    for point, links_at in plan.carriers.items():
+        if point not in linkage.points:
+            continue
+        for link in links_at[1:]:
+            rows.append(velocity(link, places[point]) - velocity(links_at[0], places[point]))
+            needed += 3
+    for name, ratio in linkage.ratios.items():
+        rows.append((rate(name) - ratio.ratio * rate(ratio.of))[None])
+        needed += 1
+    ground = np.zeros((6, count))
+    ground[:, 6 * links[GROUND] : 6 * links[GROUND] + 6] = np.eye(6)
+    constraints = np.vstack([*rows, ground])
+    inputs = np.vstack([rate(name) for name in linkage.driven])
+    rank, _ = _rank_and_motions(constraints)
+    locked, motions = _rank_and_motions(np.vstack([constraints, inputs]))
+    rods = plan.rods
+    free = [
+        link
+        for link in links
+        if max(
+            (np.abs(velocity(link, places[point]) @ motions).max(initial=0.0)
+             for point in plan.carried[link]), default=0.0
+        ) > 1e-7
+        or (link not in rods and np.abs(spin(link) @ motions).max(initial=0.0) > 1e-7)
+    ]  # fmt: skip
+    dependent = len(linkage.driven) - (locked - rank)
+    return Freedom(count - rank - len(rods), needed + 6 - rank, tuple(free), dependent)
+
+
+def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> None:
+    """Refuse a linkage that its inputs do not move, or that its steps do not find."""
+    count = len(linkage.driven)
+    given = f'{count} input{"s" * (count != 1)} for {freedom.mobility} degrees of freedom'
+    if freedom.free:
+        raise DefinitionError(
+            'input', f'{given}: {list_names(freedom.free)} stay free',
+            'drive another joint, or hold these links',
+        )  # fmt: skip
+    if freedom.dependent:
+        raise DefinitionError(
+            'input', f'{given}: they depend on each other', 'leave one of them out'
+        )
+    unknown = [
+        link for link in linkage.link_names if link not in plan.frames and link not in plan.idle
+    ]
+    if unknown or plan.lost:
+        raise DefinitionError(
+            'input',
+            f'{list_names(unknown or plan.lost)} close only together, and no step finds them',
+            'drive other joints, for example those that are published',
+        )
+
+
+def _rank_and_motions(matrix: np.ndarray) -> tuple[int, np.ndarray]:
+    """Return the rank of a matrix, and the vectors that it makes 0, as columns."""
+    _, values, rows = np.linalg.svd(matrix)
+    rank = int(np.count_nonzero(values > _RANK * values[0]))
+    return rank, rows[rank:].T

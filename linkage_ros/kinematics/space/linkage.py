@@ -1,0 +1,254 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+A spatial linkage: points in one pose, links that carry them, and the joints between links.
+
+Lengths are in metres, angles in radians. A point that two links carry is a ball joint; a link of
+two points is a rod. In the pose every joint has its ``value``, which is 0 unless said.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import dist, isfinite
+
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
+from linkage_ros.kinematics.checks import check_all_limits
+from linkage_ros.kinematics.linkage import (
+    AssemblyPose,
+    GROUND,
+    Input,
+    Limits,
+    NO_LIMITS,
+    Ratio,
+    RevoluteJoint,
+    SlideJoint,
+)
+from linkage_ros.kinematics.space.vectors import length, Vector, ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class SpatialJoint:
+    """
+    A hinge of ``child`` on ``parent``, or a slide.
+
+    Attributes
+    ----------
+    parent, child
+        Names of the links.
+    axis
+        Its direction in the pose; the joint turns or moves the child positively about or along
+        it. Any length but zero.
+    at
+        A point of the axis of a hinge, in the pose, in [m].
+    value
+        Its value in the pose, in [rad] or [m].
+    limits
+        Its limits.
+
+    """
+
+    parent: str
+    child: str
+    axis: Vector
+    at: Vector = ZERO
+    value: float = 0.0
+    limits: Limits = NO_LIMITS
+
+
+@dataclass(frozen=True)
+class SpaceLinkage:
+    """
+    A spatial linkage, as its file says it.
+
+    Attributes
+    ----------
+    points
+        The points in the pose, in the frame of the ground, in [m].
+    links
+        The points that each link carries; links that only joints name are left out.
+    hinges, slides
+        The joints, by name.
+    struts
+        Pairs of points whose distance is a joint, by name.
+    driven, published
+        Names of the driven and of the published joints: of hinges, slides and struts.
+    ratios
+        How a joint follows another, by name.
+    traced
+        Names of points whose paths are drawn.
+
+    """
+
+    points: Mapping[str, Vector]
+    links: Mapping[str, tuple[str, ...]]
+    hinges: Mapping[str, SpatialJoint]
+    slides: Mapping[str, SpatialJoint]
+    struts: Mapping[str, tuple[str, str]]
+    driven: tuple[str, ...]
+    published: tuple[str, ...]
+    ratios: Mapping[str, Ratio] = field(default_factory=dict)
+    traced: tuple[str, ...] = ()
+
+    @cached_property
+    def between(self) -> dict[str, SpatialJoint]:
+        """Return the hinges and slides by name."""
+        return {**self.hinges, **self.slides}
+
+    @cached_property
+    def link_names(self) -> tuple[str, ...]:
+        """Return all links, the ground first."""
+        ends = (end for joint in self.between.values() for end in (joint.parent, joint.child))
+        return tuple(dict.fromkeys((GROUND, *self.links, *ends)))
+
+    @cached_property
+    def inputs(self) -> tuple[Input, ...]:
+        """Return the driven joints, as those of a planar linkage."""
+        return tuple(map(self._as_input, self.driven))
+
+    @cached_property
+    def joints(self) -> dict[str, RevoluteJoint | SlideJoint]:
+        """Return the published joints, as those of a planar linkage."""
+        return {name: self._as_input(name).as_joint() for name in self.published}
+
+    @cached_property
+    def driven_joints(self) -> tuple[Input, ...]:
+        """Return the inputs, then the joints that follow others, as if they were inputs."""
+        return (*self.inputs, *map(self._as_input, self.ratios))
+
+    @cached_property
+    def limits(self) -> dict[str, Limits]:
+        """Return the limits of the joints that have any, by name, inputs first."""
+        named = {given.joint: given.limits for given in self.inputs}
+        named |= {name: joint.limits for name, joint in self.joints.items()}
+        return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
+
+    @cached_property
+    def pose(self) -> AssemblyPose:
+        """Return the inputs of the pose."""
+        return AssemblyPose(tuple(map(self.pose_value, self.driven)), {})
+
+    def pose_value(self, name: str) -> float:
+        """Return the value of a joint in the pose, in [rad] or [m]."""
+        if name in self.struts:
+            one, other = self.struts[name]
+            return dist(self.points[one], self.points[other])
+        return self.between[name].value
+
+    def _as_input(self, name: str) -> Input:
+        if name in self.struts:
+            return Input(name, slider=name)
+        joint = self.between[name]
+        slider = name if name in self.slides else ''
+        return Input(name, joint.parent, joint.child, slider, joint.limits)
+
+
+def check_space_linkage(linkage: SpaceLinkage) -> None:
+    """Refuse a linkage whose parts do not match; the error names the key of the part."""
+    for link, points in linkage.links.items():
+        for point in points:
+            _check_name(f'links.{link}', point, 'point', linkage.points)
+        if points and max(Counter(points).values()) > 1:
+            twice = Counter(points).most_common(1)[0][0]
+            raise DefinitionError(f'links.{link}', f'names {quote(twice)} twice', 'name it once')
+    for name, ends in linkage.struts.items():
+        for point in ends:
+            _check_name(f'struts.{name}', point, 'point', linkage.points)
+        if dist(*(linkage.points[point] for point in ends)) == 0.0:
+            reason = f'{quote(ends[0])} and {quote(ends[1])} are in one place'
+            raise DefinitionError(f'struts.{name}', reason, 'name two points apart')
+    for kind, joints in (('hinges', linkage.hinges), ('slides', linkage.slides)):
+        for name, joint in joints.items():
+            if joint.parent == joint.child:
+                raise DefinitionError(
+                    f'{kind}.{name}.child', f'{quote(joint.child)} is its own parent',
+                    'name two links',
+                )  # fmt: skip
+            if not isfinite(length(joint.axis)) or length(joint.axis) < 1e-100:
+                axis = ', '.join(f'{one:g}' for one in joint.axis)
+                raise DefinitionError(
+                    f'{kind}.{name}.axis', f'[{axis}] has no direction',
+                    'write for example [0, 0, 1]',
+                )  # fmt: skip
+    _check_held(linkage)
+    _check_driven(linkage)
+    for point in linkage.traced:
+        _check_name('traced', point, 'point', linkage.points)
+    check_all_limits(linkage)
+
+
+def _check_held(linkage: SpaceLinkage) -> None:
+    """Refuse a link that a single ball holds, and a point that nothing carries."""
+    carried = Counter(point for points in linkage.links.values() for point in points)
+    ends = {end for joint in linkage.between.values() for end in (joint.parent, joint.child)}
+    for link, points in linkage.links.items():
+        if link in ends or link == GROUND:
+            continue
+        if sum(carried[point] > 1 for point in points) < 2:
+            raise DefinitionError(
+                f'links.{link}',
+                'is free: at most one ball holds it',
+                f'add the hinge of {quote(link)}, or name its points on the links that hold it',
+            )
+    for name, (one, other) in linkage.struts.items():
+        for point in (one, other):
+            if not carried[point]:
+                raise DefinitionError(
+                    f'struts.{name}', f'no link carries {quote(point)}', 'name it under links'
+                )
+
+
+def _check_driven(linkage: SpaceLinkage) -> None:
+    """Refuse inputs, published joints and ratios that name no joint."""
+    names = (*linkage.between, *linkage.struts)
+    for key, chosen in (('input', linkage.driven), ('joints', linkage.published)):
+        for name in chosen:
+            _check_name(key, name, 'joint', names)
+            if chosen.count(name) > 1:
+                raise DefinitionError(key, f'{quote(name)} is named twice', 'name it once')
+    if not linkage.driven:
+        raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
+    for name, ratio in linkage.ratios.items():
+        key = f'ratios.{name}'
+        _check_name(key, name, 'hinge or slide', linkage.between)
+        _check_name(f'{key}.of', ratio.of, 'joint', names)
+        if name in linkage.driven:
+            reason = f'{quote(name)} is an input, which follows no joint'
+            raise DefinitionError(key, reason, 'leave one of the two out')
+        chain = [name]
+        while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
+            chain.append(linkage.ratios[chain[-1]].of)
+        if chain[-1] in chain[:-1]:
+            reason, remedy = ' follows '.join(chain), 'let one of them follow an input'
+            raise DefinitionError(f'{key}.of', reason, remedy)
+        expected = ratio.ratio * linkage.pose_value(ratio.of) + ratio.offset
+        found = linkage.pose_value(name)
+        if not ratio.ratio or abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
+            raise DefinitionError(
+                key, f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
+                'write a ratio other than 0 and the offset that fits the pose',
+            )  # fmt: skip
+
+
+def _check_name(key: str, name: str, what: str, names: object) -> None:
+    known = list(names)  # type: ignore[call-overload]
+    if name not in known:
+        remedy = did_you_mean(name, known, f'name one of {list_names(sorted(known))}')
+        raise DefinitionError(key, f'there is no {what} {quote(name)}', remedy)
+
+
+def size_of(linkage: SpaceLinkage) -> float:
+    """Return the size of a linkage: the greatest extent of its points and hinges, in [m]."""
+    places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
+    extents = [max(one) - min(one) for one in zip(*places, strict=True)]
+    return max(extents, default=0.0) or 1.0
+
+

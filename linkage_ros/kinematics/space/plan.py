@@ -1,0 +1,615 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+The order of solution of a spatial linkage: which step finds what, from the inputs outwards.
+
+There are no kinds of mechanisms and no patterns. Two points of one link keep their distance: so
+each pair of points on a link is a rod, whatever else joins the link. The axis of a hinge gives two
+points to both of its links. In the order of the file, again and again:
+
+- a joint whose value is known places its link;
+- a hinge or slide whose link carries a known point is aimed at it;
+- a hinge or slide whose link carries a point at a known distance from a known one is closed; of
+  all such pairs the one is taken whose rod meets the motion of its point least squarely off;
+- a link with three known points has a frame;
+- a point at known distances from three known points is placed; a link that hangs on three slides
+  only moves without turning, and is one point.
+
+The pose gives the sign of each closed step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import atan2, dist, frexp, hypot, ldexp, lcm, tau
+from typing import Any, NamedTuple
+
+from linkage_ros.errors import DefinitionError, list_names, quote
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.solved_links import count_turns
+from linkage_ros.kinematics.space.joints import Hinge, Joint, Slide
+from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
+from linkage_ros.kinematics.space.steps import (
+    AimedHinge,
+    CarriedPoint,
+    ClosedHinge,
+    ClosedSlide,
+    frame_of,
+    FramedLink,
+    GivenJoint,
+    GroundStep,
+    MeasuredHinge,
+    MeasuredStrut,
+    ResolvedSlides,
+    Rod,
+    ShiftedPoint,
+    ThreeDistances,
+)
+from linkage_ros.kinematics.space.vectors import (
+    cross,
+    dot,
+    Frame,
+    GROUND_FRAME,
+    length,
+    minus,
+    plus,
+    scale,
+    Vector,
+    ZERO,
+)
+from linkage_ros.kinematics.step import FollowerJoint, LinkState
+
+_SQUARE = 1e-6
+"""Least sine of the angle at which a rod may meet the motion of its point in the pose."""
+
+_BETTER = 1e-6
+"""By how much the next pair must be better: among equal ones the first is taken."""
+
+_CLEAN = 2.0**-50
+"""A component of a unit vector below this is rounding."""
+
+
+class SpaceGroup(NamedTuple):
+    """What a few steps find together, for people."""
+
+    kind: str
+    links: tuple[str, ...]
+    method: str
+    assembly: str = ''
+
+
+class _Pair(NamedTuple):
+    """A point of a link, and a known point at a known distance."""
+
+    point: str
+    known: str
+    rod: Rod
+    by: str  # The link or strut that keeps the distance
+
+
+class SpacePlan:
+    """Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres."""
+
+    def __init__(self, linkage: SpaceLinkage) -> None:
+        self._linkage = linkage
+        self.scale = ldexp(1.0, frexp(size_of(linkage))[1])
+        self.steps: list[Any] = []
+        self.step_groups: list[int] = []
+        self.groups: list[SpaceGroup] = []
+        self.coordinates: dict[str, int] = {
+            name: 1 + number for number, name in enumerate(linkage.driven)
+        }
+        self.frames: dict[str, int] = {}
+        """Indices, among the pins, of the frames of links that are known."""
+        self.pose_frames: dict[str, Frame] = {GROUND: GROUND_FRAME}
+        self.points: dict[str, int] = {}
+        """Indices, among the pins, of the points that are placed."""
+        self.placed_by: dict[str, str] = {}
+        """For each link the joint that places it, if one does."""
+        self._coordinate_count = 1 + len(linkage.driven)
+        self._pin_count = 0
+        self._collect_points()
+        self._add(GroundStep(), pins=1)
+        self.frames[GROUND] = 0
+        self.step_groups[0] = 0
+        while self._find_next():
+            pass
+        unknown = self._unknown_links()
+        self.idle = tuple(
+            link
+            for link in self.rods
+            if link in unknown and all(map(self._is_known, self.carried[link]))
+        )
+        """Rods whose ends are known: nothing holds their turn about themselves."""
+        self._measure_published()
+
+    def _collect_points(self) -> None:
+        """Collect the places in the pose, and which links carry each point."""
+        linkage, unit = self._linkage, 1.0 / self.scale
+        self.places: dict[str, Vector] = {
+            name: scale(unit, place) for name, place in linkage.points.items()
+        }
+        self.carriers: dict[str, list[str]] = {name: [] for name in self.places}
+        self.carried: dict[str, list[str]] = {name: [] for name in linkage.link_names}
+        self._axes: dict[str, Vector] = {}
+        for link, points in linkage.links.items():
+            for point in points:
+                self._carry(point, link)
+        for name, joint in linkage.between.items():
+            self._axes[name] = _unit(joint.axis)
+            if name in linkage.slides:
+                continue
+            at = scale(unit, joint.at)
+            for number, place in enumerate((at, plus(at, self._axes[name]))):
+                point = f'{name}, point {number + 1} of the axis'
+                self.places[point], self.carriers[point] = place, []
+                for link in (joint.parent, joint.child):
+                    self._carry(point, link)
+
+    def _carry(self, point: str, link: str) -> None:
+        self.carriers[point].append(link)
+        self.carried[link].append(point)
+
+    def _add(self, step: Any, coordinates: int = 0, pins: int = 0) -> None:
+        self.steps.append(step)
+        self.step_groups.append(len(self.groups))
+        self._coordinate_count += coordinates
+        self._pin_count += pins
+
+    def axis_of(self, name: str) -> Vector:
+        """Return the direction of a joint in the pose."""
+        return self._axes[name]
+
+    @property
+    def rods(self) -> list[str]:
+        """Return the links of points on one line that no joint holds: they may spin."""
+        joints = self._linkage.between.values()
+        held = {end for joint in joints for end in (joint.parent, joint.child)}
+        return [
+            link
+            for link, points in self.carried.items()
+            if link not in held and link != GROUND and not self._spans(points)
+        ]
+
+    def _spans(self, points: list[str]) -> bool:
+        """Return whether points do not lie on one line."""
+        start, *others = (self.places[point] for point in points)
+        arms = [minus(other, start) for other in others]
+        return any(
+            length(cross(one, other)) > 1e-3 * length(one) * length(other)
+            for one, other in combinations(arms, 2)
+        )
+
+    def _unknown_links(self) -> list[str]:
+        return [link for link in self._linkage.link_names if link not in self.frames]
+
+    def _is_known(self, point: str) -> bool:
+        return point in self.points or any(link in self.frames for link in self.carriers[point])
+
+    def _point_index(self, point: str) -> int:
+        """Return the index of a known point; it is placed when first asked for."""
+        if point not in self.points:
+            link = next(link for link in self.carriers[point] if link in self.frames)
+            place = _clean(self.pose_frames[link].locate(self.places[point]))
+            self.points[point] = self._pin_count
+            self._add(CarriedPoint(self.frames[link], place, self._pin_count), pins=1)
+        return self.points[point]
+
+    def _find_next(self) -> bool:
+        """Add the next step; False if there is none."""
+        return (
+            any(map(self._follow, self._linkage.ratios))
+            or any(map(self._give, self._linkage.between))
+            or any(map(self._aim, self._linkage.between))
+            or any(map(self._close, self._linkage.between))
+            or any(map(self._frame, self._unknown_links()))
+            or any(map(self._place_point, self.places))
+            or any(map(self._translate, self._unknown_links()))
+        )
+
+    # Joints
+
+    def _ends(self, name: str) -> tuple[str, str] | None:
+        """Return the known and the unknown link of a joint; None if there are not one of each."""
+        joint = self._linkage.between[name]
+        ends = sorted((joint.parent, joint.child), key=lambda link: link not in self.frames)
+        known, unknown = ends
+        if known in self.frames and unknown not in self.frames:
+            return known, unknown
+        return None
+
+    def _axis_to(self, name: str, child: str) -> Vector:
+        """Return the axis of a joint, reversed if the child is its parent in the file."""
+        joint = self._linkage.between[name]
+        return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
+
+    def _value(self, name: str) -> float:
+        """Return the value of a joint in the pose, in the unit of the steps."""
+        value = self._linkage.pose_value(name)
+        return value / self.scale if self._slides(name) else value
+
+    def _slides(self, name: str) -> bool:
+        return name not in self._linkage.hinges
+
+    def _make_joint(
+        self, name: str, parent: str, child: str, toward: Vector | None = None
+    ) -> tuple[Joint, Frame]:
+        """Return a joint on a known link, and the frame of its child in the pose."""
+        z = self._axis_to(name, child)
+        if name in self._linkage.hinges:
+            at = scale(1.0 / self.scale, self._linkage.hinges[name].at)
+        else:
+            at = self.places[self.carried[child][0]] if self.carried[child] else ZERO
+        x = _across(z)
+        if toward is not None:
+            # The x axis leads roughly there: the direction does not jump from π to −π nearby.
+            y, arm = cross(z, x), minus(toward, at)
+            ways = (x, y, scale(-1.0, x), scale(-1.0, y))
+            x = max(ways, key=lambda way: dot(way, arm))
+        # The seat does not turn with the joint: the child turns or moves from it by the value.
+        kind = Slide if self._slides(name) else Hinge
+        origin = minus(at, scale(self._value(name), z)) if self._slides(name) else at
+        base = Frame(x, cross(z, x), z, origin)
+        on = self.pose_frames[parent]
+        seat = Frame(*(_clean(on.resolve(axis)) for axis in base[:3]), on.locate(base.origin))
+        joint = kind(self.frames[parent], seat)
+        return joint, joint.child_frame(base, self._value(name))
+
+    def _set_frame(self, link: str, frame: Frame, by: str = '') -> int:
+        """Keep the frame of a link that the next step appends; return its index."""
+        self.frames[link], self.pose_frames[link] = self._pin_count, frame
+        self.placed_by[link] = by
+        return self._pin_count
+
+    def _give(self, name: str) -> bool:
+        """Place the link of a joint whose value is known."""
+        ends = self._ends(name)
+        if ends is None or name not in self.coordinates:
+            return False
+        joint, frame = self._make_joint(name, *ends)
+        index = self._set_frame(ends[1], frame, name)
+        self._add(GivenJoint(joint, self.coordinates[name], index), pins=1)
+        kind = 'input' if name in self._linkage.driven else 'joint'
+        self._end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
+        return True
+
+    def _end_group(
+        self, kind: str, links: tuple[str, ...], method: str, assembly: str = ''
+    ) -> None:
+        self.groups.append(SpaceGroup(kind, links, method, assembly))
+
+    def _new_coordinate(self, name: str) -> None:
+        self.coordinates[name] = self._coordinate_count
+
+    def _follow(self, name: str) -> bool:
+        """Give a joint that follows a known one its value."""
+        ratio = self._linkage.ratios[name]
+        if name in self.coordinates or ratio.of not in self.coordinates:
+            return False
+        own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
+        of = self.coordinates[ratio.of]
+        self._new_coordinate(name)
+        factor, offset = ratio.ratio * other / own, ratio.offset / own
+        self._add(FollowerJoint(name, of, 0, 0.0, factor, offset), coordinates=1)
+        self._end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
+        return True
+
+    def _aim(self, name: str) -> bool:
+        """Aim a hinge at a known point that its link carries."""
+        ends = self._ends(name)
+        if ends is None or name in self.coordinates:
+            return False
+        slides, axis = self._slides(name), self._axis_to(name, ends[1])
+        at = self._linkage.between[name].at
+        for point in filter(self._is_known, self.carried[ends[1]]):
+            arm = minus(self.places[point], scale(1.0 / self.scale, at))
+            if not slides and length(cross(axis, arm)) < _SQUARE * length(arm):
+                continue
+            if not slides and not length(arm):
+                continue
+            to = self._point_index(point)
+            joint, frame = self._make_joint(name, *ends, self.places[point])
+            place = frame.locate(self.places[point])
+            index = self._set_frame(ends[1], frame, name)
+            self._new_coordinate(name)
+            if isinstance(joint, Hinge):
+                direction = self._direction(joint, frame, place, name, point)
+                self._add(AimedHinge(joint, direction, to, index), coordinates=1, pins=1)
+            else:
+                self._add_resolved((name,), ends[0], to, self.places[point])
+                self._add(GivenJoint(joint, self.coordinates[name], index), pins=1)
+            self._end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
+            return True
+        return False
+
+    def _direction(
+        self, joint: Hinge, frame: Frame, place: Vector, name: str, point: str, angle: float = 0.0
+    ) -> float:
+        """Return the direction of a carried point at 0, with the turns of the pose."""
+        base = self._pose_base(joint)
+        x, y, _ = base.locate(self.places[point])
+        direction = atan2(place[1], place[0])
+        found = atan2(y, x) - direction + angle
+        return direction + tau * round((found - self._value(name)) / tau)
+
+    def _pose_base(self, joint: Joint) -> Frame:
+        link = next(link for link, index in self.frames.items() if index == joint.parent)
+        state = LinkState([], [])
+        state.pins.extend([None] * joint.parent + [self.pose_frames[link]])
+        return joint.base(state)
+
+    def _distances(self, point: str) -> Iterator[_Pair]:
+        """Yield the known points at known distances from a point."""
+        for link in self.carriers[point]:
+            for other in self.carried[link]:
+                size = dist(self.places[point], self.places[other])
+                if other != point and size and self._is_known(other):
+                    yield _Pair(point, other, Rod(size), link)
+        for name, ends in self._linkage.struts.items():
+            if name in self.coordinates and point in ends:
+                other = ends[1 - ends.index(point)]
+                if self._is_known(other):
+                    yield _Pair(point, other, Rod(0.0, self.coordinates[name]), name)
+
+    def _close(self, name: str) -> bool:
+        """Close a hinge or slide by a rod."""
+        ends = self._ends(name)
+        if ends is None or name in self.coordinates:
+            return False
+        best, choice = _SQUARE, None
+        axis, at = self._axis_to(name, ends[1]), self._linkage.between[name].at
+        for point in self.carried[ends[1]]:
+            arm = minus(self.places[point], scale(1.0 / self.scale, at))
+            slope = axis if self._slides(name) else cross(axis, arm)
+            for pair in self._distances(point) if length(slope) > _SQUARE else ():
+                rod = minus(self.places[point], self.places[pair.known])
+                square = dot(rod, slope) / (length(rod) * length(slope))
+                if abs(square) > best + _BETTER:
+                    best, choice = abs(square), (pair, 1.0 if square > 0.0 else -1.0)
+        if choice is None:
+            return False
+        (point, known, rod, by), sign = choice
+        to = self._point_index(known)
+        joint, frame = self._make_joint(name, *ends, self.places[known])
+        place = _clean(frame.locate(self.places[point]))
+        index = self._set_frame(ends[1], frame, name)
+        self._new_coordinate(name)
+        if isinstance(joint, Hinge):
+            radius = hypot(place[0], place[1])
+            plain = ClosedHinge(joint, place, to, rod, sign, index, radius, 0.0)
+            # Where 0 lies among the whole turns follows from the value in the pose.
+            found = self._closed_value(plain, known, point)
+            direction = atan2(place[1], place[0])
+            direction += tau * round((found - direction - self._value(name)) / tau)
+            step: Any = ClosedHinge(joint, place, to, rod, sign, index, radius, direction)
+        else:
+            step = ClosedSlide(joint, place, to, rod, sign, index)
+        self._add(step, coordinates=1, pins=1)
+        side = '+' if sign > 0.0 else '-'
+        method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
+        self._end_group('closed', (ends[1],), method, f'{side}, as in the pose')
+        return True
+
+    def _closed_value(self, step: ClosedHinge, known: str, point: str) -> float:
+        """Return the value of a closed hinge in the pose, if its direction is 0."""
+        state = LinkState([0.0] * self._coordinate_count, [ZERO] * self._pin_count)
+        for strut in self._linkage.struts:
+            if strut in self.coordinates:
+                state.coordinates[self.coordinates[strut]] = self._value(strut)
+        for link, index in self.frames.items():
+            if index < self._pin_count:
+                state.pins[index] = self.pose_frames[link]
+        state.pins[step.to] = self.places[known]
+        if not step.close(state).status.has_pose:
+            raise DefinitionError(
+                'points', f'{quote(point)} is at a toggle in the pose', 'draw another pose'
+            )
+        return state.coordinates[-1]
+
+    # Links and points
+
+    def _frame(self, link: str) -> bool:
+        """Find the frame of a link with three known points."""
+        known = list(filter(self._is_known, self.carried[link]))
+        for names in combinations(known, 3):
+            start, *ends = (self.places[name] for name in names)
+            one, other = (minus(end, start) for end in ends)
+            if length(cross(one, other)) > 1e-3 * length(one) * length(other):
+                indices = tuple(map(self._point_index, names))
+                index = self._set_frame(link, frame_of(start, one, other))
+                self._add(FramedLink((indices[0], indices[1], indices[2]), index), pins=1)
+                self._end_group('framed', (link,), f'by points {list_names(names)}')
+                return True
+        return False
+
+    def _place_point(self, point: str) -> bool:
+        """Place a point at three known distances."""
+        if self._is_known(point):
+            return False
+        return self._meet(point, list(self._distances(point)), {})
+
+    def _meet(self, point: str, pairs: list[_Pair], shifts: dict[_Pair, tuple[str, Vector]]) -> bool:
+        """Place a point by the first three pairs that tell it; some are shifted beside a point."""
+        for three in combinations(pairs, 3):
+            if len({pair.known for pair in three}) < 3 and not shifts:
+                continue
+            at = self.places[point]
+            places = [
+                plus(self.places[pair.known], shifts[pair][1] if shifts else ZERO)
+                for pair in three
+            ]
+            rods = [minus(at, place) for place in places]
+            size = length(rods[0]) * length(rods[1]) * length(rods[2])
+            across = cross(minus(places[1], places[0]), minus(places[2], places[0]))
+            if abs(volume := dot(across, rods[0])) <= _SQUARE * size:
+                continue
+            to = []
+            for pair in three:
+                to.append(self._point_index(pair.known))
+                if shifts and length(shifts[pair][1]):
+                    root, offset = shifts[pair]
+                    offset = _clean(self.pose_frames[root].resolve(offset))
+                    self._add(ShiftedPoint(to[-1], self.frames[root], offset), pins=1)
+                    to[-1] = self._pin_count - 1
+            sign = 1.0 if volume > 0.0 else -1.0
+            lengths = tuple(pair.rod for pair in three)
+            self.points[point] = self._pin_count
+            step = ThreeDistances(
+                (to[0], to[1], to[2]), (lengths[0], lengths[1], lengths[2]), sign, self._pin_count
+            )
+            self._add(step, pins=1)
+            by = list_names(f'{pair.by} from {pair.known}' for pair in three)
+            side = '+' if sign > 0.0 else '-'
+            method = f'point {point}, by {by}'
+            self._end_group('three distances', (), method, f'{side}, as in the pose')
+            return True
+        return False
+
+    def _slide_chain(self, link: str) -> tuple[str, list[str]] | None:
+        """Return the known link and the slides that lead from it to a link, outwards."""
+        chain: list[str] = []
+        while link not in self.frames:
+            ways = [
+                (name, joint)
+                for name, joint in self._linkage.slides.items()
+                if link in (joint.parent, joint.child) and name not in chain
+            ]
+            # A chain, not a tree: the first slide that leads on.
+            if not ways or len(chain) > 2:
+                return None
+            name, joint = ways[0]
+            chain.insert(0, name)
+            link = joint.parent if joint.child == link else joint.child
+        return link, chain
+
+    def _translate(self, link: str) -> bool:
+        """Place a link that hangs on three slides: it does not turn, and so is one point."""
+        found = self._slide_chain(link)
+        if found is None or len(found[1]) != 3 or not self.carried[link]:
+            return False
+        root, chain = found
+        point = self.carried[link][0]
+        pairs, shifts = [], {}
+        for other in self.carried[link]:
+            for pair in self._distances(other):
+                pairs.append(pair)
+                shifts[pair] = (root, minus(self.places[point], self.places[other]))
+        if not self._meet(point, pairs, shifts):
+            return False
+        self._add_resolved(tuple(chain), root, self.points[point], self.places[point])
+        return True
+
+    def _add_resolved(
+        self, names: tuple[str, ...], root: str, point: int, place: Vector
+    ) -> None:
+        """Measure the slides that lead from a link to a point."""
+        on, chain = self.pose_frames[root], self._linkage.between
+        link, axes = root, []
+        for name in names:
+            joint = chain[name]
+            link = joint.child if joint.parent == link else joint.parent
+            axes.append(self._axis_to(name, link))
+        start = place
+        for name, axis in zip(names, axes, strict=True):
+            start = minus(start, scale(self._value(name), axis))
+            self._new_coordinate(name)
+            self._coordinate_count += 1
+        duals = _dual_basis(axes)
+        directions = tuple(_clean(on.resolve(dual)) for dual in duals)
+        self._add(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
+
+    # What is published
+
+    def measure_joint(self, name: str) -> Any:
+        """Return the step that measures a hinge between known links."""
+        spatial: SpatialJoint = self._linkage.between[name]
+        joint, frame = self._make_joint(name, spatial.parent, spatial.child)
+        assert isinstance(joint, Hinge)
+        # The x axis of the seat, turned with the child.
+        mark = _clean(self.pose_frames[spatial.child].resolve(frame.x))
+        return MeasuredHinge(joint, mark, self.frames[spatial.child])
+
+    def _measure_published(self) -> None:
+        """Measure published joints that no step found."""
+        linkage = self._linkage
+        wanted = [*linkage.published, *(ratio.of for ratio in linkage.ratios.values())]
+        self.lost: list[str] = []
+        """Published joints that no step can find."""
+        for name in dict.fromkeys(wanted):
+            if name in self.coordinates:
+                continue
+            if name in linkage.struts:
+                if not all(map(self._is_known, linkage.struts[name])):
+                    self.lost.append(name)
+                    continue
+                one, other = map(self._point_index, linkage.struts[name])
+                self._new_coordinate(name)
+                step = MeasuredStrut((one, other), self.coordinates[name])
+                self._add(step, coordinates=1)
+            else:
+                joint = linkage.between[name]
+                if joint.parent not in self.frames or joint.child not in self.frames:
+                    self.lost.append(name)
+                    continue
+                if self._slides(name):
+                    self._measure_slide(name, joint)
+                else:
+                    self._new_coordinate(name)
+                    self._add(self.measure_joint(name), coordinates=1)
+            self._end_group('measured', (), name)
+
+    def _measure_slide(self, name: str, joint: SpatialJoint) -> None:
+        child = joint.child
+        place = self.places[self.carried[child][0]] if self.carried[child] else ZERO
+        point = self._pin_count
+        local = self.pose_frames[child].locate(place)
+        self._add(CarriedPoint(self.frames[child], local, point), pins=1)
+        self._add_resolved((name,), joint.parent, point, place)
+
+    @property
+    def ratio_turns(self) -> int:
+        """Return the turns of a single input after which the joints that follow it repeat."""
+        turns = 1
+        for name in self._linkage.ratios:
+            total, of = 1.0, name
+            while of in self._linkage.ratios:
+                total *= self._linkage.ratios[of].ratio
+                of = self._linkage.ratios[of].of
+            if of in self._linkage.driven and not (self._slides(of) or self._slides(name)):
+                turns = lcm(turns, count_turns(total))
+        return turns
+
+
+def _unit(vector: Vector) -> Vector:
+    return _clean(scale(1.0 / length(vector), vector))
+
+
+def _clean(vector: Vector) -> Vector:
+    """Return a vector without the components that are rounding, and with exact axes."""
+    x, y, z = (0.0 if abs(one) < _CLEAN else one for one in vector)
+    return x, y, z
+
+
+def _across(axis: Vector) -> Vector:
+    """Return a unit vector across an axis; one of the axes of the ground where it can be."""
+    ways = sorted(GROUND_FRAME[:3], key=lambda way: abs(dot(way, axis)))
+    first = ways[0]
+    return _unit(minus(first, scale(dot(first, axis), axis)))
+
+
+def _dual_basis(axes: list[Vector]) -> list[Vector]:
+    """Return the vectors whose scalar product with one axis is 1, and with the others 0."""
+    if len(axes) == 1:
+        return axes
+    one, other, third = axes
+    volume = dot(one, cross(other, third))
+    return [
+        _clean(scale(1.0 / volume, cross(*two)))
+        for two in ((other, third), (third, one), (one, other))
+    ]

@@ -1,0 +1,672 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+The steps of a linkage in space: joints that are given, closed or measured, and points.
+
+Each step appends to the coordinates (joints) and pins (points and frames of links) as in the
+plane. The one formula of a closed loop: a circle of radius r about an axis comes as near to a
+point B, at the distance d from the axis and the height h above the circle, as ``near``, and as far
+as ``far``::
+
+    near = hypot(h, d − r)    far = hypot(h, d + r)    tan(θ/2) = √((L² − near²)/(far² − L²))
+
+A point of the circle has the distance L from B at the angle ±θ from the direction of B. No term
+cancels that the reach itself does not cancel. The rate divides by r·d·sin θ, which is half the
+product of both roots. A planar dyad of two pinned links is h = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from typing import NamedTuple
+
+from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt
+from linkage_ros.kinematics.space.joints import Hinge, Joint
+from linkage_ros.kinematics.space.vectors import (
+    add,
+    cross,
+    dot,
+    Frame,
+    GROUND_FRAME,
+    hypotenuse,
+    length,
+    minus,
+    Motion,
+    multiply,
+    plus,
+    scale,
+    STILL,
+    subtract,
+    Vector,
+    ZERO,
+)
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import LinearStep, LinkState, PLACED, StepPose
+
+
+class Rod(NamedTuple):
+    """The distance of two points: a constant, or the coordinate of a strut (0 if it is none)."""
+
+    constant: float
+    strut: int = 0
+
+    def length(self, solved: LinkState) -> float:
+        """Return the distance."""
+        return self.constant if not self.strut else solved.coordinates[self.strut]
+
+    def power(self, solved: LinkState, velocities: LinkState) -> float:
+        """Return the derivative of half the square of the distance."""
+        if not self.strut:
+            return 0.0
+        return self.length(solved) * velocities.coordinates[self.strut]
+
+    def bend(self, solved: LinkState, velocities: LinkState, accelerations: LinkState) -> float:
+        """Return its second derivative."""
+        if not self.strut:
+            return 0.0
+        rate = velocities.coordinates[self.strut]
+        return rate * rate + self.length(solved) * accelerations.coordinates[self.strut]
+
+
+class ClosedPose(NamedTuple):
+    """The pose of a closed step."""
+
+    status: Status
+    gap: float = 0.0
+    lever: float = 0.0  # What the rate divides by; its sign is the assembly
+    angle: float = 0.0  # From a toggle, in [rad]
+
+
+class ClosedRates(NamedTuple):
+    """What the accelerations of a closed joint need."""
+
+    rate: float
+    arm: Vector  # From the origin of the child to its point
+    slope: Vector  # Velocity of the point at a rate of 1
+    slip: Vector  # Velocity of the point relative to the other end of the rod
+
+
+def root_between(long: float, short: float) -> Root:
+    """Return √(long² − short²); within the rounding of the two lengths it is a toggle."""
+    total, size = long - short, long + short
+    rounding = ROUNDING * size
+    if total > rounding:
+        return Root(sqrt(total * size))
+    if total >= -rounding:
+        return Root(0.0, 0.0, Status.TOGGLE)
+    return Root(0.0, -total, Status.OPEN)
+
+
+def meet_circle(radius: float, distance: float, height: float, rod: float) -> tuple[Root, Root]:
+    """Return both roots of a circle and a rod, as in the formula of the module."""
+    return (
+        root_between(rod, hypotenuse(height, subtract(distance, radius))),
+        root_between(hypotenuse(height, add(distance, radius)), rod),
+    )
+
+
+def status_of_roots(low: Root, high: Root) -> tuple[Status, float]:
+    """Return the status of two roots, and the gap; two toggles leave the pose undefined."""
+    for root in (low, high):
+        if root.status is Status.OPEN:
+            return Status.OPEN, root.missing
+    if low.status is Status.TOGGLE and high.status is Status.TOGGLE:
+        return Status.INDETERMINATE, 0.0
+    return (Status.TOGGLE if Status.TOGGLE in (low.status, high.status) else Status.CLOSED), 0.0
+
+
+class GroundStep(LinearStep):
+    """The ground, whose frame is the first pin."""
+
+    __slots__ = ()
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the frame."""
+        solved.pins.append(GROUND_FRAME)
+        return PLACED
+
+    def append_derivative(self, state: LinkState) -> None:
+        """Append the motion of the ground."""
+        state.pins.append(STILL)
+
+
+@dataclass(frozen=True, slots=True)
+class GivenJoint:
+    """A joint whose value is known; its child is placed."""
+
+    joint: Joint
+    coordinate: int  # Index of its value among the coordinates
+    child: int  # Index of the child's frame among the pins
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the frame of the child."""
+        base = self.joint.base(solved)
+        solved.pins.append(self.joint.child_frame(base, solved.coordinates[self.coordinate]))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append the motion of the child."""
+        rate = velocities.coordinates[self.coordinate]
+        frame = solved.pins[self.child]
+        velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the derivative of the motion."""
+        rate = velocities.coordinates[self.coordinate]
+        change = accelerations.coordinates[self.coordinate]
+        frame = solved.pins[self.child]
+        accelerations.pins.append(
+            self.joint.change(solved, velocities, accelerations, frame, rate, change)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CarriedPoint:
+    """A point of a link, at a place in its frame."""
+
+    link: int
+    place: Vector
+    point: int  # Index of the point among the pins
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the point."""
+        solved.pins.append(solved.pins[self.link].place(self.place))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append its velocity."""
+        velocities.pins.append(velocities.pins[self.link].velocity(self._arm(solved)))
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append its acceleration."""
+        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
+        accelerations.pins.append(motion.acceleration(change, self._arm(solved)))
+
+    def _arm(self, solved: LinkState) -> Vector:
+        return minus(solved.pins[self.point], solved.pins[self.link].origin)
+
+
+@dataclass(frozen=True, slots=True)
+class ShiftedPoint:
+    """A point beside another, by a constant offset in the frame of a link."""
+
+    beside: int
+    link: int
+    offset: Vector
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the point."""
+        offset = solved.pins[self.link].turn(self.offset)
+        solved.pins.append(plus(solved.pins[self.beside], offset))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append its velocity."""
+        offset = solved.pins[self.link].turn(self.offset)
+        swept = cross(velocities.pins[self.link].spin, offset)
+        velocities.pins.append(plus(velocities.pins[self.beside], swept))
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append its acceleration."""
+        offset = solved.pins[self.link].turn(self.offset)
+        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
+        turning = Motion(motion.spin, ZERO).acceleration(Motion(change.spin, ZERO), offset)
+        accelerations.pins.append(plus(accelerations.pins[self.beside], turning))
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedJoint:
+    """A joint whose child carries a point at a known distance from a known point."""
+
+    joint: Joint
+    place: Vector  # The carried point in the frame of the child
+    to: int  # Index of the known point among the pins
+    rod: Rod
+    sign: float
+    child: int  # Index of the child's frame among the pins
+
+    def close(self, solved: LinkState) -> ClosedPose:
+        """Append the joint and the frame of the child."""
+        raise NotImplementedError
+
+    def _append(self, solved: LinkState, base: Frame, value: float) -> None:
+        solved.coordinates.append(value)
+        solved.pins.append(self.joint.child_frame(base, value))
+
+    def rates(
+        self, pose: ClosedPose, solved: LinkState, velocities: LinkState
+    ) -> ClosedRates:
+        """
+        Append the rates of the joint and of its child.
+
+        The rod keeps its length: (X − B)·(Ẋ − Ḃ) = L·L̇.
+        """
+        frame = solved.pins[self.child]
+        still = self.joint.motion(solved, velocities, frame, 0.0)
+        arm = frame.turn(self.place)
+        rod = self._rod_vector(solved, frame, arm)
+        slip = minus(still.velocity(arm), velocities.pins[self.to])
+        rate = subtract(self.rod.power(solved, velocities), dot(rod, slip)) / pose.lever
+        slope = self.joint.slope(frame.z, arm)
+        velocities.coordinates.append(rate)
+        velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
+        return ClosedRates(rate, arm, slope, plus(slip, scale(rate, slope)))
+
+    def accelerations(
+        self,
+        pose: ClosedPose,
+        rates: ClosedRates,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇²."""
+        frame, motion = solved.pins[self.child], velocities.pins[self.child]
+        rate, arm, _, slip = rates
+        before = self.joint.change(solved, velocities, accelerations, frame, rate, 0.0)
+        pull = minus(motion.acceleration(before, arm), accelerations.pins[self.to])
+        bend = subtract(self.rod.bend(solved, velocities, accelerations), dot(slip, slip))
+        rod = self._rod_vector(solved, frame, arm)
+        change = subtract(bend, dot(rod, pull)) / pose.lever
+        accelerations.coordinates.append(change)
+        accelerations.pins.append(
+            self.joint.change(solved, velocities, accelerations, frame, rate, change)
+        )
+
+    def _rod_vector(self, solved: LinkState, frame: Frame, arm: Vector) -> Vector:
+        return minus(plus(frame.origin, arm), solved.pins[self.to])
+
+    def transmission_angle(self, pose: ClosedPose) -> float:
+        """Return the angle from a toggle, in [0, π/2] rad."""
+        return acute_angle(pose.angle)
+
+    def side_of(self, pose: ClosedPose) -> float:
+        """Return a number whose sign is the assembly."""
+        return pose.lever
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedHinge(ClosedJoint):
+    """A hinge closed by a rod: q = dir(B) − dir(X) ± θ."""
+
+    radius: float
+    direction: float  # That of the carried point where the hinge is 0, in [rad]; with whole turns
+
+    def close(self, solved: LinkState) -> ClosedPose:
+        """Append the hinge and the frame of the child."""
+        base = self.joint.base(solved)
+        x, y, z = base.locate(solved.pins[self.to])
+        low, high = meet_circle(
+            self.radius,
+            hypotenuse(x, y),
+            subtract(z, self.place[2]),
+            self.rod.length(solved),
+        )
+        status, gap = status_of_roots(low, high)
+        if not status.has_pose:
+            return ClosedPose(status, gap)
+        half = atan2(low.root, high.root)
+        # Adding 0.0 makes 0.0 of −0.0: otherwise the direction could be −π instead of π.
+        turn = atan2(y + 0.0, x + 0.0) - self.direction
+        self._append(solved, base, turn + 2.0 * self.sign * half)
+        lever = 0.5 * self.sign * (low.root * high.root)
+        return ClosedPose(status, 0.0, lever, 2.0 * half)
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedSlide(ClosedJoint):
+    """A slide closed by a rod: q = foot of B ± √(L² − d²)."""
+
+    def close(self, solved: LinkState) -> ClosedPose:
+        """Append the slide and the frame of the child."""
+        base = self.joint.base(solved)
+        x, y, z = minus(base.locate(solved.pins[self.to]), self.place)
+        distance = hypotenuse(x, y)
+        root, gap, status = root_between(self.rod.length(solved), distance)
+        if status is Status.OPEN:
+            return ClosedPose(status, gap)
+        self._append(solved, base, z + self.sign * root)
+        return ClosedPose(status, 0.0, self.sign * root, atan2(root, distance))
+
+
+@dataclass(frozen=True, slots=True)
+class AimedHinge:
+    """A hinge whose child carries a point that is known already."""
+
+    joint: Hinge
+    direction: float  # Of the point where the hinge is 0, in [rad]; with whole turns
+    to: int
+    child: int
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the hinge and the frame of the child."""
+        base = self.joint.base(solved)
+        x, y, _ = base.locate(solved.pins[self.to])
+        value = atan2(y + 0.0, x + 0.0) - self.direction
+        solved.coordinates.append(value)
+        solved.pins.append(self.joint.child_frame(base, value))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> Vector:
+        """Append the rates; return the slope of the point and the square of its size."""
+        frame = solved.pins[self.child]
+        arm = minus(solved.pins[self.to], frame.origin)
+        slope = self.joint.slope(frame.z, arm)
+        still = self.joint.motion(solved, velocities, frame, 0.0)
+        slip = minus(velocities.pins[self.to], still.velocity(arm))
+        rate = dot(slope, slip) / dot(slope, slope)
+        velocities.coordinates.append(rate)
+        velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
+        return slope
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        slope: Vector,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the accelerations."""
+        frame, motion = solved.pins[self.child], velocities.pins[self.child]
+        arm = minus(solved.pins[self.to], frame.origin)
+        rate = velocities.coordinates[len(accelerations.coordinates)]
+        before = self.joint.change(solved, velocities, accelerations, frame, rate, 0.0)
+        pull = minus(accelerations.pins[self.to], motion.acceleration(before, arm))
+        change = dot(slope, pull) / dot(slope, slope)
+        accelerations.coordinates.append(change)
+        accelerations.pins.append(
+            self.joint.change(solved, velocities, accelerations, frame, rate, change)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ThreeDistances:
+    """
+    A point at known distances from three known points P0, P1, P2.
+
+    It lies on a circle about the line P0 P1, which the third rod meets. The assembly is the sign
+    of ((P1 − P0) × (P2 − P0))·(X − P0).
+    """
+
+    to: tuple[int, int, int]
+    rods: tuple[Rod, Rod, Rod]
+    sign: float
+    point: int
+
+    def close(self, solved: LinkState) -> ClosedPose:
+        """Append the point."""
+        start, end, third = (solved.pins[index] for index in self.to)
+        one, other, rod = (each.length(solved) for each in self.rods)
+        line, across = minus(end, start), minus(third, start)
+        size = length(line)
+        along = scale(1.0 / size, line)
+        up = cross(along, across)
+        distance = length(up)
+        normal = scale(1.0 / distance, up)
+        # 16·area² of the triangle P0 P1 X, by factors (Kahan).
+        reach = root_between(one + other, size)
+        apart = root_between(size, one - other)
+        for root in (reach, apart):
+            if root.status is not Status.CLOSED:
+                return ClosedPose(root.status, root.missing)
+        radius = 0.5 * (reach.root * apart.root) / size
+        foot = 0.5 * (size + (one - other) * (one + other) / size)
+        low, high = meet_circle(radius, distance, dot(across, along) - foot, rod)
+        status, gap = status_of_roots(low, high)
+        if not status.has_pose:
+            return ClosedPose(status, gap)
+        # Its coordinates in the circle, r·cos θ and r·sin θ: far² − near² is 4·r·d.
+        unit = 0.25 / distance
+        x = unit * (high.root * high.root - low.root * low.root)
+        y = 2.0 * unit * self.sign * (low.root * high.root)
+        beside = plus(scale(x, cross(normal, along)), scale(y, normal))
+        solved.pins.append(plus(start, plus(scale(foot, along), beside)))
+        lever = 0.5 * self.sign * (low.root * high.root) * size
+        return ClosedPose(status, 0.0, lever, 2.0 * atan2(low.root, high.root))
+
+    def rates(self, pose: ClosedPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append the velocity: (X − Pᵢ)·(Ẋ − Ṗᵢ) = L·L̇ for each rod."""
+        rods = self._rod_vectors(solved)
+        sides = [
+            add(dot(vector, velocities.pins[index]), rod.power(solved, velocities))
+            for vector, index, rod in zip(rods, self.to, self.rods, strict=True)
+        ]
+        velocities.pins.append(_solve_three(rods, sides, pose.lever))
+
+    def accelerations(
+        self,
+        pose: ClosedPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the acceleration: (X − Pᵢ)·(Ẍ − P̈ᵢ) + |Ẋ − Ṗᵢ|² = L·L̈ + L̇² for each rod."""
+        rods = self._rod_vectors(solved)
+        sides = []
+        for vector, index, rod in zip(rods, self.to, self.rods, strict=True):
+            slip = minus(velocities.pins[self.point], velocities.pins[index])
+            bend = subtract(rod.bend(solved, velocities, accelerations), dot(slip, slip))
+            sides.append(add(dot(vector, accelerations.pins[index]), bend))
+        accelerations.pins.append(_solve_three(rods, sides, pose.lever))
+
+    def _rod_vectors(self, solved: LinkState) -> list[Vector]:
+        return [minus(solved.pins[self.point], solved.pins[index]) for index in self.to]
+
+    def transmission_angle(self, pose: ClosedPose) -> float:
+        """Return the angle from a toggle, in [0, π/2] rad."""
+        return acute_angle(pose.angle)
+
+    def side_of(self, pose: ClosedPose) -> float:
+        """Return a number whose sign is the assembly."""
+        return pose.lever
+
+
+def _solve_three(rows: list[Vector], sides: list[float], determinant: float) -> Vector:
+    """Return the vector whose scalar products with three rows are given (Cramer's rule)."""
+    total = ZERO
+    for number, side in enumerate(sides):
+        one, other = rows[number - 2], rows[number - 1]
+        total = plus(total, scale(side, cross(one, other)))
+    return scale(1.0 / determinant, total)
+
+
+@dataclass(frozen=True, slots=True)
+class FramedLink:
+    """A link with three known points: x leads from the first to the second, y to the third."""
+
+    points: tuple[int, int, int]
+    link: int  # Index of the frame among the pins
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the frame."""
+        start, one, other = self._edges(solved)
+        solved.pins.append(frame_of(start, one, other))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append the motion."""
+        start, one, other = self._edges(velocities)
+        velocities.pins.append(Motion(self._spin(solved, one, other), start))
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the derivative of the motion."""
+        start, one, other = self._edges(accelerations)
+        spin = velocities.pins[self.link].spin
+        _, first, second = self._edges(velocities)
+        one, other = minus(one, cross(spin, first)), minus(other, cross(spin, second))
+        accelerations.pins.append(Motion(self._spin(solved, one, other), start))
+
+    def _edges(self, state: LinkState) -> tuple[Vector, Vector, Vector]:
+        start, one, other = (state.pins[index] for index in self.points)
+        return start, minus(one, start), minus(other, start)
+
+    def _spin(self, solved: LinkState, one: Vector, other: Vector) -> Vector:
+        """Return ω from the derivatives ω × a and ω × b of the two edges a and b."""
+        _, a, b = self._edges(solved)
+        normal = cross(a, b)
+        spin = plus(
+            minus(scale(dot(other, normal), a), scale(dot(one, normal), b)),
+            scale(dot(one, b), normal),
+        )
+        return scale(1.0 / dot(normal, normal), spin)
+
+
+def frame_of(origin: Vector, one: Vector, other: Vector) -> Frame:
+    """Return the frame with x along an edge, and y on the side of another."""
+    x = scale(1.0 / length(one), one)
+    up = cross(x, other)
+    z = scale(1.0 / length(up), up)
+    return Frame(x, cross(z, x), z, origin)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredHinge:
+    """A hinge between two links whose frames are known."""
+
+    joint: Hinge
+    mark: Vector  # The vector of the child that is the x axis of the seat where the hinge is 0
+    child: int
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the angle."""
+        x, y, _ = self.joint.base(solved).resolve(solved.pins[self.child].turn(self.mark))
+        solved.coordinates.append(atan2(y + 0.0, x + 0.0))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append the rate."""
+        self._append_difference(solved, velocities)
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the acceleration: the axis turns with both links, which adds nothing."""
+        self._append_difference(solved, accelerations)
+
+    def _append_difference(self, solved: LinkState, state: LinkState) -> None:
+        axis = solved.pins[self.joint.parent].turn(self.joint.seat.z)
+        child, parent = state.pins[self.child], state.pins[self.joint.parent]
+        state.coordinates.append(dot(axis, minus(child.spin, parent.spin)))
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedSlides:
+    """The slides in a row that lead from a link to a known point: its offset, by directions."""
+
+    link: int
+    start: Vector  # Where the point lies in the frame of the link if all slides are 0
+    directions: tuple[Vector, ...]  # For each slide what the offset is multiplied by, in the frame
+    point: int
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the slides."""
+        offset = minus(solved.pins[self.link].locate(solved.pins[self.point]), self.start)
+        solved.coordinates.extend(dot(one, offset) for one in self.directions)
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> Vector:
+        """Append the rates; return the velocity relative to the link."""
+        arm = minus(solved.pins[self.point], solved.pins[self.link].origin)
+        slip = minus(velocities.pins[self.point], velocities.pins[self.link].velocity(arm))
+        self._append_resolved(solved, velocities, slip)
+        return slip
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        slip: Vector,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the accelerations."""
+        arm = minus(solved.pins[self.point], solved.pins[self.link].origin)
+        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
+        pull = minus(accelerations.pins[self.point], motion.acceleration(change, arm))
+        pull = minus(pull, scale(2.0, cross(motion.spin, slip)))
+        self._append_resolved(solved, accelerations, pull)
+
+    def _append_resolved(self, solved: LinkState, state: LinkState, vector: Vector) -> None:
+        turned = solved.pins[self.link].resolve(vector)
+        state.coordinates.extend(dot(one, turned) for one in self.directions)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredStrut:
+    """The distance of two known points."""
+
+    points: tuple[int, int]
+    coordinate: int  # Its index among the coordinates
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the length."""
+        solved.coordinates.append(length(self._between(solved)))
+        return PLACED
+
+    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
+        """Append the rate."""
+        size = solved.coordinates[self.coordinate]
+        rate = dot(self._between(solved), self._between(velocities)) / size
+        velocities.coordinates.append(rate)
+
+    def accelerations(
+        self,
+        _pose: StepPose,
+        _rates: None,
+        solved: LinkState,
+        velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the acceleration: what turns across the strut adds v²/L."""
+        between, slip = self._between(solved), self._between(velocities)
+        size = solved.coordinates[self.coordinate]
+        across = scale(1.0 / size, cross(between, slip))
+        pull = dot(between, self._between(accelerations))
+        accelerations.coordinates.append(add(pull, dot(across, across)) / size)
+
+    def _between(self, state: LinkState) -> Vector:
+        one, other = (state.pins[index] for index in self.points)
+        return minus(other, one)
+
+

@@ -1,0 +1,451 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+What the closures of planar and of spatial linkages share: they run steps, one after the other.
+
+Position first; what a scene calls for beyond it starts from the position and repeats nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import inf
+from operator import mul
+from typing import Any, TYPE_CHECKING
+
+from linkage_ros.errors import escape_unprintable, list_names, quote
+from linkage_ros.kinematics.arithmetic import all_finite
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
+from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
+from linkage_ros.kinematics.limits import Bounds, limit_status
+from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.kinematics.ranges import closing_ranges, input_ranges
+from linkage_ros.kinematics.results import (
+    Acceleration,
+    InputRange,
+    Position,
+    SingularInput,
+    SingularityMargin,
+    Velocity,
+)
+from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import LinkState, Step, StepPose
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch import Array, Batch
+    from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
+    from numpy.typing import ArrayLike
+
+
+def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
+    if not status.has_rates:
+        return ValueError(f'{what}: a linkage that is {status.value} has none; check its status')
+    return ValueError(f'{what}: {list(given)} is not finite')
+
+
+def _multiply(
+    found: Velocity | Acceleration, factor: float
+) -> tuple[tuple[float, ...], LinkState]:
+    """Return joints and state of a velocity or an acceleration times a factor."""
+    coordinates, pins = found.state
+    return (
+        tuple(value * factor for value in found.joints),
+        LinkState(
+            [value * factor for value in coordinates],
+            [complex(pin.real * factor, pin.imag * factor) for pin in pins],
+        ),
+    )
+
+
+class StepwiseClosure:
+    """
+    A linkage, ready to be solved; its kind makes the steps.
+
+    Attributes
+    ----------
+    linkage, name
+        The linkage and its name.
+    input_names
+        Names of the driven joints, in the order in which `position` takes their values.
+    joint_names
+        Names of the published joints, in the order of `Position.joints`.
+
+    """
+
+    gap_unit: str = 'm'
+    """Unit of the gap of an open position."""
+
+    zero_length: float | None = None
+    """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
+
+    steps: tuple[Step, ...]
+    step_groups: tuple[int, ...]
+    """For each step the number of the group that it belongs to."""
+
+    ratio_turns: int
+    """Whole turns of a single input after which its ratios repeat; 0 if they never do."""
+
+    _terms: tuple[tuple[int, int, float, float], ...]
+    """For each published joint i, j, factor, constant: it is factor·(x[i] − x[j]) + constant."""
+
+    def _set_linkage(self, linkage: Any, name: str, scale: float) -> None:
+        """Set what follows from the linkage alone; ``scale`` is in [m]."""
+        self.linkage = linkage
+        self.name = name
+        self.scale = scale
+        """Metres in the unit of length of the steps."""
+        self.input_names = tuple(given.joint for given in linkage.inputs)
+        self.joint_names = tuple(linkage.joints)
+        self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
+        """For each published joint: whether it turns (an angle) or slides (a length)."""
+        factors = [1.0 / scale if given.slider else 1.0 for given in linkage.inputs]
+        self._factors = None if set(factors) == {1.0} else factors
+        self._single = factors == [1.0]
+        self.bounds = Bounds(linkage)
+        """The limits between which its joints stay."""
+        if self.bounds:
+            self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
+        self._compiled: list[Compiled] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
+        return type(self), (self.linkage, self.name)
+
+    def __repr__(self) -> str:
+        counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
+        has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
+        named = ' '.join(filter(None, (type(self).__name__, escape_unprintable(self.name))))
+        return f'<{named}: {has}>'
+
+    def position(self, *inputs: float) -> Position:
+        """
+        Close the loops.
+
+        Parameters
+        ----------
+        *inputs
+            One value for each driven joint, in [rad] or [m]. If one is not finite, the position
+            is indeterminate.
+
+        Returns
+        -------
+        position : Position
+            Its status says whether the loops close.
+
+        Raises
+        ------
+        ValueError
+            If there is not one input for each driven joint.
+        TypeError
+            If an input is not a number.
+
+        """
+        x = self._input_coordinates('inputs', inputs, 0.0, inf)
+        if x is None:
+            numbers = self._as_doubles('inputs', inputs)
+            state = LinkState([0.0, *self._scale_inputs(numbers)], [])
+            return Position(Status.INDETERMINATE, 0.0, (), state, [], self)
+        state = LinkState(x, [])
+        poses: list[StepPose] = []
+        status = Status.CLOSED
+        for step in self.steps:
+            pose = step.close(state)
+            poses.append(pose)
+            found = pose.status
+            if found is not Status.CLOSED:
+                if not found.has_pose:
+                    return Position(found, pose.gap * self.scale, (), state, poses, self)
+                if status.has_rates:
+                    status = found
+        joints: tuple[float, ...] = ()
+        for i, j, factor, constant in self._terms:
+            joints += (factor * (x[i] - x[j]) + constant,)
+        return Position(status, 0.0, joints, state, poses, self)
+
+    def initial_state(self, *inputs: float) -> LinkState:
+        """Return the state before the first step: the coordinates of the ground and the inputs."""
+        return LinkState(self._input_coordinates('inputs', inputs, 0.0, inf) or [], [])
+
+    def close_unlimited(self, *inputs: float) -> Position:
+        """Close the loops as `position` does, without limits."""
+        return type(self).position(self, *inputs)
+
+    def velocity(self, position: Position, *rates: float) -> Velocity:
+        """
+        Return the rates of the linkage at a position.
+
+        Parameters
+        ----------
+        position
+            A position that this closure found, with ``position.status.has_rates``.
+        *rates
+            One rate for each driven joint, in [rad/s] or [m/s].
+
+        Raises
+        ------
+        ValueError
+            If the position has no rates, as at a toggle, if a rate is not finite, or if there is
+            not one for each driven joint.
+        TypeError
+            If a rate is not a number, or the position is one of another linkage.
+
+        """
+        if getattr(position, 'closure', None) is not self:
+            self._check_own('position', position)
+        v = self._input_coordinates('rates', rates)
+        if v is None or not position.status.has_rates:
+            return self._huge_velocity(position, self._as_doubles('rates', rates))
+        velocities = LinkState(v, [])
+        found = []
+        for step, pose in zip(self.steps, position.poses, strict=True):
+            found.append(step.rates(pose, position.state, velocities))
+        return Velocity(self._joint_rates(v), velocities, found, self)
+
+    def acceleration(
+        self, position: Position, velocity: Velocity, *accelerations: float
+    ) -> Acceleration:
+        """
+        Return the accelerations of the linkage at a position.
+
+        Parameters
+        ----------
+        position, velocity
+            A position and a velocity that this closure found.
+        *accelerations
+            One acceleration for each driven joint, in [rad/s²] or [m/s²].
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `velocity`.
+
+        """
+        if getattr(velocity, 'closure', None) is not self:
+            self._check_own('velocity', velocity)
+        a = self._input_coordinates('accelerations', accelerations, -0.0, HUGE * HUGE)
+        if a is None or type(velocity.rates) is Velocity:
+            numbers = self._as_doubles('accelerations', accelerations)
+            return self._huge_acceleration(position, velocity, numbers)
+        state_accelerations = LinkState(a, [])
+        for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
+            step.accelerations(pose, rate, position.state, velocity.state, state_accelerations)
+        return Acceleration(self._joint_rates(a), state_accelerations, self)
+
+    def jacobian(self, position: Position) -> Array:
+        """
+        Return the derivatives of the published joints by the inputs, (joints, inputs).
+
+        Without masses and friction its transpose turns efforts of the joints into efforts of the
+        inputs that balance them.
+
+        Parameters
+        ----------
+        position
+            A position that this closure found, with ``position.status.has_rates``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As `velocity`.
+
+        """
+        import numpy as np  # local import: few ask for it
+
+        units = np.eye(len(self.input_names)).tolist()
+        return np.array([self.velocity(position, *unit).joints for unit in units]).T
+
+    def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
+        """Return the velocity at rates of which one is huge: infinite where it overflows."""
+        if not (position.status.has_rates and all_finite(rates)):
+            raise _no_motion('rates', rates, position.status)
+        found = self.velocity(position, *(rate * SHRINK for rate in rates))
+        return Velocity(*_multiply(found, 1.0 / SHRINK), found, self)
+
+    def _huge_acceleration(
+        self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
+    ) -> Acceleration:
+        if not all_finite(accelerations):
+            raise _no_motion('accelerations', accelerations, position.status)
+        scaled = velocity.rates
+        if not isinstance(scaled, Velocity):
+            rates = self.inputs_of(velocity.state)
+            scaled = self.velocity(position, *(rate * SHRINK for rate in rates))
+        changes = (change * SHRINK * SHRINK for change in accelerations)
+        found = self.acceleration(position, scaled, *changes)
+        once = Acceleration(*_multiply(found, 1.0 / SHRINK), self)
+        return Acceleration(*_multiply(once, 1.0 / SHRINK), self)
+
+    def compile_linkage(
+        self, derivatives: int, wanted: OutputSelection | None = None, given_count: int = 0
+    ) -> Compiled:
+        """
+        Return the linkage compiled; for the same numbers it is compiled once.
+
+        ``derivatives``: 0 for positions, 1 for velocities too, 2 for accelerations too. ``wanted``
+        selects the numbers, by the motion and ``given_count`` numbers beside it; without it they
+        are all published joints.
+        """
+        from linkage_ros.kinematics.compiling import (
+            linkage,  # local import: they trace
+            trace,  # local import: they trace
+        )
+
+        wanted = wanted or trace.published_joints
+        with BUILD_LOCK:
+            for compiled in self._compiled:
+                if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
+                    return compiled
+            compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
+            self._compiled.append(compiled)
+            return compiled
+
+    def solve(
+        self,
+        *inputs: ArrayLike,
+        rates: Any = None,
+        accelerations: Any = None,
+        derivatives: int = 2,
+        out: Batch | None = None,
+    ) -> Batch:
+        """
+        Solve many states at once, as `position`, `velocity` and `acceleration` solve one.
+
+        The memory beyond the results does not grow with the number of states. Links that need
+        iteration are solved state by state, as slowly as `position` solves them.
+
+        Parameters
+        ----------
+        *inputs
+            For each driven joint an array (N,) of its values, in [rad] or [m]. A state with a
+            value that is not finite is indeterminate.
+        rates, accelerations
+            For each driven joint a number or an array (N,); with one driven joint, without a list.
+            Without ``rates`` the rate of a single driven joint is 1; several driven joints need
+            them. Without ``accelerations`` these are 0.
+        derivatives
+            0 solves for positions, 1 also for velocities, 2 also for accelerations.
+        out
+            Arrays that take the results, and that are returned.
+
+        Returns
+        -------
+        batch : Batch
+            With a row for each published joint, in the order of `joint_names`: arrays (joints, N).
+
+        Raises
+        ------
+        ValueError
+            If the arrays do not fit each other, the linkage or ``out``, or values are masked.
+        TypeError
+            If a value is not a number.
+
+        """
+        return self._solver.solve(inputs, rates, accelerations, derivatives, out)
+
+    @BuiltProperty
+    def _solver(self) -> SolverOutline:
+        from linkage_ros.kinematics.compiling import SolverOutline  # local import: numpy
+
+        return SolverOutline(self, len(self.linkage.joints))
+
+    def limit_exceeded(self, position: Position) -> str:
+        """Return which joint of a pose is beyond its limits, as text; '' if none is."""
+        inputs = position.inputs
+        joints = position.joints or self.position(*inputs).joints
+        bound = self.bounds.first_exceeded(inputs, joints) if joints else None
+        if bound is None:
+            return ''
+        driven_one = bound in self.bounds.inputs
+        number = bound.number
+        value = bound.turn_to_middle((inputs if driven_one else joints)[number])
+        turns = not self.linkage.inputs[number].slider if driven_one else self.turning[number]
+        unit = 'rad' if turns else 'm'
+        limits = self.linkage.limits[bound.name]
+        return f'{bound.name} at {value:.6g} {unit}, limits {limits} {unit}'
+
+    def inputs_of(self, state: LinkState) -> tuple[float, ...]:
+        """Return the driven joints in a state, or their rates, in [rad] or [m]."""
+        factors = self._factors or [1.0] * len(self.input_names)
+        driven = zip(state.coordinates[1:], factors, strict=False)
+        return tuple(value / factor for value, factor in driven)
+
+    @BuiltProperty
+    def input_ranges(self) -> tuple[InputRange, ...]:
+        """
+        Ranges of a single input, in [rad] or [m]; empty for several inputs.
+
+        Every loop closes there, and no joint is beyond its limits.
+        """
+        return input_ranges(self)
+
+    @BuiltProperty
+    def singular_inputs(self) -> tuple[SingularInput, ...]:
+        """Toggles and change points of a single input; empty for several inputs."""
+        return singular_inputs(self)
+
+    @BuiltProperty
+    def closing_ranges(self) -> tuple[InputRange, ...]:
+        """Ranges in which a single input closes every loop, without limits; empty for several."""
+        return closing_ranges(self)
+
+    def singularity_margin(self, position: Position) -> SingularityMargin:
+        """Return how near a closed position is to a singularity."""
+        return singularity_margin(self, position)
+
+    def _input_coordinates(
+        self, what: str, values: tuple[float, ...], zero: float = -0.0, most: float = HUGE
+    ) -> list[float] | None:
+        """
+        Return the coordinates of the ground and the inputs, as doubles.
+
+        Each is a value plus ``zero``: 0.0 makes 0.0 of −0.0, which is the same input, and −0.0
+        changes nothing. None if a value is not between ``-most`` and ``most``.
+        """
+        if self._single and len(values) == 1:
+            (value,) = values
+            if type(value) is float and -most < value < most:
+                return [0.0, value + zero]
+        if len(values) != len(self.input_names):
+            names = list_names(self.input_names)
+            raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
+        numbers = self._as_doubles(what, values)
+        x = [0.0, *self._scale_inputs([number + zero for number in numbers])]
+        if any(hasattr(number, 'apply') for number in numbers):
+            return x if all_finite(numbers) else None
+        return x if all(-most < number < most for number in (*numbers, *x)) else None
+
+    def _as_doubles(self, what: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        """Return values of any type as doubles; symbols as they are."""
+        return tuple(
+            value
+            if type(value) is float or hasattr(value, 'apply')
+            else to_double(what, value, '; solve() takes arrays')
+            for value in values
+        )
+
+    def _scale_inputs(self, values: Sequence[float]) -> Iterable[float]:
+        """Return values of the inputs, or their rates, in the unit of the steps."""
+        factors = self._factors
+        return values if factors is None else map(mul, values, factors)
+
+    def _check_own(self, what: str, found: Position | Velocity) -> None:
+        """Refuse a result of another linkage: the steps would read its numbers."""
+        closure = getattr(found, 'closure', None)
+        linkage = getattr(closure, 'linkage', None)
+        if linkage is not self.linkage and linkage != self.linkage:
+            message = f'{what}: {quote(found)} is not from {self!r}; give one that it returned'
+            raise TypeError(message)
+
+    def _joint_rates(self, values: list[float]) -> tuple[float, ...]:
+        """Return the derivatives of the published joints."""
+        joints: tuple[float, ...] = ()
+        for i, j, factor, _ in self._terms:
+            joints += (factor * (values[i] - values[j]),)
+        return joints
