@@ -1,0 +1,106 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+The steps in space to 80 digits, by forms of their own: law of cosines, planes of two spheres.
+
+Rates and accelerations are differences of these values along the motion of the points, and κ is by
+differences in each number that is given.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mpmath import mp, mpf
+
+from ..reference import Quantity
+
+DIGITS = 80
+_STEP = mpf(10) ** -25
+
+Row = list[mpf]
+
+
+def moved(place: Sequence[Any], velocity: Sequence[Any], change: Sequence[Any], t: Any) -> Row:
+    """Return a point at a time."""
+    return [p + v * t + a * t * t / 2 for p, v, a in zip(place, velocity, change, strict=True)]
+
+
+def dot(one: Sequence[Any], other: Sequence[Any]) -> Any:
+    """Return the scalar product."""
+    return sum(a * b for a, b in zip(one, other, strict=True))
+
+
+def cross(one: Sequence[Any], other: Sequence[Any]) -> Row:
+    """Return the cross product."""
+    (a, b, c), (d, e, f) = one, other
+    return [b * f - c * e, c * d - a * f, a * e - b * d]
+
+
+def less(one: Sequence[Any], other: Sequence[Any]) -> Row:
+    """Return the difference."""
+    return [a - b for a, b in zip(one, other, strict=True)]
+
+
+def hinge_angle(place: Row, to: Row, rod: mpf, sign: int) -> mpf:
+    """Return the angle about z that brings a place to a distance from a point."""
+    (a, b, h), (x, y, z) = place, to
+    r, d = mp.hypot(a, b), mp.hypot(x, y)
+    cosine = (r * r + d * d + (h - z) ** 2 - rod * rod) / (2 * r * d)
+    return mp.atan2(y, x) - mp.atan2(b, a) + sign * mp.acos(cosine)
+
+
+def slide_length(place: Row, to: Row, rod: mpf, sign: int) -> mpf:
+    """Return the slide along z that brings a place to a distance from a point."""
+    x, y, z = less(to, place)
+    return z + sign * mp.sqrt(rod * rod - x * x - y * y)
+
+
+def three_spheres(ends: Sequence[Row], rods: Sequence[Any], sign: int) -> Row:
+    """Return the point of three spheres: on the line of two planes, by a quadratic equation."""
+    start, one, other = ends
+    d, e = less(one, start), less(other, start)
+    normal = cross(d, e)
+    # (X − P0)·d = (l0² − l1² + |d|²)/2, likewise e.
+    sides = [
+        (rods[0] ** 2 - rod**2 + dot(edge, edge)) / 2 for rod, edge in ((rods[1], d), (rods[2], e))
+    ]
+    square = dot(normal, normal)
+    first, second = cross(e, normal), cross(normal, d)
+    foot = [(sides[0] * p + sides[1] * q) / square for p, q in zip(first, second, strict=True)]
+    height = mp.sqrt((rods[0] ** 2 - dot(foot, foot)) / square)
+    return [s + f + sign * height * n for s, f, n in zip(start, foot, normal, strict=True)]
+
+
+def motion_of(
+    function: Callable[[Sequence[Any], Any], Any], given: Sequence[float]
+) -> list[Quantity]:
+    """
+    Return a value, its rate and its acceleration at the time 0, each with its κ.
+
+    ``function`` takes the given numbers and the time.
+    """
+    with mp.workdps(DIGITS):
+        exact = [mpf(number) for number in given]
+
+        def orders(numbers: Sequence[Any]) -> list[mpf]:
+            before, now, after = (function(numbers, k * _STEP) for k in (-1, 0, 1))
+            return [
+                now,
+                (after - before) / (2 * _STEP),
+                (after - 2 * now + before) / _STEP**2,
+            ]
+
+        found = orders(exact)
+        kappa = [abs(value) for value in found]
+        for k, number in enumerate(exact):
+            if number:
+                beside = list(exact)
+                beside[k] = number * (1 + mpf(10) ** -15)
+                for order, value in enumerate(orders(beside)):
+                    kappa[order] += abs(value - found[order]) * mpf(10) ** 15
+        return [Quantity(value, float(k)) for value, k in zip(found, kappa, strict=True)]
