@@ -24,6 +24,7 @@ from linkage_ros.description.linkage_file import (
     find_closures as find_closures,
     linkage_content as linkage_content,
     load as load,
+    read_any_closure as read_any_closure,
     read_closure as read_closure,
     read_linkage as read_linkage,
     written_linkage as written_linkage,

@@ -17,9 +17,16 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.description.linkage_grammar import LINKAGE, SHORTHANDS, UNITS, WRITTEN_OUT
+from linkage_ros.description.linkage_grammar import (
+    LINKAGE,
+    ratio_in_si,
+    SHORTHANDS,
+    UNITS,
+    WRITTEN_OUT,
+)
 from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
+from linkage_ros.description.space_file import is_spatial, read_space_closure
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import DefinitionError, FileError
@@ -34,9 +41,9 @@ from linkage_ros.kinematics import (
     GROUND,
     Input,
     Linkage,
-    Ratio,
     RevoluteJoint,
     SlideJoint,
+    StepwiseClosure,
     without_drawn_pose,
 )
 from linkage_ros.resources import linkage_names, named_file
@@ -53,9 +60,9 @@ def looks_like_linkage(content: Section) -> bool:
     return any(key in content for key in ('links', *SHORTHANDS))
 
 
-def load(linkage: str | PathLike[str]) -> Closure:
+def load(linkage: str | PathLike[str]) -> Closure | Any:
     """
-    Load a linkage as a closure.
+    Load a linkage as a closure: a `Closure`, or a `SpaceClosure` if it is spatial.
 
     Parameters
     ----------
@@ -72,7 +79,7 @@ def load(linkage: str | PathLike[str]) -> Closure:
 
     """
     file = named_file(linkage, 'linkages')
-    return read_closure(linkage_content(file), file.stem)
+    return read_any_closure(linkage_content(file), file.stem)
 
 
 def linkage_content(file: Path) -> Section:
@@ -97,9 +104,14 @@ def read_linkage(content: Section) -> Linkage:
     return read_closure(content).linkage
 
 
+def read_any_closure(content: Section, name: str = '') -> StepwiseClosure:
+    """Read a planar or a spatial linkage; errors as in `read_closure`."""
+    return (read_space_closure if is_spatial(content) else read_closure)(content, name)
+
+
 def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
     """
-    Read a linkage and check that it closes.
+    Read a planar linkage and check that it closes.
 
     Parameters
     ----------
@@ -122,6 +134,9 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
 
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
+    if is_spatial(content):
+        remedy = 'take a planar linkage; linkage check and linkage solve take spatial ones'
+        raise content.error('points', 'make this linkage spatial', remedy)
     content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))
     for shorthand, keys in SHORTHANDS.items():
         if shorthand in content:
@@ -175,16 +190,10 @@ def _parse_linkage(
     units |= {driven.joint: driven.unit for driven in inputs}
     parts['slide'] = [name for name, unit in units.items() if unit == 'm']
     ratios = {
-        name: replace(one, ratio=_ratio_in_si(one, units.get(name), units.get(one.of), content))
+        name: ratio_in_si(one, units.get(name), units.get(one.of), content.units)
         for name, one in (read('ratios') or {}).items()
     }
     return Linkage(points, inputs, assembly, published, sliders, traced, pose, masses, ratios)
-
-
-def _ratio_in_si(ratio: Ratio, unit: str | None, driving: str | None, content: Section) -> float:
-    """Return a ratio of the file's units of length: metres for a radian, radians for a metre."""
-    found = content.units.to_si(ratio.ratio, 'm' if unit == 'm' else '')
-    return found / content.units.to_si(1.0, 'm') if driving == 'm' else found
 
 
 def _input_line(points: Mapping[str, Collection[str]]) -> str:

@@ -46,7 +46,7 @@ from linkage_ros.description.parameters import (
     TextOf,
 )
 from linkage_ros.description.section import Section
-from linkage_ros.description.units import ANGLES
+from linkage_ros.description.units import ANGLES, Units
 from linkage_ros.errors import list_names, quote
 from linkage_ros.kinematics import (
     AssemblyPose,
@@ -60,7 +60,7 @@ from linkage_ros.kinematics import (
     Slider,
 )
 
-_MOST_LINKS = 400
+MOST_LINKS = 400
 """Bound on the links, sliders, joints and ratios; at it a check takes seconds."""
 
 FARTHEST = 1e9
@@ -96,7 +96,7 @@ class _SliderOrLinks(Rule):
 
 
 @dataclass(frozen=True, slots=True)
-class _Moves(Rule):
+class Moves(Rule):
     """The joint of these limits turns or slides."""
 
     slides: bool = False
@@ -147,7 +147,7 @@ def _coordinate(meaning: str, default: float, unit: str = '') -> Any:
 
 
 _LEFT, _AHEAD = ('left', 'right'), ('ahead', 'behind')
-_LIMITS = {
+LIMITS = {
     'limits': declare(
         LimitPair(
             'limits of the joint: [low, high] [rad or m]; -.inf or .inf for no limit on a side',
@@ -163,18 +163,18 @@ _LIMITS = {
 }
 
 
-def _split_limits(values: _Values) -> Limits:
+def split_limits(values: _Values) -> Limits:
     """Return the limits of a joint and take their keys out; `kinematics.checks` judges them."""
     low, high = values.pop('limits', (-inf, inf))
     return Limits(low, high, values.pop('velocity', inf), values.pop('effort', inf))
 
 
 def _build_input(**values: Any) -> Input:
-    return Input(limits=_split_limits(values), **values)
+    return Input(limits=split_limits(values), **values)
 
 
 def _build_joint(**values: Any) -> RevoluteJoint | SlideJoint:
-    limits = _split_limits(values)
+    limits = split_limits(values)
     if 'slider' in values:
         return SlideJoint(limits=limits, **values)
     return RevoluteJoint(limits=limits, **values)
@@ -184,7 +184,7 @@ _ENDS = {
     'parent': text('the link from which the angle is measured', None),
     'child': text('the link whose angle it is', None),
     'slider': text('the slider, instead of parent and child', None),
-    **_LIMITS,
+    **LIMITS,
 }
 _INPUT = Keys(
     'The driven joint; several in a list.',
@@ -213,7 +213,7 @@ _SLIDER = Keys(
     },
     (OnlyWith('angle', 'block'),),
 )
-_RATIO = Keys(
+RATIO = Keys(
     'A published joint, as ratio · other joint + offset.',
     Ratio,
     {
@@ -271,7 +271,7 @@ WRITTEN_OUT = {
         Named(
             'Links, each with its points; a point on two links is a pin; one link is the ground.',
             Named('points of the link, by name', _PLACE),
-            _MOST_LINKS,
+            MOST_LINKS,
         )
     ),
     'input': declare(OneOrMore(_INPUT.meaning, _INPUT)),
@@ -283,18 +283,18 @@ WRITTEN_OUT = {
         None,
     ),
     'sliders': _by_name(
-        'Points that stay on lines of other links, by name.', _SLIDER, most=_MOST_LINKS
+        'Points that stay on lines of other links, by name.', _SLIDER, most=MOST_LINKS
     ),
     'joints': _by_name(
         'Published joints, in this order, by name.',
         _JOINT,
         MISSING,
         least=1,
-        most=_MOST_LINKS,
+        most=MOST_LINKS,
         check=_refuse_input,
     ),
     'ratios': _by_name(
-        'Joints that follow others: gears, belts, racks, mimic.', _RATIO, most=_MOST_LINKS
+        'Joints that follow others: gears, belts, racks, mimic.', RATIO, most=MOST_LINKS
     ),
     'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
     'pose': optional_keys(_POSE),
@@ -378,7 +378,7 @@ class _Swivel(Point):
 
 def _joint_limits(meaning: str, slides: bool) -> Keys:
     # In SI, as an expanded shorthand has them: infinite ends as they are.
-    return Keys(meaning, _written_limits, _LIMITS, (_Moves(slides),))
+    return Keys(meaning, _written_limits, LIMITS, (Moves(slides),))
 
 
 def _written_limits(**values: Any) -> _Values:
@@ -437,6 +437,14 @@ LINKAGE = Keys(
     {**UNITS, **WRITTEN_OUT, **{name: optional_keys(keys) for name, keys in SHORTHANDS.items()}},
     (_ShorthandOrLinks(),),
 )
+
+
+def ratio_in_si(ratio: Ratio, unit: str | None, driving: str | None, units: Units) -> Ratio:
+    """Return a ratio of the file's units of length: metres for a radian, radians for a metre."""
+    found = units.to_si(ratio.ratio, 'm' if unit == 'm' else '')
+    if driving == 'm':
+        found /= units.to_si(1.0, 'm')
+    return replace(ratio, ratio=found)
 
 
 def linkage_schema() -> Schema:

@@ -193,6 +193,19 @@ class Section:
         self._check_most(key, value, (x, y), most, unit)
         return x, y
 
+    def place(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float, float]:
+        """Return three finite numbers, each within ±most."""
+        name = self.units.file_unit(unit)
+        value = self._take_value(key, None, f'three numbers [x, y, z]{_unit_text(name)}')
+        if not _is_list_of_finite(value) or len(value) != 3:
+            remedy = 'write three finite numbers: [x, y, z]'
+            if _is_pair(value):
+                remedy += '; a linkage with points is spatial'
+            raise self.error(key, f'{quote(value)} is not a place', remedy)
+        x, y, z = (self._to_si(key, part, unit) for part in value)
+        self._check_most(key, value, (x, y, z), most, unit)
+        return x, y, z
+
     def interval(self, key: str, *, most: float = inf, unit: str = '') -> tuple[float, float]:
         """
         Return two numbers [low, high]; infinite for no limit, and if the key is absent.

@@ -145,11 +145,20 @@ from linkage_ros.kinematics.sides import (
     without_drawn_pose as without_drawn_pose,
     written_sides as written_sides,
 )
+from linkage_ros.kinematics.space.closure import (
+    check_pose as check_pose,
+    SpaceClosure as SpaceClosure,
+)
+from linkage_ros.kinematics.space.linkage import (
+    SpaceLinkage as SpaceLinkage,
+    SpatialJoint as SpatialJoint,
+)
 from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
     LinkState as LinkState,
 )
+from linkage_ros.kinematics.stepwise_closure import StepwiseClosure as StepwiseClosure
 from linkage_ros.kinematics.sweep_analysis import (
     check_closes as check_closes,
     check_limits as check_limits,

@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections import Counter
 from itertools import combinations
 from math import hypot, inf, isfinite, isnan
+from typing import Any
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.linkage import (
-    AnyLinkage,
     GROUND,
     Input,
     Limits,
@@ -215,7 +215,7 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
             )
 
 
-def check_all_limits(linkage: AnyLinkage) -> None:
+def check_all_limits(linkage: Any) -> None:
     """Refuse limits that allow no motion, and a pose beyond those of its inputs."""
     for given in linkage.inputs:
         _check_limits('input', given.limits, given.joint, given.unit)

@@ -63,6 +63,8 @@ class Closure(StepwiseClosure):
 
     """
 
+    linkage: Linkage
+
     def __init__(self, linkage: Linkage, name: str = '') -> None:
         if not isinstance(linkage, Linkage):
             raise TypeError(f'linkage: {quote(linkage)} is not a Linkage; load() reads files')
@@ -75,7 +77,6 @@ class Closure(StepwiseClosure):
         self.step_groups = tuple(planner.step_groups)
         self.angles, self.slides = planner.angles, planner.slides
         self.turns_with = planner.turns_with
-        """For each coordinate that is a sum of inputs, how often each input is in it."""
         self.ratio_turns = planner.ratio_turns
         self._terms = tuple(self._joint_term(joint) for joint in linkage.joints.values())
         self._point_index = {
@@ -224,6 +225,13 @@ class Closure(StepwiseClosure):
     def named_points(self, position: Position) -> dict[str, complex]:
         """Return every point by its name, as `Position.points`."""
         return {point: place for (_, point), place in self.points(position).items()}
+
+    def named_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[str, PointMotion]:
+        """Return `point_motion` by the names of the points."""
+        found = self.point_motion(position, velocity, acceleration)
+        return {point: motion for (_, point), motion in found.items()}
 
     def point_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration

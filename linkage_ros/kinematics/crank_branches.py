@@ -33,7 +33,7 @@ from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import golden_section, last_inside, sample_inputs
-from linkage_ros.kinematics.results import InputRange, LoopClosure
+from linkage_ros.kinematics.results import InputRange, PlanarClosure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _CELLS = 32
@@ -80,7 +80,7 @@ class Output(NamedTuple):
         return 'rad' if self.turning else 'm'
 
 
-def output_named(closure: LoopClosure, name: str) -> Output:
+def output_named(closure: PlanarClosure, name: str) -> Output:
     """Return the output of a name, such as ``rocker_joint`` or ``P.x``; refuse unknown names."""
     if name in closure.input_names:
         raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
@@ -336,7 +336,7 @@ class CrankBranch:
 class OutputFunction:
     """An output over the crank, with its slope, both NaN where the linkage does not close."""
 
-    def __init__(self, closure: LoopClosure, output: Output) -> None:
+    def __init__(self, closure: PlanarClosure, output: Output) -> None:
         compiled = Compiled(closure, 1, output.wanted, within_limits=False)
         self._compiled = compiled
         self.fast = compiled.fast
@@ -355,7 +355,7 @@ class OutputFunction:
 
 
 def crank_branches(
-    closure: LoopClosure, output: Output, *, limited: bool = True
+    closure: PlanarClosure, output: Output, *, limited: bool = True
 ) -> list[CrankBranch]:
     """
     Return the branches of an output over a single input, by the crank at which they begin.
@@ -546,7 +546,7 @@ def _crank_distance(branch: CrankBranch, crank: float) -> float:
     return max(branch.least - crank, crank - branch.most, 0.0)
 
 
-def inverse_of(closure: LoopClosure, name: str, limited: bool = True) -> Inverse:
+def inverse_of(closure: PlanarClosure, name: str, limited: bool = True) -> Inverse:
     """
     Return an output with its branches; limits of joints cut them.
 

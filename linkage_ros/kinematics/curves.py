@@ -59,7 +59,7 @@ def traced_carriers(linkage: Linkage) -> dict[str, str]:
 
 def sweep_range(input_sweep: InputSweep, interval: InputRange) -> RangeSweep:
     """Move a linkage through a range."""
-    closure = input_sweep.closure
+    closure: Any = input_sweep.closure
     linkage = closure.linkage
     carriers = traced_carriers(linkage)
     x: list[float] = []

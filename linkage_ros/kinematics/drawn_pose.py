@@ -31,7 +31,7 @@ from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.topology import Dyad, Iterated, links_of
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure, Position
+    from linkage_ros.kinematics.results import PlanarClosure, Position
     from linkage_ros.kinematics.solved_links import SolvedLinks
 
 _SAME = 1e-9
@@ -282,7 +282,7 @@ def _telling_text(plan: SolvedLinks, dyad: Dyad, states: Sequence[LinkState]) ->
     return f'{point or f"the angle of {link}"}: {texts[0]} or {texts[1]}'
 
 
-def read_drawn_pose(closure: LoopClosure, position: Position) -> AssemblyPose:
+def read_drawn_pose(closure: PlanarClosure, position: Position) -> AssemblyPose:
     """
     Return the pose that determines the assembly of a position.
 

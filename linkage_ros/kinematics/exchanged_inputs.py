@@ -24,7 +24,7 @@ from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import assur_groups, Iterated
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure
+    from linkage_ros.kinematics.results import PlanarClosure
 
 _SAME = 1e-6
 """Largest difference of joints in one assembly, in [rad] or of the linkage's size."""
@@ -34,7 +34,7 @@ _MOST = 1024
 
 
 def exchange_inputs(
-    closure: LoopClosure, names: Sequence[str], rebuild: Callable[[Linkage], LoopClosure]
+    closure: PlanarClosure, names: Sequence[str], rebuild: Callable[[Linkage], PlanarClosure]
 ) -> Linkage:
     """
     Return the linkage with these published joints as its inputs, and its inputs as joints.

@@ -20,10 +20,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from math import inf, pi, remainder, tau
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import ROUNDING, UNIT_ROUNDOFF
-from linkage_ros.kinematics.linkage import AnyLinkage, GROUND, Limits, Linkage, RevoluteJoint
+from linkage_ros.kinematics.linkage import GROUND, Limits, Linkage, RevoluteJoint
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Bound(NamedTuple):
 class Bounds:
     """The limits of a linkage's driven joints, and of its published ones."""
 
-    def __init__(self, linkage: AnyLinkage) -> None:
+    def __init__(self, linkage: Any) -> None:
         limits = {name: of for name, of in linkage.limits.items() if of.is_bounded}
         driven = [given.joint for given in linkage.inputs]
         self.inputs = tuple(

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal
 
 Point = tuple[float, float]
 
@@ -211,23 +211,6 @@ class Mass:
     mass: float
     center: Point
     inertia: float
-
-
-class AnyLinkage(Protocol):
-    """What ranges, limits and margins ask of a planar or a spatial linkage; as in `Linkage`."""
-
-    @property
-    def inputs(self) -> tuple[Input, ...]: ...
-    @property
-    def joints(self) -> Mapping[str, RevoluteJoint | SlideJoint]: ...
-    @property
-    def pose(self) -> AssemblyPose | None: ...
-    @property
-    def ratios(self) -> Mapping[str, Ratio]: ...
-    @property
-    def driven_joints(self) -> tuple[Input, ...]: ...
-    @property
-    def limits(self) -> dict[str, Limits]: ...
 
 
 @dataclass(frozen=True, slots=True)

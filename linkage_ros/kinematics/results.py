@@ -20,9 +20,10 @@ from math import tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.errors import list_names, quote
-from linkage_ros.kinematics.linkage import AnyLinkage
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
+from linkage_ros.kinematics.topology import Structure
 
 
 class InputRange(NamedTuple):
@@ -138,8 +139,8 @@ class LoopClosure(Protocol):
     `Closure` imports them. Its docstrings describe the members.
     """
 
-    @property
-    def linkage(self) -> AnyLinkage: ...
+    linkage: Any  # A `Linkage`, or a `SpaceLinkage`, which has inputs, joints, limits and pose too
+
     @property
     def slide_bound(self) -> float: ...
 
@@ -178,6 +179,21 @@ class LoopClosure(Protocol):
 
     @property
     def zero_length(self) -> float | None: ...
+
+
+class PlanarClosure(LoopClosure, Protocol):
+    """The part of a `Closure` that only planar linkages have."""
+
+    linkage: Linkage
+    structure: Structure
+
+    def points(self, position: Position) -> dict[tuple[str, str], complex]: ...
+
+    def point_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[tuple[str, str], PointMotion]: ...
+    def slide_values(self, position: Position) -> dict[str, float]: ...
+    def link_angles(self, position: Position) -> dict[str, float]: ...
 
 
 class _JointValues(Mapping[str, float]):

@@ -19,7 +19,7 @@ from linkage_ros.kinematics.linkage import AssemblyPose, Linkage, links_by_point
 from linkage_ros.kinematics.topology import Dyad, Group, Iterated, Structure
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure, Position
+    from linkage_ros.kinematics.results import PlanarClosure, Position
 
 SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 SIDES['RPR'] = SIDES['RRP']
@@ -80,7 +80,7 @@ def assembly_sides(structure: Structure) -> dict[str, tuple[str, ...]]:
     return sides
 
 
-def written_sides(closure: LoopClosure) -> dict[str, str]:
+def written_sides(closure: PlanarClosure) -> dict[str, str]:
     """Return the side of each dyad as the file writes it, or as its pose draws it."""
     pose = closure.linkage.pose
     drawn = (
@@ -102,7 +102,7 @@ def without_drawn_pose(linkage: Linkage, structure: Structure) -> Linkage:
     return replace(linkage, pose=AssemblyPose(pose.inputs, points, angles))
 
 
-def sides_at(closure: LoopClosure, position: Position) -> dict[str, str]:
+def sides_at(closure: PlanarClosure, position: Position) -> dict[str, str]:
     """
     Return the side of each dyad that closes in two ways, as it lies at a position.
 

@@ -14,7 +14,7 @@ Position first; what a scene calls for beyond it starts from the position and re
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from operator import mul
 from typing import Any, TYPE_CHECKING
@@ -82,15 +82,15 @@ class StepwiseClosure:
     gap_unit: str = 'm'
     """Unit of the gap of an open position."""
 
-    zero_length: float | None = None
-    """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
-
     steps: tuple[Step, ...]
     step_groups: tuple[int, ...]
     """For each step the number of the group that it belongs to."""
 
     ratio_turns: int
     """Whole turns of a single input after which its ratios repeat; 0 if they never do."""
+
+    turns_with: Any
+    """For each coordinate that is a sum of inputs, how often each input is in it."""
 
     _terms: tuple[tuple[int, int, float, float], ...]
     """For each published joint i, j, factor, constant: it is factor·(x[i] − x[j]) + constant."""
@@ -394,6 +394,42 @@ class StepwiseClosure:
     def closing_ranges(self) -> tuple[InputRange, ...]:
         """Ranges in which a single input closes every loop, without limits; empty for several."""
         return closing_ranges(self)
+
+    @property
+    def zero_length(self) -> float | None:
+        """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
+        return None
+
+    @property
+    def slide_bound(self) -> float:
+        """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
+        raise NotImplementedError
+
+    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
+        """Return the ranges of the first input that a user expects."""
+        return ranges
+
+    def needed_groups(self, number: int) -> set[int]:
+        """Return the numbers of a group and of the groups that it starts from."""
+        return set(range(number + 1))
+
+    def links_of_group(self, number: int) -> list[str]:
+        """Return the links of a group, for people."""
+        raise NotImplementedError
+
+    def named_points(self, position: Position) -> dict[str, Any]:
+        """Return every point by its name, as `Position.points`."""
+        raise NotImplementedError
+
+    def named_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> Mapping[str, Any]:
+        """Return place, velocity and acceleration of points by their names, traced ones at least."""
+        raise NotImplementedError
+
+    def residual(self, position: Position) -> float:
+        """Return the closure error of a closed position, in [m]."""
+        raise NotImplementedError
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
         """Return how near a closed position is to a singularity."""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import Bound
-from linkage_ros.kinematics.linkage import AnyLinkage
+from linkage_ros.kinematics.linkage import AssemblyPose, Linkage
 from linkage_ros.kinematics.ranges import (
     describe_ranges,
     even_samples,
@@ -257,7 +257,8 @@ def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     degrees each if that is far from a toggle, or else at the point of a coarse grid that is
     farthest from one.
     """
-    linkage, pose = closure.linkage, closure.linkage.pose
+    linkage = closure.linkage
+    pose: AssemblyPose | None = linkage.pose
     several = len(linkage.inputs) > 1
     # Without joints a loop is open.
     if pose and starts_at_pose(closure) and closure.position(*pose.inputs).joints:
@@ -609,6 +610,6 @@ def _limits_text(closure: LoopClosure, bound: Bound) -> str:
     return f'{limits} {_joint_unit(closure.linkage, bound)}'
 
 
-def _joint_unit(linkage: AnyLinkage, bound: Bound) -> str:
+def _joint_unit(linkage: Linkage, bound: Bound) -> str:
     driven = {given.joint: given.unit for given in linkage.inputs}
     return driven.get(bound.name) or linkage.joints[bound.name].unit

@@ -16,7 +16,7 @@ from typing import Any
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.linkage import SlideJoint
-from linkage_ros.kinematics.results import InputRange, Position
+from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.freedom import check_freedom, find_freedom, Freedom
 from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage
 from linkage_ros.kinematics.space.plan import SpacePlan
@@ -62,7 +62,8 @@ class SpaceClosure(StepwiseClosure):
 
     """
 
-    turns_with: Mapping[int, Any] = {}
+    linkage: SpaceLinkage
+    turns_with: Any = {}
 
     def __init__(self, linkage: SpaceLinkage, name: str = '') -> None:
         if not isinstance(linkage, SpaceLinkage):
@@ -94,16 +95,37 @@ class SpaceClosure(StepwiseClosure):
         """
         self._check_pose('points', position)
         places = {}
-        for point in self.linkage.points:
+        for name in self.linkage.points:
+            point = self._plan.same[name]
             if point in self._plan.points:
                 place = position.state.pins[self._plan.points[point]]
             else:
-                link = next(one for one in self._plan.carriers[point] if one in self._plan.frames)
-                place = self._carried_place(position, link, point)
-            places[point] = scale(self.scale, place)
+                carriers = self._plan.carriers[point]
+                known = [link for link in carriers if link in self._plan.frames]
+                if not known:
+                    continue  # No link carries it.
+                place = self._carried_place(position, known[0], point)
+            places[name] = scale(self.scale, place)
         return places
 
-    named_points = points
+    def named_points(self, position: Position) -> dict[str, Vector]:
+        """Return every point by its name, as `points`."""
+        return self.points(position)
+
+    def named_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[str, tuple[Vector, Vector, Vector]]:
+        """Return place, velocity and acceleration of every traced point, in [m]."""
+        found = {}
+        for point in self.linkage.traced:
+            index = self._plan.points.get(self._plan.same[point])
+            if index is not None:
+                place, rate, change = (
+                    scale(self.scale, one.state.pins[index])
+                    for one in (position, velocity, acceleration)
+                )
+                found[point] = (place, rate, change)
+        return found
 
     def frames(self, position: Position) -> dict[str, tuple[Vector, Quaternion]]:
         """
@@ -191,23 +213,9 @@ class SpaceClosure(StepwiseClosure):
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         return 4.0 * self.scale
 
-    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
-        """Return the ranges of the first input as they are."""
-        return ranges
-
-    def needed_groups(self, number: int) -> set[int]:
-        """Return the numbers of the groups up to one."""
-        return set(range(number + 1))
-
     def links_of_group(self, number: int) -> list[str]:
         """Return the links of a group."""
         return list(self.groups[number].links)
-
-    @BuiltProperty
-    def worst_gap(self) -> tuple[float, tuple[float, ...]]:
-        """The greatest residual over the range of a single input, or in the pose; its inputs."""
-        pose = self.linkage.pose.inputs
-        return self.residual(self.close_unlimited(*pose)), pose
 
 
 def check_pose(closure: SpaceClosure) -> None:

@@ -18,6 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names
+from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import SpaceLinkage
 from linkage_ros.kinematics.space.plan import SpacePlan
@@ -41,14 +42,14 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
     """Return the degrees of freedom in the pose."""
     links = {name: number for number, name in enumerate(linkage.link_names)}
     places, count = plan.places, 6 * len(links)
-    rows: list[np.ndarray] = []
+    rows: list[Array] = []
 
-    def spin(link: str) -> np.ndarray:
+    def spin(link: str) -> Array:
         found = np.zeros((3, count))
         found[:, 6 * links[link] : 6 * links[link] + 3] = np.eye(3)
         return found
 
-    def velocity(link: str, place: Vector) -> np.ndarray:
+    def velocity(link: str, place: Vector) -> Array:
         x, y, z = place
         first = 6 * links[link]
         found = np.zeros((3, count))
@@ -57,19 +58,24 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         found[:, first + 3 : first + 6] = np.eye(3)
         return found
 
-    def rate(name: str) -> np.ndarray:
+    def rate(name: str) -> Array:
         """Return the row of a joint's rate, in the unit of the file."""
         if name in linkage.struts:
             one, other = linkage.struts[name]
             between = np.subtract(places[other], places[one])
-            ends = (velocity(plan.carriers[point][0], places[point]) for point in (other, one))
-            return plan.scale * (between / np.linalg.norm(between)) @ np.subtract(*ends)
+            at_other, at_one = (
+                velocity(plan.carriers[plan.same[point]][0], places[point])
+                for point in (other, one)
+            )
+            along: Array = plan.scale * between / np.linalg.norm(between)
+            return np.asarray(along @ (at_other - at_one))
         joint = linkage.between[name]
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         if name in linkage.hinges:
-            return axis @ (spin(joint.child) - spin(joint.parent))
+            return np.asarray(axis @ (spin(joint.child) - spin(joint.parent)))
         at = (0.0, 0.0, 0.0)
-        return plan.scale * axis @ (velocity(joint.child, at) - velocity(joint.parent, at))
+        moving = velocity(joint.child, at) - velocity(joint.parent, at)
+        return np.asarray(plan.scale * axis @ moving)
 
     for name, joint in linkage.between.items():
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
@@ -85,6 +91,8 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         if point not in linkage.points:
             continue
         for link in links_at[1:]:
+            if _is_on_hinge(linkage, plan, point, {links_at[0], link}):
+                continue
             rows.append(velocity(link, places[point]) - velocity(links_at[0], places[point]))
             needed += 3
     for name, ratio in linkage.ratios.items():
@@ -134,7 +142,18 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
         )
 
 
-def _rank_and_motions(matrix: np.ndarray) -> tuple[int, np.ndarray]:
+def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[str]) -> bool:
+    """Return whether a point lies on the axis of a hinge between two links, which then holds it."""
+    place = np.array(plan.places[point])
+    for hinge in linkage.hinges.values():
+        arm = place - np.array(hinge.at) / plan.scale
+        axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+        if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < _RANK:
+            return True
+    return False
+
+
+def _rank_and_motions(matrix: Array) -> tuple[int, Array]:
     """Return the rank of a matrix, and the vectors that it makes 0, as columns."""
     _, values, rows = np.linalg.svd(matrix)
     rank = int(np.count_nonzero(values > _RANK * values[0]))

@@ -71,6 +71,9 @@ _SQUARE = 1e-6
 _BETTER = 1e-6
 """By how much the next pair must be better: among equal ones the first is taken."""
 
+_SAME = 1e-9
+"""Points of one link nearer to each other than this are one."""
+
 _CLEAN = 2.0**-50
 """A component of a unit vector below this is rounding."""
 
@@ -152,6 +155,30 @@ class SpacePlan:
                 for link in (joint.parent, joint.child):
                     self._carry(point, link)
 
+        self._merge_points()
+
+    def _merge_points(self) -> None:
+        """Make one point of those that share a link and a place, as in a universal joint."""
+        self.same = {name: name for name in self.places}
+        """For each point the one that it is known by."""
+        found = True
+        while found:
+            found = False
+            for points in self.carried.values():
+                for one, other in combinations(points, 2):
+                    if dist(self.places[one], self.places[other]) < _SAME:
+                        self._make_same(one, other)
+                        found = True
+                        break
+
+    def _make_same(self, kept: str, gone: str) -> None:
+        self.same = {name: kept if of == gone else of for name, of in self.same.items()}
+        for link in self.carriers.pop(gone):
+            others = self.carried[link]
+            others[others.index(gone)] = kept
+            self.carried[link] = list(dict.fromkeys(others))
+            self.carriers[kept] = list(dict.fromkeys((*self.carriers[kept], link)))
+
     def _carry(self, point: str, link: str) -> None:
         self.carriers[point].append(link)
         self.carried[link].append(point)
@@ -209,7 +236,7 @@ class SpacePlan:
             or any(map(self._aim, self._linkage.between))
             or any(map(self._close, self._linkage.between))
             or any(map(self._frame, self._unknown_links()))
-            or any(map(self._place_point, self.places))
+            or any(map(self._place_point, self.carriers))
             or any(map(self._translate, self._unknown_links()))
         )
 
@@ -257,7 +284,8 @@ class SpacePlan:
         origin = minus(at, scale(self._value(name), z)) if self._slides(name) else at
         base = Frame(x, cross(z, x), z, origin)
         on = self.pose_frames[parent]
-        seat = Frame(*(_clean(on.resolve(axis)) for axis in base[:3]), on.locate(base.origin))
+        x, y, z = (_clean(on.resolve(axis)) for axis in base[:3])
+        seat = Frame(x, y, z, on.locate(base.origin))
         joint = kind(self.frames[parent], seat)
         return joint, joint.child_frame(base, self._value(name))
 
@@ -351,7 +379,8 @@ class SpacePlan:
                 size = dist(self.places[point], self.places[other])
                 if other != point and size and self._is_known(other):
                     yield _Pair(point, other, Rod(size), link)
-        for name, ends in self._linkage.struts.items():
+        for name, points in self._linkage.struts.items():
+            ends = [self.same[end] for end in points]
             if name in self.coordinates and point in ends:
                 other = ends[1 - ends.index(point)]
                 if self._is_known(other):
@@ -374,7 +403,7 @@ class SpacePlan:
                     best, choice = abs(square), (pair, 1.0 if square > 0.0 else -1.0)
         if choice is None:
             return False
-        (point, known, rod, by), sign = choice
+        (point, known, bar, by), sign = choice
         to = self._point_index(known)
         joint, frame = self._make_joint(name, *ends, self.places[known])
         place = _clean(frame.locate(self.places[point]))
@@ -382,14 +411,14 @@ class SpacePlan:
         self._new_coordinate(name)
         if isinstance(joint, Hinge):
             radius = hypot(place[0], place[1])
-            plain = ClosedHinge(joint, place, to, rod, sign, index, radius, 0.0)
+            plain = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
             # Where 0 lies among the whole turns follows from the value in the pose.
             found = self._closed_value(plain, known, point)
             direction = atan2(place[1], place[0])
             direction += tau * round((found - direction - self._value(name)) / tau)
-            step: Any = ClosedHinge(joint, place, to, rod, sign, index, radius, direction)
+            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, direction)
         else:
-            step = ClosedSlide(joint, place, to, rod, sign, index)
+            step = ClosedSlide(joint, place, to, bar, sign, index)
         self._add(step, coordinates=1, pins=1)
         side = '+' if sign > 0.0 else '-'
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
@@ -545,10 +574,11 @@ class SpacePlan:
             if name in self.coordinates:
                 continue
             if name in linkage.struts:
-                if not all(map(self._is_known, linkage.struts[name])):
+                ends = [self.same[point] for point in linkage.struts[name]]
+                if not all(map(self._is_known, ends)):
                     self.lost.append(name)
                     continue
-                one, other = map(self._point_index, linkage.struts[name])
+                one, other = map(self._point_index, ends)
                 self._new_coordinate(name)
                 step = MeasuredStrut((one, other), self.coordinates[name])
                 self._add(step, coordinates=1)
@@ -563,6 +593,10 @@ class SpacePlan:
                     self._new_coordinate(name)
                     self._add(self.measure_joint(name), coordinates=1)
             self._end_group('measured', (), name)
+        for point in linkage.traced:
+            if self._is_known(self.same[point]):
+                self._point_index(self.same[point])
+        self.step_groups = [min(number, len(self.groups) - 1) for number in self.step_groups]
 
     def _measure_slide(self, name: str, joint: SpatialJoint) -> None:
         child = joint.child

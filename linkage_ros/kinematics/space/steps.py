@@ -22,6 +22,7 @@ product of both roots. A planar dyad of two pinned links is h = 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from typing import NamedTuple
@@ -90,6 +91,14 @@ class ClosedRates(NamedTuple):
     arm: Vector  # From the origin of the child to its point
     slope: Vector  # Velocity of the point at a rate of 1
     slip: Vector  # Velocity of the point relative to the other end of the rod
+
+
+def missing_length(rods: Sequence[Rod], solved: LinkState) -> float | None:
+    """Return by how much a strut is shorter than 0; None if none is."""
+    for rod in rods:
+        if rod.strut and not (size := rod.length(solved)) > 0.0:
+            return -size
+    return None
 
 
 def root_between(long: float, short: float) -> Root:
@@ -321,6 +330,9 @@ class ClosedHinge(ClosedJoint):
 
     def close(self, solved: LinkState) -> ClosedPose:
         """Append the hinge and the frame of the child."""
+        missing = missing_length((self.rod,), solved)
+        if missing is not None:
+            return ClosedPose(Status.OPEN, missing)
         base = self.joint.base(solved)
         x, y, z = base.locate(solved.pins[self.to])
         low, high = meet_circle(
@@ -346,6 +358,9 @@ class ClosedSlide(ClosedJoint):
 
     def close(self, solved: LinkState) -> ClosedPose:
         """Append the slide and the frame of the child."""
+        missing = missing_length((self.rod,), solved)
+        if missing is not None:
+            return ClosedPose(Status.OPEN, missing)
         base = self.joint.base(solved)
         x, y, z = minus(base.locate(solved.pins[self.to]), self.place)
         distance = hypotenuse(x, y)
@@ -423,6 +438,9 @@ class ThreeDistances:
 
     def close(self, solved: LinkState) -> ClosedPose:
         """Append the point."""
+        missing = missing_length(self.rods, solved)
+        if missing is not None:
+            return ClosedPose(Status.OPEN, missing)
         start, end, third = (solved.pins[index] for index in self.to)
         one, other, rod = (each.length(solved) for each in self.rods)
         line, across = minus(end, start), minus(third, start)

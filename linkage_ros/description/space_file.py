@@ -1,0 +1,107 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""Read a spatial linkage file into a `SpaceLinkage`, or into its closure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from linkage_ros.description.linkage_grammar import ratio_in_si, UNITS
+from linkage_ros.description.parameters import read_parameters
+from linkage_ros.description.section import Section
+from linkage_ros.description.space_grammar import SPACE
+from linkage_ros.description.units import Units
+from linkage_ros.errors import did_you_mean, DefinitionError, list_names, quote
+from linkage_ros.kinematics import (
+    check_limits,
+    check_pose,
+    SpaceClosure,
+    SpaceLinkage,
+    SpatialJoint,
+)
+
+
+def is_spatial(content: Section) -> bool:
+    """Return whether a linkage file is spatial: it has points of its own."""
+    return 'points' in content
+
+
+def read_space_closure(
+    content: Section, name: str = '', *, publish_inputs: bool = False
+) -> SpaceClosure:
+    """Read a spatial linkage and check that its pose closes; errors as in `read_closure`."""
+    try:
+        closure = SpaceClosure(_read_linkage(content, publish_inputs), name)
+        check_pose(closure)
+        check_limits(closure)
+    except DefinitionError as error:
+        raise content.locate_error(error) from None
+    return closure
+
+
+def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
+    content.units = Units(*(SPACE.read_key(content, key, {}) for key in UNITS))
+    sliding = [*_names(content, 'slides'), *_names(content, 'struts')]
+    values = read_parameters(content, SPACE, {'slide': sliding})
+    points = values['points']
+    links = {link: tuple(names) for link, names in values.get('links', {}).items()}
+    joints: dict[str, dict[str, SpatialJoint]] = {}
+    for kind in ('hinges', 'slides'):
+        joints[kind] = {}
+        for joint, of in values.get(kind, {}).items():
+            if through := of.pop('through', None):
+                of |= _axis_through(content, f'{kind}.{joint}.through', through, points)
+                for link in (of['parent'], of['child']):
+                    links[link] = tuple(dict.fromkeys((*links.get(link, ()), *through)))
+            joints[kind][joint] = SpatialJoint(**of)
+    struts = values.get('struts', {})
+    names = [*joints['hinges'], *joints['slides'], *struts]
+    for one in names:
+        if names.count(one) > 1:
+            raise content.error('', f'two joints are named {quote(one)}', 'name each differently')
+    units = {name: 'm' if name in sliding else 'rad' for name in names}
+    driven = values['input']
+    published = values.get('joints') or tuple(name for name in names if name not in driven)
+    for name in driven:
+        if name in published:
+            raise content.error('joints', f'{quote(name)} is an input', 'publish the others')
+    return SpaceLinkage(
+        points=points,
+        links=links,
+        **joints,
+        struts=struts,
+        driven=driven,
+        published=(*driven, *published) if publish_inputs else published,
+        ratios={
+            name: ratio_in_si(ratio, units.get(name), units.get(ratio.of), content.units)
+            for name, ratio in values.get('ratios', {}).items()
+        },
+        traced=values.get('traced', ()),
+    )
+
+
+def _axis_through(
+    content: Section, key: str, names: Sequence[str], points: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return a point and the direction of an axis through two points."""
+    for name in names:
+        if name not in points:
+            remedy = did_you_mean(name, points, f'name one of {list_names(sorted(points))}')
+            raise content.error(key, f'there is no point {quote(name)}', remedy)
+    one, other = (points[name] for name in names)
+    if one == other:
+        reason = f'{quote(names[0])} and {quote(names[1])} are in one place'
+        raise content.error(key, reason, 'name two points apart')
+    return {'at': one, 'axis': tuple(b - a for a, b in zip(one, other, strict=True))}
+
+
+def _names(content: Section, key: str) -> list[str]:
+    """Return the names in a section before it is read."""
+    named = content.mapping.get(key)
+    return list(named) if isinstance(named, dict) else []

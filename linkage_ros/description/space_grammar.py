@@ -1,0 +1,186 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""The keys of a spatial linkage file, declared once; a file with a key `points` is one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from linkage_ros.description.grammar import DIALECT, ListOf, Named
+from linkage_ros.description.linkage_grammar import (
+    FARTHEST,
+    LIMITS,
+    MOST_LINKS,
+    Moves,
+    RATIO,
+    split_limits,
+    UNITS,
+)
+from linkage_ros.description.parameters import (
+    declare,
+    Keys,
+    Kind,
+    number,
+    NumberList,
+    ParameterGroup,
+    parameters_schema,
+    Parts,
+    Rule,
+    Schema,
+    text,
+    TextOf,
+)
+from linkage_ros.description.section import Section
+
+_MOST_POINTS = 2000
+"""Bound on the points of a spatial linkage; at it a check takes seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place(NumberList):
+    """Three finite numbers [x, y, z], each within ±most."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        return content.place(key, most=self.most, unit=self.unit)
+
+    def json_schema(self) -> Schema:
+        return {**NumberList.json_schema(self), 'minItems': 3, 'maxItems': 3}
+
+
+@dataclass(frozen=True, slots=True)
+class _TwoPoints(ListOf):
+    """The names of two points."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
+        names = content.texts(key)
+        if len(names) != 2 or names[0] == names[1]:
+            reason = f'{list(names)} does not name two points'
+            raise content.error(key, reason, 'write [ONE, OTHER], two points')
+        return tuple(names)
+
+    def json_schema(self) -> Schema:
+        return {**ListOf.json_schema(self), 'minItems': 2, 'maxItems': 2}
+
+
+@dataclass(frozen=True, slots=True)
+class _NameOrNames(ListOf):
+    """A name, or a list of names."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
+        if isinstance(content.mapping[key], str):
+            return (content.text(key),)
+        return tuple(content.texts(key))
+
+    def json_schema(self) -> Schema:
+        several = {**ListOf.json_schema(self), 'minItems': 1}
+        return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
+
+
+class _AtOrThrough(Rule):
+    """A hinge has a point and the direction of its axis, or two points on it."""
+
+    def needed_keys(self, content: Section) -> Sequence[str]:
+        return () if 'through' in content else ('at', 'axis')
+
+    def unknown_keys(self, content: Section) -> Sequence[str]:
+        return ('at', 'axis') if 'through' in content else ()
+
+    def json_schema(self) -> Schema:
+        return {
+            'if': {'required': ['through']},
+            'then': {'properties': {'at': False, 'axis': False}},
+            'else': {'required': ['at', 'axis']},
+        }
+
+
+def _joint(**values: Any) -> dict[str, Any]:
+    limits = split_limits(values)
+    return {**values, 'limits': limits}
+
+
+def _by_name(meaning: str, of: Kind) -> Any:
+    return declare(Named(meaning, of, MOST_LINKS), None)
+
+
+_ENDS = {
+    'parent': text('the link that carries it, or the ground'),
+    'child': text('the link that it moves'),
+}
+_HINGE = Keys(
+    'An axis about which the child turns on the parent.',
+    _joint,
+    {
+        **_ENDS,
+        'at': declare(Place('a point of the axis: [x, y, z]', 'm', FARTHEST), None),
+        'axis': declare(Place('direction of the axis: [x, y, z]', '', FARTHEST), None),
+        'through': declare(
+            _TwoPoints('two points of the axis, which leads from one to the other',
+                       TextOf('a point')),
+            None,
+        ),
+        'value': number('its angle in the pose', 0.0, unit='rad', least=-FARTHEST, most=FARTHEST),
+        **LIMITS,
+    },
+    (_AtOrThrough(), Moves(False)),
+)  # fmt: skip
+_SLIDE = Keys(
+    'A direction along which the child moves on the parent, and does not turn.',
+    _joint,
+    {
+        **_ENDS,
+        'axis': declare(Place('the direction: [x, y, z]', '', FARTHEST)),
+        'value': number('its length in the pose', 0.0, unit='m', least=-FARTHEST, most=FARTHEST),
+        **LIMITS,
+    },
+    (Moves(True),),
+)
+SPACE = Keys(
+    'A spatial linkage: points in one pose, and what joins the links there.',
+    dict,
+    {
+        **UNITS,
+        'points': declare(
+            Named('Points in the pose, in the frame of the ground, by name.',
+                  Place('[x, y, z]', 'm', FARTHEST), _MOST_POINTS),
+        ),
+        'links': declare(
+            Named(
+                'Links, each with its points; a point of two links is a ball joint, a link of two '
+                'points a rod.',
+                ListOf('points of the link', TextOf('a point')),
+                MOST_LINKS,
+            ),
+            None,
+        ),
+        'hinges': _by_name('Hinges between links, by name.', ParameterGroup(_HINGE.meaning, _HINGE)),
+        'slides': _by_name('Slides between links, by name.', ParameterGroup(_SLIDE.meaning, _SLIDE)),
+        'struts': _by_name(
+            'Pairs of points whose distance is a joint, such as a cylinder, by name.',
+            _TwoPoints('its two points', TextOf('a point')),
+        ),
+        'input': declare(
+            _NameOrNames('The driven hinge, slide or strut; several in a list.', TextOf('a joint'))
+        ),
+        'joints': declare(
+            ListOf(
+                'Published joints, in this order; all others that are no inputs if left out.',
+                TextOf('a joint'),
+            ),
+            None,
+        ),
+        'ratios': _by_name(RATIO.meaning, ParameterGroup(RATIO.meaning, RATIO)),
+        'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
+    },
+)  # fmt: skip
+
+
+def space_schema() -> Schema:
+    """Return the schema of a spatial linkage file."""
+    return {'$schema': DIALECT, 'title': 'Spatial linkage', **parameters_schema(SPACE)}
