@@ -17,7 +17,7 @@ the units of the linkage file; JSON has SI units.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, nan
 import sys
 from threading import Event
@@ -36,9 +36,16 @@ from linkage_ros.cli.arguments import (
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description import linkage_content, read_closure
+from linkage_ros.description import linkage_content, read_any_closure
 from linkage_ros.errors import LinkageError, list_names
-from linkage_ros.kinematics import assur_groups, Closure, InputSweep, Iterated, traced_carriers
+from linkage_ros.kinematics import (
+    assur_groups,
+    Closure,
+    InputSweep,
+    Iterated,
+    Position,
+    StepwiseClosure,
+)
 from linkage_ros.resources import named_file
 
 _STEPS = 36
@@ -105,6 +112,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--points', action='store_true', help='add the traced points, in the frame of the ground'
     )
+    parser.add_argument(
+        '--jacobian',
+        action='store_true',
+        help='add the derivative of each joint by each input, in SI; its transpose turns efforts '
+        'of the joints into those of the inputs (without masses)',
+    )
     add_result(parser)
 
 
@@ -112,10 +125,13 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Solve the linkage."""
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
-    closure = read_closure(content, file.stem)
+    closure = read_any_closure(content, file.stem)
     arguments.angles = arguments.angles.of_file(content.units)
     if arguments.joint:
         _check_alone(arguments)
+        if not isinstance(closure, Closure):
+            remedy = 'name other joints as the input of its file'
+            raise LinkageError('--joint', 'is for planar linkages', remedy)
         several = len(closure.input_names) > 1
         columns, rows = (_exchanged_table if several else _inverse_table)(closure, arguments)
     else:
@@ -131,7 +147,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _forward_table(
-    closure: Closure, arguments: argparse.Namespace
+    closure: StepwiseClosure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     question = _read_question(closure, arguments)
     rows = []
@@ -230,7 +246,7 @@ def _joint_value(text: str) -> tuple[str, float]:
 
 
 def _show_reach(
-    closure: Closure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
+    closure: StepwiseClosure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
 ) -> None:
     """Say once where the linkage closes, if it does not at an input that was typed."""
     for given in typed:
@@ -253,11 +269,12 @@ class Question(NamedTuple):
     # Of the inputs; empty if not requested.
     rates: tuple[float, ...] | None
     accelerations: tuple[float, ...] | None
-    points: dict[str, str]  # For each traced point, a link that carries it
+    points: tuple[str, ...]  # The traced points
+    jacobian: bool
 
 
 def _read_question(
-    closure: Closure,
+    closure: StepwiseClosure,
     arguments: argparse.Namespace,
     asked: Sequence[tuple[float, ...]] = (),
 ) -> Question:
@@ -289,12 +306,12 @@ def _read_question(
     rate = read_typed(arguments.rate, '--rate')
     if rate is None and acceleration is not None:
         rate = (0.0,) * len(linkage.inputs)
-    carriers = traced_carriers(linkage)
-    if arguments.points and not carriers:
+    if arguments.points and not linkage.traced:
         raise LinkageError(
             '--points', 'the linkage traces none', 'name them in the file: traced: [P]'
         )
-    return Question(asked, rate, acceleration, carriers if arguments.points else {})
+    points = linkage.traced if arguments.points else ()
+    return Question(asked, rate, acceleration, points, arguments.jacobian)
 
 
 def _sweep_inputs(
@@ -328,7 +345,7 @@ def _sweep_inputs(
             yield (value,)
 
 
-def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
+def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Column]:
     linkage = closure.linkage
     for given in linkage.inputs:
         yield _state_column(given.joint, given.unit)
@@ -339,8 +356,21 @@ def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
             unit = 'rad' if turning else 'm'
             yield _state_column(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
         for point in question.points:
-            for axis in 'xy':
+            for axis in _axes(closure):
                 yield _state_column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
+
+
+    if question.jacobian:
+        for joint in linkage.joints.items():
+            for given in linkage.inputs:
+                same = joint[1].unit == given.unit
+                unit = '' if same else f'{joint[1].unit}/{given.unit}'
+                yield Column(f'>{joint[0]} by {given.joint}', f'{joint[0]} by {given.joint}', unit,
+                             lambda value, _: '' if value is None else f'{value:.{_DIGITS}f}')
+
+
+def _axes(closure: StepwiseClosure) -> str:
+    return 'xy' if isinstance(closure, Closure) else 'xyz'
 
 
 def _state_column(name: str, unit: str) -> Column:
@@ -351,37 +381,49 @@ def _derivative_orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _state_row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
+def _state_row(closure: StepwiseClosure, question: Question, given: tuple[float, ...]) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
     row: list[Any] = [*given]
     position = closure.position(*given)
     row += [position.status.value, position.gap]
-    count = len(closure.turning) + 2 * len(question.points)
+    count = len(closure.turning) + len(_axes(closure)) * len(question.points)
+    slopes = len(closure.turning) * len(given) if question.jacobian else 0
     if not position.joints:
-        return row + [None] * (count * len(_derivative_orders(question)))
+        return row + [None] * (count * len(_derivative_orders(question)) + slopes)
     row += [
         wrap_angle(value) if turning else value
         for value, turning in zip(position.joints, closure.turning, strict=True)
     ]
-    points = closure.points(position) if question.points else {}
-    for point, link in question.points.items():
-        row += _to_xy(points[link, point])
-    if question.rates is None:
-        return row
+    points = closure.named_points(position) if question.points else {}
+    for point in question.points:
+        row += _coordinates(points[point])
     if not position.status.has_rates:
-        return row + [None] * (count * (len(_derivative_orders(question)) - 1))
-    velocity = closure.velocity(position, *question.rates)
-    # Rates of points come together with accelerations; unknown accelerations count as 0.
-    changes = question.accelerations or (0.0,) * len(given)
-    acceleration = closure.acceleration(position, velocity, *changes)
-    motion = closure.point_motion(position, velocity, acceleration) if question.points else {}
-    rates = (velocity.joints, acceleration.joints)[: len(_derivative_orders(question)) - 1]
-    for order, joints in enumerate(rates, start=1):
-        row += joints
-        for point, link in question.points.items():
-            row += _to_xy(motion[link, point][order])
+        return row + [None] * (count * (len(_derivative_orders(question)) - 1) + slopes)
+    if question.rates is not None:
+        row += _rate_cells(closure, question, position)
+    if question.jacobian:
+        row += closure.jacobian(position).ravel().tolist()
     return row
 
 
-def _to_xy(place: complex) -> tuple[float, float]:
-    return place.real, place.imag
+def _rate_cells(
+    closure: StepwiseClosure, question: Question, position: Position
+) -> Iterator[float]:
+    """Yield rates and accelerations, as far as asked for."""
+    assert question.rates is not None
+    velocity = closure.velocity(position, *question.rates)
+    # Rates of points come together with accelerations; unknown accelerations count as 0.
+    changes = question.accelerations or (0.0,) * len(question.rates)
+    acceleration = closure.acceleration(position, velocity, *changes)
+    motion: Mapping[str, Any] = {}
+    if question.points:
+        motion = closure.named_motion(position, velocity, acceleration)
+    rates = (velocity.joints, acceleration.joints)[: len(_derivative_orders(question)) - 1]
+    for order, joints in enumerate(rates, start=1):
+        yield from joints
+        for point in question.points:
+            yield from _coordinates(motion[point][order])
+
+
+def _coordinates(place: complex | tuple[float, ...]) -> tuple[float, ...]:
+    return (place.real, place.imag) if isinstance(place, complex) else place

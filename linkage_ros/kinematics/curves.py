@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import remainder, tau
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.ranges import sample_inputs

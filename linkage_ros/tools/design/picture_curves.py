@@ -136,13 +136,14 @@ def _sweep_branch(
         # Near a toggle the rocker follows the root of the crank: denser samples for a round curve.
         part = 0.5 - 0.5 * np.cos(pi * part)
     crank, joints, trace = [], [], []
+    closure: Any = sweep.closure
     for value in (low + (high - low) * part).tolist():
         position = sweep.position_at(min(max(value, low), high))
         if position.joints:
             crank.append(value)
             joints.append(position.joints)
-            if sweep.closure.linkage.traced:
-                trace.append(sweep.closure.points(position)[COUPLER, 'P'])
+            if closure.linkage.traced:
+                trace.append(closure.points(position)[COUPLER, 'P'])
     relative, rocker = np.unwrap(np.array(joints), axis=0).T
     at = np.array(crank)
     return DesignBranch(side == own, limited, at, rocker, relative + at, tuple(trace))
