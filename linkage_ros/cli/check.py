@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from math import ceil, tau
 import sys
@@ -22,7 +22,7 @@ from linkage_ros.cli.arguments import add_file, add_radians, DisplayUnits, finit
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
-from linkage_ros.description import linkage_content, linkage_notes, read_closure
+from linkage_ros.description import is_spatial, linkage_content, linkage_notes, read_closure
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
     closes_in_two_ways,
@@ -40,6 +40,7 @@ from linkage_ros.kinematics import (
     links_of,
     sides_at,
     Status,
+    StepwiseClosure,
     SweptCurve,
     transmission_angles,
     usual_inputs,
@@ -79,6 +80,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; an invalid file raises before this returns."""
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
+    if is_spatial(content):
+        from linkage_ros.cli.check_space import check_space
+
+        return check_space(content, file.stem, arguments)
     closure = read_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
@@ -103,13 +108,13 @@ def linkage_json(
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
     named = [point for points in linkage.links.values() for point in points]
-    units = dict(zip(linkage.joints, map(_joint_unit, closure.turning), strict=True))
-    units |= {given.joint: _joint_unit(not given.slider) for given in linkage.inputs}
+    units = dict(zip(linkage.joints, map(joint_unit, closure.turning), strict=True))
+    units |= {given.joint: joint_unit(not given.slider) for given in linkage.inputs}
     sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
     # Most of the time goes by here.
     parts = (
-        _examine_reach,
-        _examine_residual,
+        examine_reach,
+        examine_residual,
         _other_assemblies,
         _examine_transmission,
         _examine_conditioning,
@@ -137,17 +142,7 @@ def linkage_json(
             }
             for given in linkage.inputs
         ],
-        'limits': [
-            {
-                'joint': name,
-                'unit': units[name],
-                'low': finite_or_none(limits.low),
-                'high': finite_or_none(limits.high),
-                'velocity': finite_or_none(limits.velocity),
-                'effort': finite_or_none(limits.effort),
-            }
-            for name, limits in linkage.limits.items()
-        ],
+        'limits': list(list_limits(linkage, units)),
         'unwrapped': _counts_turns(closure),
         'groups': [_group_json(closure, index, sides) for index in range(len(structure.groups))],
         'four_bars': [
@@ -165,6 +160,19 @@ def linkage_json(
     }
 
 
+def list_limits(linkage: Any, units: Mapping[str, str]) -> Iterator[dict[str, Any]]:
+    """Yield the limits of the joints, which have units."""
+    for name, limits in linkage.limits.items():
+        yield {
+            'joint': name,
+            'unit': units[name],
+            'low': finite_or_none(limits.low),
+            'high': finite_or_none(limits.high),
+            'velocity': finite_or_none(limits.velocity),
+            'effort': finite_or_none(limits.effort),
+        }
+
+
 def _list_branches(closure: Closure) -> Iterator[dict[str, Any]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
     linkage = closure.linkage
@@ -180,7 +188,7 @@ def _list_branches(closure: Closure) -> Iterator[dict[str, Any]]:
                     'branch': branch.number,
                     'input_low': branch.least,
                     'input_high': branch.most,
-                    'unit': _joint_unit(branch.turning),
+                    'unit': joint_unit(branch.turning),
                     'low': branch.low,
                     'high': branch.high,
                     'turns_back': list(branch.turns_back),
@@ -203,11 +211,11 @@ def _group_json(closure: Closure, number: int, sides: Mapping[str, str]) -> dict
     return {'kind': kind, 'links': links.split(', '), 'method': method, 'assembly': assembly}
 
 
-def _joint_unit(turning: bool) -> str:
+def joint_unit(turning: bool) -> str:
     return 'rad' if turning else 'm'
 
 
-def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
+def examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
     """Return ranges and singular inputs; None if they depend on several inputs."""
     if sweep is None:
         return {'ranges': None, 'singular_inputs': None}
@@ -240,7 +248,7 @@ def _is_reached(sweep: InputSweep, value: float) -> bool:
     return not sweep.closure.bounds or any(sweep.range_about(value + turn) for turn in turns)
 
 
-def _examine_residual(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
+def examine_residual(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
     found = worst_residual(closure)
     if found is None:
         return {'worst_residual': None}
@@ -280,16 +288,20 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
 
 def _examine_transmission(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
     found = transmission_angles(sweep) if sweep is not None else {}
-    return {'transmission_angles': _curve_extremes(closure, found, 'angle_rad')}
+    return {'transmission_angles': curve_extremes(_links_of_group(closure), found, 'angle_rad')}
 
 
 def _examine_conditioning(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
     found = conditioning_curves(sweep) if sweep is not None else {}
-    return {'conditioning': _curve_extremes(closure, found, 'conditioning')}
+    return {'conditioning': curve_extremes(_links_of_group(closure), found, 'conditioning')}
 
 
-def _curve_extremes(
-    closure: Closure, found: Mapping[int, SweptCurve], key: str
+def _links_of_group(closure: Closure) -> Callable[[int], Sequence[str]]:
+    return lambda number: links_of(closure.structure.groups[number])
+
+
+def curve_extremes(
+    links: Callable[[int], Sequence[str]], found: Mapping[int, SweptCurve], key: str
 ) -> list[dict[str, Any]]:
     """Return the extreme values by group, and the inputs where they occur; none if constant."""
 
@@ -299,7 +311,7 @@ def _curve_extremes(
     return [
         {
             'group': number + 1,
-            'links': list(links_of(closure.structure.groups[number])),
+            'links': list(links(number)),
             'least': extreme_json(curve.lowest),
             'greatest': extreme_json(curve.highest),
         }
@@ -366,7 +378,7 @@ def _margin_text(margin: float, units: DisplayUnits) -> str:
 
 
 _GROUP, _LINKS = Column('>', 'group'), Column('links', 'links', form=_join)
-_ORDER = (
+ORDER = (
     Column('>', 'number'),
     Column('group', 'kind'),
     _LINKS,
@@ -379,12 +391,12 @@ def _linkage_tables(account: Mapping[str, Any], units: DisplayUnits) -> Iterator
     """Yield the tables that describe a linkage."""
     yield facts_table(account['file'], _linkage_facts(account, units))
     groups = [{'number': number, **one} for number, one in enumerate(account['groups'], 1)]
-    yield table_of_rows('Solved in this order', 'groups', _ORDER, groups)
+    yield table_of_rows('Solved in this order', 'groups', ORDER, groups)
     input_units = [given['unit'] for given in account['inputs']]
     yield from (
         _assemblies_table(group, input_units, units) for group in account['other_assemblies']
     )
-    found = [_four_bars_table(account, units), *_extremes_tables(account)]
+    found = [_four_bars_table(account, units), *extremes_tables(account)]
     if 'branches' in account:
         found.append(_branches_table(account))
     yield from (table for table in found if table.rows or table.key == 'branches')
@@ -403,7 +415,7 @@ def _four_bars_table(account: Mapping[str, Any], units: DisplayUnits) -> Table:
     return table_of_rows(title, 'four_bars', columns, account['four_bars'])
 
 
-def _extremes_tables(account: Mapping[str, Any]) -> Iterator[Table]:
+def extremes_tables(account: Mapping[str, Any]) -> Iterator[Table]:
     """Yield the tables of transmission angles and conditioning over the range."""
     turning = account['inputs'][0]['unit'] == 'rad'
 
@@ -478,24 +490,28 @@ def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         )
         yield 'input', f'{given["joint"]}: {driven}'
     for limits in account['limits']:
-        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
-    yield from _reach_facts(account, units)
-    worst = account['worst_residual']
+        yield 'limits', f'{limits["joint"]}: {limits_text(limits, units)}'
+    yield from reach_facts(account, units)
+    yield residual_fact(account, units)
+
+
+def residual_fact(account: Mapping[str, Any], units: DisplayUnits) -> tuple[str, str]:
+    """Return the worst residual, where it was met, and among how many positions."""
+    worst, inputs = account['worst_residual'], account['inputs']
     if worst is None:
-        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
-        return
+        return 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
     place = ', '.join(
         units.value_text(value, given['unit'] == 'rad')
         for value, given in zip(worst['inputs'], inputs, strict=True)
     )
     residual = units.format_length(worst['residual_m'], '.1e')
-    yield (
+    return (
         'worst residual',
         f'{residual}, of {worst["positions"]} positions, at {place}',
     )
 
 
-def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
+def reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     if account['ranges'] is None:
         yield 'range', 'not a single one: it depends on every input'
         if account['unwrapped']:
@@ -537,7 +553,7 @@ def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: 
     return 0.0 if abs(value) < _SAME else value
 
 
-def _limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
+def limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
     turning = limits['unit'] == 'rad'
     texts = []
     low, high = (

@@ -115,6 +115,11 @@ from linkage_ros.description.tables import (
     TABLE_KINDS as TABLE_KINDS,
     write_tables as write_tables,
 )
+from linkage_ros.description.space_file import (
+    is_spatial as is_spatial,
+    read_space_closure as read_space_closure,
+)
+from linkage_ros.description.space_grammar import space_schema as space_schema
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.violations import (
     find_violations as find_violations,

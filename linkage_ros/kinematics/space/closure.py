@@ -18,7 +18,7 @@ from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.freedom import check_freedom, find_freedom, Freedom
-from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage
+from linkage_ros.kinematics.space.linkage import check_space_linkage, size_of, SpaceLinkage
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
@@ -30,6 +30,7 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
 )
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+from linkage_ros.kinematics.sweep_analysis import worst_residual
 
 Quaternion = tuple[float, float, float, float]
 
@@ -209,6 +210,12 @@ class SpaceClosure(StepwiseClosure):
             raise ValueError(f'{what}: {position!r} has none; check its status first')
 
     @property
+    def ball_count(self) -> int:
+        """Return the number of points that two links share."""
+        carried = [point for points in self.linkage.links.values() for point in points]
+        return sum(carried.count(point) > 1 for point in self.linkage.points)
+
+    @property
     def slide_bound(self) -> float:
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         return 4.0 * self.scale
@@ -219,12 +226,24 @@ class SpaceClosure(StepwiseClosure):
 
 
 def check_pose(closure: SpaceClosure) -> None:
-    """Refuse a linkage that its own pose does not close, or whose equations are not met."""
+    """Refuse a linkage whose pose does not close, or whose redundant equations are not met."""
     pose = closure.linkage.pose.inputs
     position = closure.close_unlimited(*pose)
     if not position.status.has_rates:
         raise DefinitionError(
             'points', f'the linkage is {position.status.value} in the pose', 'draw another pose'
+        )
+    if not closure.freedom.redundant:
+        return
+    found = worst_residual(closure)
+    gap, inputs = (closure.residual(position), pose) if found is None else found[:2]
+    if gap > _MET * size_of(closure.linkage):
+        count, places = closure.freedom.redundant, ', '.join(f'{value:.4g}' for value in inputs)
+        raise DefinitionError(
+            'points',
+            f'the linkage is over-constrained: {count} equations more than needed, missed by '
+            f'{gap:.3g} m where the input is {places}',
+            'let a hinge be a ball, or give the axes and lengths that meet them',
         )
 
 
