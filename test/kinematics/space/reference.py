@@ -104,3 +104,39 @@ def motion_of(
                 for order, value in enumerate(orders(beside)):
                     kappa[order] += abs(value - found[order]) * mpf(10) ** 15
         return [Quantity(value, float(k)) for value, k in zip(found, kappa, strict=True)]
+
+
+def turn(vector: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:
+    """Return a vector turned about an axis of any length (Rodrigues)."""
+    size = mp.sqrt(dot(axis, axis))
+    unit = [part / size for part in axis]
+    c, s = mp.cos(angle), mp.sin(angle)
+    along, across = dot(unit, vector), cross(unit, vector)
+    return [
+        c * v + s * w + (1 - c) * along * u
+        for v, w, u in zip(vector, across, unit, strict=True)
+    ]
+
+
+def turned_about(point: Sequence[Any], at: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:
+    """Return a point turned about an axis that passes a point."""
+    return [a + v for a, v in zip(at, turn(less(point, at), axis, angle), strict=True)]
+
+
+def angle_to_meet(
+    point: Sequence[Any], at: Sequence[Any], axis: Sequence[Any], to: Row, rod: Any, sign: int
+) -> mpf:
+    """Return the angle about an axis that brings a point to a distance from another one."""
+    z = [part / mp.sqrt(dot(axis, axis)) for part in axis]
+    arm = less(point, at)
+    x = [a - dot(arm, z) * part for a, part in zip(arm, z, strict=True)]
+    x = [part / mp.sqrt(dot(x, x)) for part in x]
+    frame = (x, cross(z, x), z)
+    place, beside = ([dot(way, each) for way in frame] for each in (arm, less(to, at)))
+    return hinge_angle(place, beside, rod, sign)
+
+
+def size_between(one: Sequence[Any], other: Sequence[Any]) -> mpf:
+    """Return a distance."""
+    between = less(one, other)
+    return mp.sqrt(dot(between, between))

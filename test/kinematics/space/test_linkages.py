@@ -1,0 +1,312 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""Spatial linkages from file to joints: exact, consistent, and those of the books."""
+
+from math import atan2, cos, dist, pi, radians, remainder, sin, tan, tau
+from pathlib import Path
+from random import Random
+
+import linkage_ros as lr
+from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
+import numpy as np
+import pytest
+
+from .reference import (
+    angle_to_meet,
+    motion_of,
+    moved,
+    size_between,
+    turned_about,
+)
+from ..reference import Worst
+
+FOLDER = Path(__file__).parent / 'linkages'
+NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))
+LIMIT = 4.0
+"""In u·κ."""
+
+
+def closure_of(name):
+    return lr.load(FOLDER / f'{name}.yaml')
+
+
+def states_of(closure, count, reach=0.3):
+    """Yield inputs about the pose at which a linkage closes, rates and accelerations."""
+    random = Random(closure.name)
+    while count:
+        inputs, rates, changes = (
+            [random.uniform(-1.0, 1.0) for _ in closure.input_names] for _ in range(3)
+        )
+        inputs = [
+            value + reach * part * (0.1 if given.slider else 1.0)
+            for value, part, given in zip(
+                closure.linkage.pose.inputs, inputs, closure.linkage.inputs, strict=True
+            )
+        ]
+        if closure.position(*inputs).status.has_rates:
+            count -= 1
+            yield inputs, rates, changes
+
+
+def joints_at(closure, inputs):
+    return np.array(closure.position(*inputs).joints)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_the_pose_of_the_file_is_solved_at_its_inputs(name):
+    closure = closure_of(name)
+    linkage = closure.linkage
+    position = closure.position(*linkage.pose.inputs)
+    assert position.status is Status.CLOSED
+    drawn = [linkage.pose_value(joint) for joint in closure.joint_names]
+    assert position.joints == pytest.approx(drawn, abs=1e-14)
+    for point, place in closure.points(position).items():
+        assert dist(place, linkage.points[point]) < 1e-15, point
+    for link, (_, quaternion) in closure.frames(position).items():
+        assert quaternion == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-14), link
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_rates_and_accelerations_are_the_derivatives_of_joints_and_points(name):
+    closure, step = closure_of(name), 1e-4
+    for inputs, rates, changes in states_of(closure, 10, 0.2):
+        before, now, after = (
+            closure.position(*moved(inputs, rates, changes, t)) for t in (-step, 0.0, step)
+        )
+        velocity = closure.velocity(now, *rates)
+        acceleration = closure.acceleration(now, velocity, *changes)
+        scale = 1.0 + max(map(abs, (*velocity.joints, *acceleration.joints))) ** 2
+        joints = [np.array(each.joints) for each in (before, now, after)]
+        first, second = _differences(joints, step)
+        assert np.abs(first - velocity.joints).max() < 1e-6 * scale, inputs
+        assert np.abs(second - acceleration.joints).max() < 1e-5 * scale, inputs
+        assert closure.jacobian(now) @ rates == pytest.approx(velocity.joints, rel=1e-9)
+        motion = closure.named_motion(now, velocity, acceleration)
+        assert list(motion) == list(closure.linkage.traced)
+        for point, (_, *found) in motion.items():
+            places = [np.array(each.points[point]) for each in (before, now, after)]
+            for difference, value in zip(_differences(places, step), found, strict=True):
+                assert np.abs(difference - value).max() < 1e-5 * scale
+
+
+def _differences(values, step):
+    before, now, after = values
+    return (after - before) / (2.0 * step), (after - 2.0 * now + before) / step**2
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_links_keep_their_lengths_and_joints_their_axes(name):
+    closure = closure_of(name)
+    linkage = closure.linkage
+    for inputs, _, _ in states_of(closure, 20):
+        position = closure.position(*inputs)
+        assert closure.residual(position) < 1e-14
+        places, frames = closure.points(position), closure.frames(position)
+        for points in linkage.links.values():
+            for one in points:
+                for other in points:
+                    drawn = dist(linkage.points[one], linkage.points[other])
+                    assert dist(places[one], places[other]) == pytest.approx(drawn, abs=1e-14)
+        for hinge in linkage.hinges.values():
+            axes = [_rotate(frames[link][1], hinge.axis) for link in (hinge.parent, hinge.child)]
+            assert axes[0] == pytest.approx(axes[1], abs=1e-13)
+
+
+def _rotate(quaternion, vector):
+    """Return a vector rotated by a quaternion (x, y, z, w)."""
+    *axis, w = quaternion
+    once = np.cross(axis, vector)
+    return vector + 2.0 * (w * once + np.cross(axis, once))
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
+    closure = closure_of(name)
+    compiled = closure.compile_linkage(2)
+    states = list(states_of(closure, 30))
+    fast = 0
+    for inputs, rates, changes in states:
+        position = closure.position(*inputs)
+        velocity = closure.velocity(position, *rates)
+        expected = (
+            position.joints, velocity.joints,
+            closure.acceleration(position, velocity, *changes).joints,
+        )  # fmt: skip
+        answer = compiled(*inputs, *rates, *changes)
+        assert answer.values == expected
+        fast += compiled.fast(*inputs, *rates, *changes) is not None
+    assert fast == len(states)
+    columns = [list(zip(*each, strict=True)) for each in zip(*states, strict=True)]
+    given = columns if len(closure.input_names) > 1 else [each[0] for each in columns]
+    batch = closure.solve(*columns[0], rates=given[1], accelerations=given[2])
+    one = [compiled(*inputs, *rates, *changes).values for inputs, rates, changes in states]
+    for order, values in enumerate(batch[1:]):
+        assert values.T == pytest.approx(np.array([each[order] for each in one]), abs=1e-9)
+
+
+def random_rssr(random):
+    """Return a crank and a rocker about skew axes, with a rod between them."""
+
+    def vector(reach=1.0):
+        return tuple(random.uniform(-reach, reach) for _ in range(3))
+
+    return SpaceLinkage(
+        points={'A': vector(0.4), 'B': vector()},
+        links={'crank': ('A',), 'rod': ('A', 'B'), 'rocker': ('B',)},
+        hinges={
+            'crank': SpatialJoint('ground', 'crank', vector(), vector(0.1)),
+            'rocker': SpatialJoint('ground', 'rocker', vector(), vector()),
+        },
+        slides={},
+        struts={},
+        driven=('crank',),
+        published=('rocker',),
+    )
+
+
+def test_random_rssr_linkages_are_as_exact_as_their_numbers():
+    random, worst, closed = Random('rssr'), Worst(), 0
+    while closed < 50:
+        linkage = random_rssr(random)
+        try:
+            closure = SpaceClosure(linkage)
+        except lr.LinkageError:
+            continue  # It is drawn at a toggle.
+        state = [random.uniform(-1.0, 1.0) for _ in range(3)]
+        position = closure.position(state[0])
+        if not position.status.has_rates:
+            continue
+        closed += 1
+        velocity = closure.velocity(position, state[1])
+        found = (
+            position.joints[0], velocity.joints[0],
+            closure.acceleration(position, velocity, state[2]).joints[0],
+        )  # fmt: skip
+        crank, rocker = linkage.hinges.values()
+        places = (*linkage.points.values(), crank.at, crank.axis, rocker.at, rocker.axis)
+        sign = 1 if closure.steps[-1].sign > 0.0 else -1
+
+        def angle(numbers, t, sign=sign):
+            a, b, at, axis, to_at, to_axis = (numbers[3 * k : 3 * k + 3] for k in range(6))
+            q, w, change = numbers[18:]
+            now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
+            return angle_to_meet(b, to_at, to_axis, now, size_between(a, b), sign)
+
+        truth = motion_of(angle, [n for place in places for n in place] + state)
+        case = (linkage, state)
+        worst.note('rocker', truth[0].half_turn_error_of(found[0]), LIMIT, case)
+        worst.note('rate', truth[1].error_of(found[1]), LIMIT, case)
+        worst.note('acceleration', truth[2].error_of(found[2]), LIMIT, case)
+    worst.check()
+
+
+def test_an_ankle_driven_by_its_joints_is_as_exact_as_its_numbers():
+    closure, worst = closure_of('ankle'), Worst()
+    linkage = closure.linkage
+    for inputs, rates, changes in states_of(closure, 20, 0.5):
+        position = closure.position(*inputs)
+        velocity = closure.velocity(position, *rates)
+        acceleration = closure.acceleration(position, velocity, *changes)
+        for k, (motor, bar, foot) in enumerate((('m1', 'b1', 'c1'), ('m2', 'b2', 'c2'))):
+            sign = 1 if closure.steps[-1 - 1 * (k == 0)].sign > 0.0 else -1
+            names = ('pitch', 'roll', motor)
+            hinges = [linkage.hinges[name] for name in names]
+            places = [linkage.points[bar], linkage.points[foot]]
+            places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
+
+            def angle(numbers, t, sign=closure_sign(closure, motor)):
+                b, c, at1, axis1, at2, axis2, at3, axis3 = (
+                    numbers[3 * n : 3 * n + 3] for n in range(8)
+                )
+                pitch, roll = (
+                    numbers[24 + n] + numbers[26 + n] * t + numbers[28 + n] * t * t / 2
+                    for n in range(2)
+                )
+                now = turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
+                return angle_to_meet(b, at3, axis3, now, size_between(b, c), sign)
+
+            numbers = [n for place in places for n in place]
+            truth = motion_of(angle, [*numbers, *inputs, *rates, *changes])
+            case = (motor, inputs)
+            worst.note('angle', truth[0].half_turn_error_of(position.joints[k]), LIMIT, case)
+            worst.note('rate', truth[1].error_of(velocity.joints[k]), LIMIT, case)
+            worst.note('acceleration', truth[2].error_of(acceleration.joints[k]), LIMIT, case)
+    worst.check()
+
+
+def closure_sign(closure, joint):
+    """Return the sign of the step that closes a joint, as the check of a file names it."""
+    (group,) = (one for one in closure.groups if one.method.startswith(f'{joint},'))
+    return 1 if group.assembly.startswith('+') else -1
+
+
+def test_a_delta_there_and_back_is_where_it_was():
+    arms, platform = closure_of('delta_inverse'), closure_of('delta')
+    for inputs, _, _ in states_of(arms, 200):
+        there = arms.position(*inputs)
+        back = platform.position(*there.joints)
+        assert back.joints == pytest.approx(inputs, abs=1e-14)
+        product = platform.jacobian(back) @ arms.jacobian(there)
+        assert product == pytest.approx(np.eye(3), abs=1e-11)
+
+
+@pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
+def test_a_universal_joint_turns_as_in_the_books(angle):
+    """tan(out) = tan(in)·cos β if the fork of the input lies in the plane of the shafts."""
+    closure = closure_of('hooke')
+    position = closure.position(angle)
+    # In the pose the pin of the input is across that plane: in = 90° of the formula.
+    expected = atan2(cos(radians(30)) * sin(angle), cos(angle))
+    across = atan2(sin(angle), cos(angle) * cos(radians(30)))
+    found = position['out']
+    assert min(abs(remainder(found - each, tau)) for each in (expected, across)) < 1e-14
+    assert abs(remainder(found - expected, tau)) < 1e-14
+
+
+@pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
+def test_a_bennett_linkage_turns_as_in_the_books(angle):
+    """tan(θ1/2)·tan(θ2/2) is constant: sin((β + α)/2)/sin((β − α)/2) (Bennett, 1914)."""
+    closure = closure_of('bennett')
+    position = closure.position(angle)
+    alpha, beta, start = radians(40), radians(75), radians(70)
+    constant = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
+    second = 2.0 * atan2(constant, tan(start / 2))
+    expected = 2.0 * atan2(constant * cos((start + angle) / 2), sin((start + angle) / 2)) - second
+    assert abs(remainder(position['h2'] - expected, tau)) < 1e-12
+    assert abs(remainder(position['h3'] + angle, tau)) < 1e-12
+
+
+def test_a_planar_four_bar_in_space_is_the_planar_one(tmp_path):
+    planar = tmp_path / 'planar.yaml'
+    planar.write_text(
+        'four_bar: {a: 0.04, b: %r, c: %r, d: 0.1, assembly: left}\n'
+        % (dist((0, 0.04), (0.11, 0.08)), dist((0.1, 0), (0.11, 0.08)))
+    )
+    flat, space = lr.load(planar), closure_of('four_bar')
+    start = flat.position(pi / 2.0)
+    for angle in np.linspace(0.0, 6.0, 50).tolist():
+        one, other = flat.position(angle), space.position(angle)
+        for name, joint in (('rocker', 'rocker_joint'), ('coupler', 'coupler_joint')):
+            moved_by = one[joint] - start[joint]
+            assert abs(remainder(other[name] - moved_by, tau)) < 1e-14
+
+
+def test_states_in_any_order_have_the_same_bits():
+    closure = closure_of('wishbone')
+    states = [inputs for inputs, _, _ in states_of(closure, 100)]
+    forward = [closure.position(*inputs).joints for inputs in states]
+    assert [closure.position(*inputs).joints for inputs in reversed(states)] == forward[::-1]
+
+
+def test_a_jacobian_in_the_plane_too():
+    closure = lr.load('five_bar')
+    position = closure.position(1.9, 1.2)
+    columns = [closure.velocity(position, *rates).joints for rates in ((1.0, 0.0), (0.0, 1.0))]
+    assert closure.jacobian(position).T.tolist() == [list(column) for column in columns]
+    with pytest.raises(ValueError, match='has none'):
+        closure.jacobian(closure.position(0.0, pi))
