@@ -212,6 +212,7 @@ def _group_json(closure: Closure, number: int, sides: Mapping[str, str]) -> dict
 
 
 def joint_unit(turning: bool) -> str:
+    """Return the unit of a joint that turns, or slides."""
     return 'rad' if turning else 'm'
 
 
@@ -249,6 +250,7 @@ def _is_reached(sweep: InputSweep, value: float) -> bool:
 
 
 def examine_residual(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+    """Return the worst residual; None if the loops close nowhere on a grid."""
     found = worst_residual(closure)
     if found is None:
         return {'worst_residual': None}
@@ -512,6 +514,7 @@ def residual_fact(account: Mapping[str, Any], units: DisplayUnits) -> tuple[str,
 
 
 def reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
+    """Yield the ranges of the input, and its singular places."""
     if account['ranges'] is None:
         yield 'range', 'not a single one: it depends on every input'
         if account['unwrapped']:
@@ -554,6 +557,7 @@ def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: 
 
 
 def limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
+    """Return the limits of a joint as text."""
     turning = limits['unit'] == 'rad'
     texts = []
     low, high = (

@@ -96,7 +96,6 @@ def _facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[st
     if account['redundant_equations']:
         yield (
             'redundant',
-            f'{account["redundant_equations"]} equations more than needed, met within the '
-            'worst residual',
+            f'{account["redundant_equations"]} equations, met within the worst residual',
         )
     yield residual_fact(account, units)

@@ -359,14 +359,17 @@ def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Co
             for axis in _axes(closure):
                 yield _state_column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
 
-
     if question.jacobian:
         for joint in linkage.joints.items():
             for given in linkage.inputs:
                 same = joint[1].unit == given.unit
                 unit = '' if same else f'{joint[1].unit}/{given.unit}'
-                yield Column(f'>{joint[0]} by {given.joint}', f'{joint[0]} by {given.joint}', unit,
-                             lambda value, _: '' if value is None else f'{value:.{_DIGITS}f}')
+                yield Column(
+                    f'>{joint[0]} by {given.joint}',
+                    f'{joint[0]} by {given.joint}',
+                    unit,
+                    lambda value, _: '' if value is None else f'{value:.{_DIGITS}f}',
+                )
 
 
 def _axes(closure: StepwiseClosure) -> str:
@@ -381,7 +384,9 @@ def _derivative_orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _state_row(closure: StepwiseClosure, question: Question, given: tuple[float, ...]) -> list[Any]:
+def _state_row(
+    closure: StepwiseClosure, question: Question, given: tuple[float, ...]
+) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
     row: list[Any] = [*given]
     position = closure.position(*given)

@@ -17,7 +17,7 @@ from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import SPACE
 from linkage_ros.description.units import Units
-from linkage_ros.errors import did_you_mean, DefinitionError, list_names, quote
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
     check_pose,
@@ -54,7 +54,8 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     joints: dict[str, dict[str, SpatialJoint]] = {}
     for kind in ('hinges', 'slides'):
         joints[kind] = {}
-        for joint, of in values.get(kind, {}).items():
+        for joint, given in values.get(kind, {}).items():
+            of = dict(given)
             if through := of.pop('through', None):
                 of |= _axis_through(content, f'{kind}.{joint}.through', through, points)
                 for link in (of['parent'], of['child']):

@@ -109,6 +109,10 @@ def _by_name(meaning: str, of: Kind) -> Any:
     return declare(Named(meaning, of, MOST_LINKS), None)
 
 
+def _group(of: Keys) -> ParameterGroup:
+    return ParameterGroup(of.meaning, of)
+
+
 _ENDS = {
     'parent': text('the link that carries it, or the ground'),
     'child': text('the link that it moves'),
@@ -159,8 +163,8 @@ SPACE = Keys(
             ),
             None,
         ),
-        'hinges': _by_name('Hinges between links, by name.', ParameterGroup(_HINGE.meaning, _HINGE)),
-        'slides': _by_name('Slides between links, by name.', ParameterGroup(_SLIDE.meaning, _SLIDE)),
+        'hinges': _by_name('Hinges between links, by name.', _group(_HINGE)),
+        'slides': _by_name('Slides between links, by name.', _group(_SLIDE)),
         'struts': _by_name(
             'Pairs of points whose distance is a joint, such as a cylinder, by name.',
             _TwoPoints('its two points', TextOf('a point')),
@@ -175,7 +179,7 @@ SPACE = Keys(
             ),
             None,
         ),
-        'ratios': _by_name(RATIO.meaning, ParameterGroup(RATIO.meaning, RATIO)),
+        'ratios': _by_name(RATIO.meaning, _group(RATIO)),
         'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
     },
 )  # fmt: skip

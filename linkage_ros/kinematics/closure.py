@@ -22,7 +22,13 @@ from linkage_ros.kinematics.limits import without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
 from linkage_ros.kinematics.ranges import closing_ranges, link_lengths
-from linkage_ros.kinematics.results import Acceleration, InputRange, PointMotion, Position, Velocity
+from linkage_ros.kinematics.results import (
+    Acceleration,
+    InputRange,
+    PointMotion,
+    Position,
+    Velocity,
+)
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 from linkage_ros.kinematics.topology import assur_groups, Driven, Dyad, links_of, Structure

@@ -424,7 +424,7 @@ class StepwiseClosure:
     def named_motion(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> Mapping[str, Any]:
-        """Return place, velocity and acceleration of points by their names, traced ones at least."""
+        """Return place, velocity and acceleration of points by name, of traced ones at least."""
         raise NotImplementedError
 
     def residual(self, position: Position) -> float:

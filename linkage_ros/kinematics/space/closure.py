@@ -9,12 +9,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from itertools import pairwise
 from math import dist, sqrt
-from typing import Any
 
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.freedom import check_freedom, find_freedom, Freedom
@@ -64,12 +62,12 @@ class SpaceClosure(StepwiseClosure):
     """
 
     linkage: SpaceLinkage
-    turns_with: Any = {}
 
     def __init__(self, linkage: SpaceLinkage, name: str = '') -> None:
         if not isinstance(linkage, SpaceLinkage):
             raise TypeError(f'linkage: {quote(linkage)} is not a SpaceLinkage; load() reads files')
         check_space_linkage(linkage)
+        self.turns_with = {}
         self._plan = plan = SpacePlan(linkage)
         self._set_linkage(linkage, name, plan.scale)
         self.freedom: Freedom = find_freedom(linkage, plan)
@@ -152,7 +150,9 @@ class SpaceClosure(StepwiseClosure):
             if link in plan.frames:
                 frame, drawn = position.state.pins[plan.frames[link]], plan.pose_frames[link]
                 # The columns of the rotation from the pose.
-                columns = [frame.turn(drawn.resolve(axis)) for axis in plan.pose_frames['ground'][:3]]
+                columns = [
+                    frame.turn(drawn.resolve(axis)) for axis in plan.pose_frames['ground'][:3]
+                ]
                 found[link] = (scale(self.scale, frame.origin), _quaternion_of(columns))
             else:
                 points = self.points(position)
@@ -173,13 +173,17 @@ class SpaceClosure(StepwiseClosure):
         state = position.state
         known = {name: state.pins[index] for name, index in plan.points.items()}
         for point, links in plan.carriers.items():
-            places = [self._carried_place(position, one, point) for one in links if one in plan.frames]
+            places = [
+                self._carried_place(position, one, point) for one in links if one in plan.frames
+            ]
             places += [known[point]] if point in known else []
-            worst = max(worst, *(dist(places[0], place) for place in places), 0.0) if places else worst
+            worst = (
+                max(worst, *(dist(places[0], place) for place in places), 0.0) if places else worst
+            )
             known.setdefault(point, places[0]) if places else None
         for link in plan.idle:
             points = plan.carried[link]
-            for one, other in zip(points, points[1:]):
+            for one, other in pairwise(points):
                 size = dist(plan.places[one], plan.places[other])
                 worst = max(worst, abs(dist(known[one], known[other]) - size))
         for name in self.linkage.slides:
@@ -270,5 +274,3 @@ def _shortest_turn(one: Vector, other: Vector) -> Quaternion:
         return 0.0, 0.0, 0.0, 1.0
     x, y, z = scale(0.5 / half, cross(one, other))
     return x, y, z, half
-
-

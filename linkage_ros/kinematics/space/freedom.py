@@ -143,7 +143,7 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
 
 
 def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[str]) -> bool:
-    """Return whether a point lies on the axis of a hinge between two links, which then holds it."""
+    """Return whether a point lies on the axis of a hinge between two links."""
     place = np.array(plan.places[point])
     for hinge in linkage.hinges.values():
         arm = place - np.array(hinge.at) / plan.scale

@@ -250,5 +250,3 @@ def size_of(linkage: SpaceLinkage) -> float:
     places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
     extents = [max(one) - min(one) for one in zip(*places, strict=True)]
     return max(extents, default=0.0) or 1.0
-
-

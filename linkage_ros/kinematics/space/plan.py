@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from math import atan2, dist, frexp, hypot, ldexp, lcm, tau
+from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
@@ -463,7 +463,9 @@ class SpacePlan:
             return False
         return self._meet(point, list(self._distances(point)), {})
 
-    def _meet(self, point: str, pairs: list[_Pair], shifts: dict[_Pair, tuple[str, Vector]]) -> bool:
+    def _meet(
+        self, point: str, pairs: list[_Pair], shifts: dict[_Pair, tuple[str, Vector]]
+    ) -> bool:
         """Place a point by the first three pairs that tell it; some are shifted beside a point."""
         for three in combinations(pairs, 3):
             if len({pair.known for pair in three}) < 3 and not shifts:
@@ -534,9 +536,7 @@ class SpacePlan:
         self._add_resolved(tuple(chain), root, self.points[point], self.places[point])
         return True
 
-    def _add_resolved(
-        self, names: tuple[str, ...], root: str, point: int, place: Vector
-    ) -> None:
+    def _add_resolved(self, names: tuple[str, ...], root: str, point: int, place: Vector) -> None:
         """Measure the slides that lead from a link to a point."""
         on, chain = self.pose_frames[root], self._linkage.between
         link, axes = root, []

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt
@@ -39,7 +38,6 @@ from linkage_ros.kinematics.space.vectors import (
     length,
     minus,
     Motion,
-    multiply,
     plus,
     scale,
     STILL,
@@ -269,9 +267,7 @@ class ClosedJoint:
         solved.coordinates.append(value)
         solved.pins.append(self.joint.child_frame(base, value))
 
-    def rates(
-        self, pose: ClosedPose, solved: LinkState, velocities: LinkState
-    ) -> ClosedRates:
+    def rates(self, pose: ClosedPose, solved: LinkState, velocities: LinkState) -> ClosedRates:
         """
         Append the rates of the joint and of its child.
 
@@ -686,5 +682,3 @@ class MeasuredStrut:
     def _between(self, state: LinkState) -> Vector:
         one, other = (state.pins[index] for index in self.points)
         return minus(other, one)
-
-

@@ -113,8 +113,7 @@ def turn(vector: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:
     c, s = mp.cos(angle), mp.sin(angle)
     along, across = dot(unit, vector), cross(unit, vector)
     return [
-        c * v + s * w + (1 - c) * along * u
-        for v, w, u in zip(vector, across, unit, strict=True)
+        c * v + s * w + (1 - c) * along * u for v, w, u in zip(vector, across, unit, strict=True)
     ]
 
 

@@ -128,7 +128,7 @@ def _rotate(quaternion, vector):
 def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
     closure = closure_of(name)
     compiled = closure.compile_linkage(2)
-    states = list(states_of(closure, 30))
+    states = list(states_of(closure, 30, 0.1))
     fast = 0
     for inputs, rates, changes in states:
         position = closure.position(*inputs)
@@ -146,7 +146,7 @@ def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
     batch = closure.solve(*columns[0], rates=given[1], accelerations=given[2])
     one = [compiled(*inputs, *rates, *changes).values for inputs, rates, changes in states]
     for order, values in enumerate(batch[1:]):
-        assert values.T == pytest.approx(np.array([each[order] for each in one]), abs=1e-9)
+        assert pytest.approx(np.array([each[order] for each in one]), abs=1e-9) == values.T
 
 
 def random_rssr(random):
@@ -213,13 +213,14 @@ def test_an_ankle_driven_by_its_joints_is_as_exact_as_its_numbers():
         velocity = closure.velocity(position, *rates)
         acceleration = closure.acceleration(position, velocity, *changes)
         for k, (motor, bar, foot) in enumerate((('m1', 'b1', 'c1'), ('m2', 'b2', 'c2'))):
-            sign = 1 if closure.steps[-1 - 1 * (k == 0)].sign > 0.0 else -1
             names = ('pitch', 'roll', motor)
             hinges = [linkage.hinges[name] for name in names]
             places = [linkage.points[bar], linkage.points[foot]]
             places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
 
-            def angle(numbers, t, sign=closure_sign(closure, motor)):
+            sign = closure_sign(closure, motor)
+
+            def angle(numbers, t, sign=sign):
                 b, c, at1, axis1, at2, axis2, at3, axis3 = (
                     numbers[3 * n : 3 * n + 3] for n in range(8)
                 )
@@ -283,10 +284,9 @@ def test_a_bennett_linkage_turns_as_in_the_books(angle):
 
 def test_a_planar_four_bar_in_space_is_the_planar_one(tmp_path):
     planar = tmp_path / 'planar.yaml'
-    planar.write_text(
-        'four_bar: {a: 0.04, b: %r, c: %r, d: 0.1, assembly: left}\n'
-        % (dist((0, 0.04), (0.11, 0.08)), dist((0.1, 0), (0.11, 0.08)))
-    )
+    b, c = dist((0.0, 0.04), (0.11, 0.08)), dist((0.1, 0.0), (0.11, 0.08))
+    lengths = f'{{a: 0.04, b: {b!r}, c: {c!r}, d: 0.1, assembly: left}}'
+    planar.write_text(f'four_bar: {lengths}\n')
     flat, space = lr.load(planar), closure_of('four_bar')
     start = flat.position(pi / 2.0)
     for angle in np.linspace(0.0, 6.0, 50).tolist():

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 """Each step in space is as exact as its numbers allow, far from toggles and next to them."""
 
-from math import atan2, cos, dist, hypot, log10, pi, sin, sqrt
+from math import atan2, cos, dist, hypot, pi, sin, sqrt
 from random import Random
 
 from linkage_ros.kinematics import Status
@@ -43,9 +43,7 @@ def _run(step, ends, velocities, changes):
     accelerations = LinkState([0.0], [STILL, *map(tuple, changes)])
     pose = step.close(solved)
     if pose.status.has_rates:
-        step.accelerations(
-            pose, step.rates(pose, solved, rates), solved, rates, accelerations
-        )
+        step.accelerations(pose, step.rates(pose, solved, rates), solved, rates, accelerations)
     return pose, (solved, rates, accelerations)
 
 
@@ -55,8 +53,8 @@ def _compare(worst, name, truth, found, case, angle=False):
         worst.note(f'{name}, order {order}', error(value), LIMIT, case)
 
 
-@pytest.mark.parametrize('near', (False, True))
-@pytest.mark.parametrize('sign', (1, -1))
+@pytest.mark.parametrize('near', [False, True])
+@pytest.mark.parametrize('sign', [1, -1])
 def test_a_hinge_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
     random, worst = Random(f'hinge {near} {sign}'), Worst()
     for apart in _distances(random, near):
@@ -83,8 +81,8 @@ def test_a_hinge_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
     worst.check()
 
 
-@pytest.mark.parametrize('near', (False, True))
-@pytest.mark.parametrize('sign', (1, -1))
+@pytest.mark.parametrize('near', [False, True])
+@pytest.mark.parametrize('sign', [1, -1])
 def test_a_slide_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
     random, worst = Random(f'slide {near} {sign}'), Worst()
     for apart in _distances(random, near):
@@ -103,8 +101,8 @@ def test_a_slide_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
     worst.check()
 
 
-@pytest.mark.parametrize('near', (False, True))
-@pytest.mark.parametrize('sign', (1, -1))
+@pytest.mark.parametrize('near', [False, True])
+@pytest.mark.parametrize('sign', [1, -1])
 def test_a_point_at_three_distances_is_as_exact_as_its_numbers(near, sign):
     random, worst = Random(f'three {near} {sign}'), Worst()
     for apart in list(_distances(random, near))[: COUNT // 3]:
@@ -114,9 +112,7 @@ def test_a_point_at_three_distances_is_as_exact_as_its_numbers(near, sign):
         x, y = ([q - p for p, q in zip(ends[0], end, strict=True)] for end in ends[1:])
         n = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
         up = sign * (sqrt(2.0 * apart) if near else sin(apart)) / hypot(*n)
-        place = [
-            p + a * u + b * v + up * w for p, u, v, w in zip(ends[0], x, y, n, strict=True)
-        ]
+        place = [p + a * u + b * v + up * w for p, u, v, w in zip(ends[0], x, y, n, strict=True)]
         rods = [dist(place, end) for end in ends]
         step = ThreeDistances((1, 2, 3), tuple(map(Rod, rods)), float(sign), 4)
         case = (ends, rods)
