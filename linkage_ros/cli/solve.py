@@ -360,16 +360,15 @@ def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Co
                 yield _state_column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
 
     if question.jacobian:
-        for joint in linkage.joints.items():
+        for name, joint in linkage.joints.items():
             for given in linkage.inputs:
-                same = joint[1].unit == given.unit
-                unit = '' if same else f'{joint[1].unit}/{given.unit}'
-                yield Column(
-                    f'>{joint[0]} by {given.joint}',
-                    f'{joint[0]} by {given.joint}',
-                    unit,
-                    lambda value, _: '' if value is None else f'{value:.{_DIGITS}f}',
-                )
+                unit = '' if joint.unit == given.unit else f'{joint.unit}/{given.unit}'
+                slope = f'{name} by {given.joint}'
+                yield Column(f'>{slope}', slope, unit, _slope_text)
+
+
+def _slope_text(slope: float | None, _units: DisplayUnits) -> str:
+    return '' if slope is None else f'{slope:.{_DIGITS}f}'
 
 
 def _axes(closure: StepwiseClosure) -> str:

@@ -57,7 +57,7 @@ _MOST_SIDES = 5
 
 def looks_like_linkage(content: Section) -> bool:
     """Return whether a file of unknown kind has the keys of a linkage."""
-    return any(key in content for key in ('links', *SHORTHANDS))
+    return any(key in content for key in ('links', 'points', *SHORTHANDS))
 
 
 def load(linkage: str | PathLike[str]) -> Closure | Any:
