@@ -105,6 +105,11 @@ from linkage_ros.description.scene_grammar import (
 )
 from linkage_ros.description.scene_settings import apply_settings as apply_settings
 from linkage_ros.description.section import Section as Section
+from linkage_ros.description.space_file import (
+    is_spatial as is_spatial,
+    read_space_closure as read_space_closure,
+)
+from linkage_ros.description.space_grammar import space_schema as space_schema
 from linkage_ros.description.tables import (
     block_rows as block_rows,
     check_kind as check_kind,
@@ -115,11 +120,6 @@ from linkage_ros.description.tables import (
     TABLE_KINDS as TABLE_KINDS,
     write_tables as write_tables,
 )
-from linkage_ros.description.space_file import (
-    is_spatial as is_spatial,
-    read_space_closure as read_space_closure,
-)
-from linkage_ros.description.space_grammar import space_schema as space_schema
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.violations import (
     find_violations as find_violations,
