@@ -38,7 +38,7 @@ NOT_RUN = {
     'needs a ROS installation': 18,
     'needs a second machine': 1,
     'needs a demo that runs in another terminal': 1,
-    'needs the ros2 command line': 1,
+    'needs the ros2 command line': 2,
     'opens a browser': 3,
     'the importer is another program': 1,
 }
