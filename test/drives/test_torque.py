@@ -22,7 +22,7 @@ from linkage_ros.dynamics import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure, Mass, Status
 from linkage_ros.messages import EffortCommand, Rejection
-from linkage_ros.stages.drives import Context, TOPIC, TorqueDrive
+from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 
 from .contexts import two_inputs
@@ -366,7 +366,7 @@ def scene(drive_text, effects=''):
 
 def test_a_scene_is_driven_by_commands():
     pipeline = scene('{start: 0.5, rate: 0}')
-    assert pipeline.topic == TOPIC
+    assert pipeline.topic == TorqueDrive.listens_to
     first = pipeline.tick(BEGIN).states[0].reading
     assert first.joints[0] == 0.5, 'the input is published first'
     message = serialized(['other', 'crank_joint'], efforts=[9.0, 0.02])
