@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-from importlib import import_module
 from importlib.util import find_spec
 from os.path import isfile
 from pathlib import Path
@@ -46,7 +45,7 @@ from linkage_ros.description import (
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
-from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.drives import drive_class, DRIVES
 from linkage_ros.stages.effects import effect_class, EFFECTS, effects_requiring
 from linkage_ros.stages.faults import FAULTS
 from linkage_ros.tick import LinkagePipeline, Pipeline
@@ -270,9 +269,7 @@ def parameters_of(what: str, name: str) -> Any:
     """Return the parameter type of a drive, effect or fault."""
     if what == 'fault':
         return FAULTS[name]
-    if what == 'effect':
-        return effect_class(name)
-    return import_module(REGISTRIES[what][name]).PARAMETERS
+    return effect_class(name) if what == 'effect' else drive_class(name)
 
 
 def table_of(what: str, name: str) -> Table:

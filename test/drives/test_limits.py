@@ -12,8 +12,7 @@ from hypothesis import given, settings, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Status
 from linkage_ros.messages import EffortCommand
-from linkage_ros.stages.drives import ProfileParameters, value_range
-from linkage_ros.stages.drives.profile import motion_curve
+from linkage_ros.stages.drives import ProfileDrive
 import pytest
 
 from ..support.scenes import four_bar_text, pipeline_of, symmetric_five_bar
@@ -119,10 +118,10 @@ def test_what_is_refused_when_the_scene_is_built(name):
 )
 def test_between_which_values_a_table_stays(values, interpolation, repeat):
     table = tuple((float(2 * i), value) for i, value in enumerate(values))
-    parameters = ProfileParameters(table, interpolation, repeat)
-    low, high = value_range(parameters)
+    parameters = ProfileDrive(table, interpolation, repeat)
+    low, high = parameters.value_range()
     seen = [
-        motion_curve(parameters)(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)
+        parameters.motion_curve()(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)
     ]
     if not repeat or values[0] == values[-1]:
         assert low == pytest.approx(min(seen), abs=1e-4)

@@ -21,8 +21,7 @@ from linkage_ros.dynamics import AppliedLoads, JointLoad, Loads, Motor
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import EffortCommand
-from linkage_ros.stages.drives import Context, MotorParameters, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, MotorParameters, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -49,7 +48,7 @@ def drive(motor, closure=WHEEL, loads=None, **parameters):
     parameters = {'timeout': 3600.0, 'method': 'gauss_legendre', **parameters}
     loads = loads or Loads(drive_inertia=INERTIA)
     context = Context(closure, 1000.0, True, 'seed', loads, None)
-    return build(TorqueParameters(motor=motor, **parameters), context)
+    return TorqueDrive(motor=motor, **parameters).build(context)
 
 
 def under(built, command, milliseconds=2000, every=50):

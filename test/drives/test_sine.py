@@ -11,8 +11,7 @@
 from math import pi
 
 from hypothesis import given, strategies as st
-from linkage_ros.stages.drives import CrankState, Sine, SineParameters
-from linkage_ros.stages.drives.sine import build, motion_curve
+from linkage_ros.stages.drives import CrankState, Sine, SineDrive
 from mpmath import mp
 import pytest
 
@@ -37,7 +36,7 @@ def check(parameters, time):
 
         expected = [mp.diff(position, mp.mpf(time) / SECOND, n) for n in range(3)]
         w = 2 * mp.pi * f
-        found = motion_curve(parameters)(time)
+        found = parameters.motion_curve()(time)
         limits = (ROUNDING * A + abs(mean) * 2e-16, ROUNDING * A * w, ROUNDING * A * w * w)
         for value, wanted, limit in zip(found, expected, limits, strict=True):
             assert abs(value - wanted) <= limit
@@ -68,19 +67,15 @@ def test_however_late_it_is(amplitude, frequency, phase, time):
 
 @pytest.mark.parametrize('periods', [1, 10**6, 10**12 + 1])
 def test_whole_periods_repeat_to_the_last_bit(periods):
-    sine = motion_curve(
-        Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3)
-    )  # a period is 8 ms
+    # A period is 8 ms.
+    sine = Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3).motion_curve()
     for time in range(0, 8_000_000, 999_983):
         assert sine(time + periods * 8_000_000) == sine(time)
 
 
 def test_of_several_inputs_each_has_its_own():
     own = {'left_crank': Sine(amplitude=0.5, frequency=0.25, mean=2.0)}
-    drive = build(
-        SineParameters(amplitude=1.0, frequency=0.25, inputs=own),
-        two_inputs(),
-    )
+    drive = SineDrive(amplitude=1.0, frequency=0.25, inputs=own).build(two_inputs())
     assert (drive.stamp, drive.max_age) == (0, 0)
     rate = pi / 2
     state = drive.state(5 * SECOND)

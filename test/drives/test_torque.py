@@ -22,8 +22,7 @@ from linkage_ros.dynamics import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure, Mass, Status
 from linkage_ros.messages import EffortCommand, Rejection
-from linkage_ros.stages.drives import Context, reader, TOPIC, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 
 from .contexts import two_inputs
@@ -48,7 +47,7 @@ DOUBLE_ROCKER = four_bar(dict.fromkeys(('crank', 'coupler', 'rocker'), ROD), 0.0
 
 def drive(closure, loads=None, friction=None, **parameters):
     context = Context(closure, 1000.0, True, 'seed', loads, friction)
-    return build(TorqueParameters(**parameters), context)
+    return TorqueDrive(**parameters).build(context)
 
 
 def wheel(**parameters):
@@ -181,7 +180,7 @@ def test_it_tells_what_time_was_lost():
 
 def test_slow_ticks_lose_no_time():
     context = Context(WHEEL, 0.25, True, 'seed', MOTOR, None)
-    turned = build(TorqueParameters(rate=1.0, step=0.01), context)
+    turned = TorqueDrive(rate=1.0, step=0.01).build(context)
     for second in range(0, 13, 4):
         assert turned.state(BEGIN + second * SECOND).angles == pytest.approx((second,))
     assert turned.lost == 0
@@ -348,7 +347,7 @@ def test_what_cannot_be_built_is_said_in_one_line(context, parameters, line):
     if isinstance(context, Closure):
         context = Context(context, 1000.0, True, 'seed', None, None)
     with pytest.raises(DefinitionError) as raised:
-        build(TorqueParameters(**parameters), context)
+        TorqueDrive(**parameters).build(context)
     assert str(raised.value).startswith(line)
 
 
@@ -367,7 +366,7 @@ def scene(drive_text, effects=''):
 
 def test_a_scene_is_driven_by_commands():
     pipeline = scene('{start: 0.5, rate: 0}')
-    assert pipeline.topic == TOPIC
+    assert pipeline.topic == TorqueDrive.listens_to
     first = pipeline.tick(BEGIN).states[0].reading
     assert first.joints[0] == 0.5, 'the input is published first'
     message = serialized(['other', 'crank_joint'], efforts=[9.0, 0.02])
@@ -404,8 +403,7 @@ def test_what_is_wrong_in_a_scene_has_its_line():
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
     assert (
-        reader(TorqueParameters(), context)(serialized(['left/left_crank'], efforts=[2.0])).effort
-        == 2.0
+        TorqueDrive().reader(context)(serialized(['left/left_crank'], efforts=[2.0])).effort == 2.0
     )
 
 
