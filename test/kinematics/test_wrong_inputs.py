@@ -111,7 +111,7 @@ ALIKE = {**YOKE.sliders, 'slot': Slider('A', 'yoke', 'U', (1.0, 0.0))}
     (replace(CLASS_3, pose=None), 'pose: is missing: no dyad covers platform, arm_1, arm_2, arm'),
     (replace(CLASS_3, pose=AssemblyPose((1.0,), {})),
      "pose.points: does not say where 'platform' lies; give two of its points: P1, P2, P3"),
-    (replace(YOKE, sliders=ALIKE), "sliders.slot.direction: is parallel to the direction of"),
+    (replace(YOKE, sliders=ALIKE), 'sliders.slot.direction: is parallel to the direction of'),
 ])  # fmt: skip
 def test_a_malformed_linkage_is_refused_with_its_key_and_a_remedy(linkage, line):
     with pytest.raises(DefinitionError) as caught:

@@ -8,7 +8,7 @@
 
 """Function generation: pairs of angles, and functions that have no value somewhere."""
 
-from math import cos, inf, nan, pi, radians, sqrt
+from math import inf, nan, pi, radians
 
 from hypothesis import given, strategies
 from linkage_ros.errors import SynthesisError
@@ -67,13 +67,6 @@ def test_precision_points_lie_as_the_cosines_say(low, high, count):
     # They are the zeros of Chebyshev's polynomial of that degree.
     inner = (2.0 * found - low - high) / (high - low)
     assert np.max(np.abs(chebval(inner, [0.0] * count + [1.0]))) < 1e-13 * max(abs(low), 1.0) * 10
-
-
-def test_three_points_lie_where_every_textbook_has_them():
-    by = 0.25 * sqrt(3.0)
-    assert chebyshev_points(1.0, 2.0, 3).tolist() == pytest.approx(
-        [1.5 - by, 1.5, 1.5 + by], rel=1e-15
-    )
 
 
 def test_points_near_the_beginning_have_all_their_digits():
@@ -249,13 +242,6 @@ def test_what_cannot_be_generated_is_refused_in_one_line(case, message):
 def test_a_range_may_be_narrow():
     task = FunctionTask(Expression('x^2'), (1.0, 1.0 + 1e-9), (0.0, 1.0), (0.0, 1.0))
     assert wanted_rocker(task, 0.5) == pytest.approx(0.5, abs=1e-6)
-
-
-def test_chebyshev_points_of_the_angles_are_those_of_x():
-    """An even scale takes them along."""
-    crank, _ = angle_pairs(LOG, chebyshev_points(1.0, 2.0, 4))
-    expected = [75.0 - 30.0 * cos((2 * j - 1) * pi / 8.0) for j in range(1, 5)]
-    assert np.degrees(crank) == pytest.approx(expected, rel=1e-14)
 
 
 # A function without a value somewhere in its range is refused; the error says where.
