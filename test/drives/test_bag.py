@@ -358,14 +358,10 @@ LAYOUTS = {
     'with an index': {'chunk_size': 256},
     'of one chunk': {},
     'without chunks': {'use_chunking': False},
-    'without an index': {
-        'index_types': IndexType.NONE,
-        'repeat_channels': False,
-        'repeat_schemas': False,
-        'use_statistics': False,
-        'use_summary_offsets': False,
-    },
-}
+    'without an index': {'index_types': IndexType.NONE, 'repeat_channels': False,
+                         'repeat_schemas': False, 'use_statistics': False,
+                         'use_summary_offsets': False},
+}  # fmt: skip
 
 TIMES = [*range(0, 8000, 200)]
 """When messages were taken, in [ms]: they span more than any window of seconds."""

@@ -361,13 +361,10 @@ POSES = {
     'a start some turns away': ((2.0, 7.0, 9.0, 6.0), AssemblyPose((-20.0,), {}), -20.0),
     'a start of one that folds': ((4.0, 8.0, 3.0, 6.0), AssemblyPose((2.5,), {}), 2.5),
     # It closes beyond acos(27/48) only: from there to as far on the other side, two thirds.
-    'a start where it is open': (
-        (4.0, 8.0, 3.0, 6.0),
-        AssemblyPose((0.5,), {}),
-        acos(0.5625) + (tau - 2.0 * acos(0.5625)) * 2.0 / 3.0,
-    ),
+    'a start where it is open': ((4.0, 8.0, 3.0, 6.0), AssemblyPose((0.5,), {}),
+                                 acos(0.5625) + (tau - 2.0 * acos(0.5625)) * 2.0 / 3.0),
     'as drawn': ((2.0, 7.0, 9.0, 6.0), AssemblyPose((0.436,), {'A': (1.8, 0.8)}), 0.436),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('kind', POSES)

@@ -49,19 +49,12 @@ def test_an_input_that_is_not_finite_has_no_pose(value):
     (lambda: ONE.position(1.0, 2.0), ValueError, 'inputs: 2 given; give 1: crank_joint'),
     (lambda: TWO.position(1.0), ValueError, f'inputs: 1 given; give 2: {NAMES}'),
     (lambda: ONE.position('a'), TypeError, "inputs: 'a' is not a number; solve() takes arrays"),
-    (
-        lambda: ONE.position([1.0, 2.0]), TypeError,
-        'inputs: [1.0, 2.0] is not a number; solve() takes arrays',
-    ),
-    (
-        lambda: ONE.position(np.ones(2)), TypeError,
-        'inputs: array([1., 1.]) is not a number; solve() takes arrays',
-    ),
+    (lambda: ONE.position([1.0, 2.0]), TypeError,
+     'inputs: [1.0, 2.0] is not a number; solve() takes arrays'),
+    (lambda: ONE.position(np.ones(2)), TypeError,
+     'inputs: array([1., 1.]) is not a number; solve() takes arrays'),
     (ONE.solve, ValueError, 'inputs: 0 given; give 1, one for each driven joint'),
-    (
-        lambda: ONE.solve(['a']), TypeError,
-        "inputs: 'a' is not a number",
-    ),
+    (lambda: ONE.solve(['a']), TypeError, "inputs: 'a' is not a number"),
 ])  # fmt: skip
 def test_what_is_no_input(call, kind, text):
     with pytest.raises(kind, match=f'^{re.escape(text)}$'):

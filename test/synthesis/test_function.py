@@ -180,59 +180,31 @@ def test_points_that_are_none_are_refused(xs, message):
 GOOD = ((0, 1), (45, 105), (135, 225))
 
 
-@pytest.mark.parametrize(
-    ('case', 'message'),
-    [
-        (
-            ('x', (1, 1), *GOOD[1:]),
-            'range: begins and ends at 1; let it end where it does not begin',
-        ),
-        (
-            ('x', (0, 1), (45, 45), GOOD[2]),
-            'crank range: begins and ends at 45; let it end where it does not begin',
-        ),
-        (
-            ('x', *GOOD[:2], (90, 90)),
-            'rocker range: begins and ends at 90; let it end where it does not begin',
-        ),
-        (
-            ('x', (0, 1), (0, 360), GOOD[2]),
-            'crank range: 0° to 360° is a full turn or more; keep it below 360°',
-        ),
-        (
-            ('x', *GOOD[:2], (200, -200)),
-            'rocker range: 200° to -200° is a full turn or more; keep it below 360°',
-        ),
-        (('x', (0, nan), *GOOD[1:]), 'range: 0 to nan is not a range; write two finite numbers'),
-        (('x', (0, inf), *GOOD[1:]), 'range: 0 to inf is not a range; write two finite numbers'),
-        (
-            ('x', (0, 1), (inf, 0), GOOD[2]),
-            'crank range: inf to 0.0 is not a range; write two finite numbers',
-        ),
-        (
-            ('sin(x)', (0, pi), *GOOD[1:]),
-            (
-                "function 'sin(x)': is 0 both at x = 0 and at 3.141592654, so that both ends of "
-                'the rocker range would be one; let the range end where the function is another'
-            ),
-        ),
-        (
-            ('5', *GOOD),
-            (
-                "function '5': is 5 both at x = 0 and at 1, so that both ends of the rocker range "
-                'would be one; let the range end where the function is another'
-            ),
-        ),
-        (
-            ('x^2', (-1, 1.01), *GOOD[1:]),
-            (
-                "function 'x^2': goes from 1 to 1.0201, but 1.0201 up and down between: "
-                'the rocker would swing by 4567.61°; choose a range without its summits and '
-                'valleys, or a smaller rocker range'
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize(('case', 'message'), [
+    (('x', (1, 1), *GOOD[1:]), 'range: begins and ends at 1; let it end where it does not begin'),
+    (('x', (0, 1), (45, 45), GOOD[2]),
+     'crank range: begins and ends at 45; let it end where it does not begin'),
+    (('x', *GOOD[:2], (90, 90)),
+     'rocker range: begins and ends at 90; let it end where it does not begin'),
+    (('x', (0, 1), (0, 360), GOOD[2]),
+     'crank range: 0° to 360° is a full turn or more; keep it below 360°'),
+    (('x', *GOOD[:2], (200, -200)),
+     'rocker range: 200° to -200° is a full turn or more; keep it below 360°'),
+    (('x', (0, nan), *GOOD[1:]), 'range: 0 to nan is not a range; write two finite numbers'),
+    (('x', (0, inf), *GOOD[1:]), 'range: 0 to inf is not a range; write two finite numbers'),
+    (('x', (0, 1), (inf, 0), GOOD[2]),
+     'crank range: inf to 0.0 is not a range; write two finite numbers'),
+    (('sin(x)', (0, pi), *GOOD[1:]),
+     ("function 'sin(x)': is 0 both at x = 0 and at 3.141592654, so that both ends of "
+      'the rocker range would be one; let the range end where the function is another')),
+    (('5', *GOOD),
+     ("function '5': is 5 both at x = 0 and at 1, so that both ends of the rocker range "
+      'would be one; let the range end where the function is another')),
+    (('x^2', (-1, 1.01), *GOOD[1:]),
+     ("function 'x^2': goes from 1 to 1.0201, but 1.0201 up and down between: "
+      'the rocker would swing by 4567.61°; choose a range without its summits and '
+      'valleys, or a smaller rocker range')),
+])  # fmt: skip
 def test_what_cannot_be_generated_is_refused_in_one_line(case, message):
     with pytest.raises(SynthesisError) as caught:
         task_of(case)
