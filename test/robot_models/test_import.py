@@ -254,14 +254,10 @@ def closed_values(crank):
         SDF_JOINT.replace('<pose>', '<pose relative_to="coupler">'),
     ],
     ids=[
-        'loop_joint',
-        'spherical',
-        'loop_constraint',
-        'one pin by both',
-        'gazebo',
+        'loop_joint', 'spherical', 'loop_constraint', 'one pin by both', 'gazebo',
         'gazebo, frame named',
     ],
-)
+)  # fmt: skip
 def test_loop_tags_close_as_places_do(tags):
     at = closed_values(0.5)
     asked = linkage_from_urdf(read_urdf(robot(TREE).encode(), 'r'), [PLACES], ['crank_joint'], at)
