@@ -178,12 +178,13 @@ def test_what_is_just_short_and_flat_enough_is_taken():
 
 
 ATTACKS = [
-    '__import__("os").system("true")', '__import__', '().__class__.__bases__[0].__subclasses__()',
-    'x.__class__', 'sin.__globals__', 'sin(x).real', 'x[0]', '[x for x in (1, 2)]', '(x := 3)',
-    'lambda: x', 'sin(x=1)', 'sin(*x)', 'sin(x, x)', 'eval("1")', "f'{x}'", '"a" * 10**9', "b'a'",
-    '1 if x else 2', 'x and x', 'x < 1', '~x', 'not x', 'x | x', '1_000', '0x10', '1j', '...',
-    'None', 'True', 'yield', 'x; x', 'x\\\n+1', 'x # 1', 'x\x00', '\x00', '\ufeffx', 'ｘ', 'ｓin(x)',
-    'sｉn(x)', '٣', '１', 'x\u00a0+ 1', 'x\u202e+ 1', 'x\u0301', '\ud800', '\U0001f600', '(' * 10**6,
+    '__import__("os").system("true")', '__import__',
+    '().__class__.__bases__[0].__subclasses__()', 'x.__class__', 'sin.__globals__',
+    'sin(x).real', 'x[0]', '[x for x in (1, 2)]', '(x := 3)', 'lambda: x', 'sin(x=1)', 'sin(*x)',
+    'sin(x, x)', 'eval("1")', "f'{x}'", '"a" * 10**9', "b'a'", '1 if x else 2', 'x and x',
+    'x < 1', '~x', 'not x', 'x | x', '1_000', '0x10', '1j', '...', 'None', 'True', 'yield',
+    'x; x', 'x\\\n+1', 'x # 1', 'x\x00', '\x00', '\ufeffx', 'ｘ', 'ｓin(x)', 'sｉn(x)', '٣',
+    '１', 'x\u00a0+ 1', 'x\u202e+ 1', 'x\u0301', '\ud800', '\U0001f600', '(' * 10**6,
     '-' * 10**6, 'x' * 10**6, '9' * 199 + 'e9' * 1000, '(' * 100 + 'x' + ')' * 100,
     'sin(' * 49 + 'x' + ')' * 3, '2^' * 99 + 'x', 'x+' * 99,
 ]  # fmt: skip
