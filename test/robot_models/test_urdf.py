@@ -8,9 +8,8 @@
 
 """The URDF of a linkage: valid, with limits that its joints keep, and read back."""
 
-from cmath import rect
 from collections import Counter
-from math import cos, pi, remainder, sin, tau
+from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
 from linkage_ros.description import linkage_text, load, load_scene
@@ -19,22 +18,18 @@ from linkage_ros.kinematics import Closure, InputSweep, sample_inputs, usual_inp
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.models import (
-    add_frames,
-    grow_tree,
     linkage_from_urdf,
     make_scene_model,
     model_of,
     ModelPart,
     PartError,
-    prefix_names,
     read_urdf,
     urdf_model,
 )
-import numpy as np
 import pytest
 
 from .odd import closure_of, ODD, UNTOLD
-from .walked import BEGIN, heard, moving, moving_text, MS, said, several_inputs, Walked
+from .walked import BEGIN, heard, moving, moving_text, MS, said, Walked
 from ..support.scenes import linkage_of, LINKAGES, ONE_INPUT, scene_of, size_of
 
 # The URDF of a linkage: valid, reproducible, with limits that its joints keep.
@@ -339,68 +334,3 @@ def test_every_way_from_frame_to_frame(name):
 
 LOST = {'one more than needed, and the crank once more': 3, 'a rod that only slides hold': 1}
 """Joints that no link hangs by; those of links that others tell of are left out."""
-
-
-# Where URDF puts the links, from the node's own messages: every pin that was cut meets. The
-# kinematics are yourdfpy's, which knows the URDF and nothing else. So are frames of links compared
-# with the closure: turned by the link's angle, with their origin on a point of it.
-
-
-def count_meeting(data, closure, messages, within=1e-12):
-    """Check links and cut pins of a model at each message; return how many there were."""
-    pytest.importorskip('yourdfpy')
-    model, size = Walked(data), size_of(closure)
-    _, (names,) = prefix_names([('', closure.linkage)])
-    cuts = add_frames(grow_tree(closure.linkage, names), names)
-    count = 0
-    for names, positions in messages:
-        model.pose(names, positions)
-        values = dict(zip(names, positions, strict=True))
-        position = closure.position(*(values[each.joint] for each in closure.linkage.inputs))
-        points, angles = closure.points(position), closure.link_angles(position)
-        for link in closure.linkage.links:
-            off = min(
-                abs(model.place(link) - points[link, point])
-                for point in closure.linkage.links[link]
-            )
-            if link != 'ground':
-                assert off <= within * size, (link, off)
-            assert abs(model.facing(link) - rect(1.0, angles[link])) <= within, link
-        for cut in cuts:
-            first, *others = cut.frames
-            for other in others:
-                apart = model.place(other) - model.place(first)
-                if cut.kind == 'line':
-                    apart = (apart / model.facing(first)).imag
-                assert abs(apart) <= within * size, cut
-        count += 1
-    return count, cuts
-
-
-@pytest.mark.parametrize('name', ONE_INPUT)
-def test_every_cut_pin_of_the_shipped_linkages_meets(name):
-    file = LINKAGES / f'{name}.yaml'
-    pipeline = moving(file)
-    (closure,) = pipeline.closures
-    count, cuts = count_meeting(urdf_model(name, [ModelPart(closure)]), closure, said(pipeline))
-    assert count > 100
-    assert cuts, 'nothing closes'
-
-
-def test_cut_pins_of_a_linkage_with_two_inputs_meet():
-    file = LINKAGES / 'five_bar.yaml'
-    turns = np.linspace(0.0, 6.28, 60)
-    values = [(1.6 + 0.3 * cos(t), 1.5 + 0.3 * sin(1.7 * t)) for t in turns]
-    names = ['left_crank_joint', 'right_crank_joint']
-    closure = moving(file).closures[0]
-    messages = several_inputs(file.read_bytes(), names, values)
-    count, _ = count_meeting(urdf_model('five_bar', [ModelPart(closure)]), closure, messages)
-    assert count == 60
-
-
-@pytest.mark.parametrize('name', ODD)
-def test_cut_pins_meet_whichever_way_frames_go(name):
-    closure = closure_of(name)
-    pipeline = moving_text(ODD[name])
-    count, _ = count_meeting(urdf_model(name, [ModelPart(closure)]), closure, said(pipeline))
-    assert count > 100
