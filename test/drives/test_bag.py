@@ -64,12 +64,8 @@ TIMELINES = {
         {},
         THREE,
         [
-            (0, (0.5, 2.0, 0)),
-            (50, (0.6, 2.0, 50)),
-            (99, (0.698, 2.0, 99)),
-            (100, (1.0, 4.0, 0)),
-            (125, (1.1, 4.0, 25)),
-            (150, (3.0, -1.0, 0)),
+            (0, (0.5, 2.0, 0)), (50, (0.6, 2.0, 50)), (99, (0.698, 2.0, 99)), (100, (1.0, 4.0, 0)),
+            (125, (1.1, 4.0, 25)), (150, (3.0, -1.0, 0)),
         ],
     ),
     'held as measured': (
@@ -81,14 +77,8 @@ TIMELINES = {
         {'max_age': 0.04},
         THREE,
         [
-            (40, (0.58, 2.0, 40)),
-            (41, SILENT),
-            (99, SILENT),
-            (140, (1.16, 4.0, 40)),
-            (141, SILENT),
-            (150, (3.0, -1.0, 0)),
-            (190, (2.96, -1.0, 40)),
-            (191, SILENT),
+            (40, (0.58, 2.0, 40)), (41, SILENT), (99, SILENT), (140, (1.16, 4.0, 40)),
+            (141, SILENT), (150, (3.0, -1.0, 0)), (190, (2.96, -1.0, 40)), (191, SILENT),
             (10_000, SILENT),
         ],
     ),
@@ -102,10 +92,7 @@ TIMELINES = {
         {'repeat': True, 'carry_forward': False},
         THREE,  # 150 ms, and 75 more
         [
-            (0, (0.5, 2.0, 0)),
-            (224, (3.0, -1.0, 74)),
-            (225, (0.5, 2.0, 0)),
-            (325, (1.0, 4.0, 0)),
+            (0, (0.5, 2.0, 0)), (224, (3.0, -1.0, 74)), (225, (0.5, 2.0, 0)), (325, (1.0, 4.0, 0)),
             (2_250_000_101, (1.0, 4.0, 1)),
         ],
     ),
@@ -113,10 +100,7 @@ TIMELINES = {
         {'pace': 'fast'},
         THREE,
         [
-            (0, (0.5, 2.0, 0)),
-            (1, (1.0, 4.0, 0)),
-            (9999, (3.0, -1.0, 0)),
-            (10_000, SILENT),
+            (0, (0.5, 2.0, 0)), (1, (1.0, 4.0, 0)), (9999, (3.0, -1.0, 0)), (10_000, SILENT),
             (10_001, SILENT),
         ],
     ),
@@ -125,7 +109,7 @@ TIMELINES = {
         TWO,
         [(0, (0.5, 2.0, 0)), (1, (1.0, 4.0, 0)), (2, (0.5, 2.0, 0)), (3, (1.0, 4.0, 0))],
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('begin', [BEGIN, 0, 1])
@@ -355,14 +339,10 @@ LAYOUTS = {
     'with an index': {'chunk_size': 256},
     'of one chunk': {},
     'without chunks': {'use_chunking': False},
-    'without an index': {
-        'index_types': IndexType.NONE,
-        'repeat_channels': False,
-        'repeat_schemas': False,
-        'use_statistics': False,
-        'use_summary_offsets': False,
-    },
-}
+    'without an index': {'index_types': IndexType.NONE, 'repeat_channels': False,
+                         'repeat_schemas': False, 'use_statistics': False,
+                         'use_summary_offsets': False},
+}  # fmt: skip
 
 TIMES = [*range(0, 8000, 200)]
 """When messages were taken, in [ms]: they span more than any window of seconds."""

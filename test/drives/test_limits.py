@@ -44,11 +44,8 @@ DRIVES = {
     ),
     'at rest beyond': ('constant_rate: {rate: 0, start: 2}', OWN, ' from 2 rad to 2 rad, beyond'),
     'a sine to the limits': ('sine: {amplitude: 0.5, mean: 1, frequency: 1}', OWN, ''),
-    'a sine to limits in tenths': (
-        'sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
-        ', input: {limits: [0.1, 0.8]}',
-        '',
-    ),
+    'a sine to limits in tenths': ('sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
+                                   ', input: {limits: [0.1, 0.8]}', ''),
     'a sine beyond': (
         'sine: {amplitude: 0.51, mean: 1, frequency: 1}',
         OWN,
@@ -59,27 +56,17 @@ DRIVES = {
         OWN,
         "takes 'crank_joint' from 0.4 rad to 1.6 rad",
     ),
-    'a chirp that ends on its way up': (
-        CHIRP,
-        OWN,
-        '',
-    ),
-    'the same, there and back': (
-        f'{CHIRP[:-1]}, repeat: true}}',
-        OWN,
-        "takes 'crank_joint' from 0.4 rad to 1.6 rad",
-    ),
+    'a chirp that ends on its way up': (CHIRP, OWN, ''),
+    'the same, there and back': (f'{CHIRP[:-1]}, repeat: true}}', OWN,
+                                 "takes 'crank_joint' from 0.4 rad to 1.6 rad"),
     'rows within': ('profile: {table: [[0, 1], [1, 1.5]], interpolation: linear}', OWN, ''),
     'a spline that swings beyond its rows': (
         'profile: {table: [[0, 1], [1, 1.5], [2, 1.49], [3, 1]]}',
         OWN,
         "drive.profile: takes 'crank_joint' from 1 rad to 1.61884 rad, beyond its limits",
     ),
-    'rows that gain': (
-        'profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
-        OWN,
-        "takes 'crank_joint' from 1 rad to inf rad",
-    ),
+    'rows that gain': ('profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
+                       OWN, "takes 'crank_joint' from 1 rad to inf rad"),
     'a joint that follows': (
         'constant_rate: {rate: 1, start: 2}',
         PUBLISHED,

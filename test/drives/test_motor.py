@@ -85,27 +85,21 @@ RUN_UPS = {
     'a voltage against the motion': ({}, -3.0, 5.0, lambda t: run_up(t, -3.0, 5.0)),
     'no voltage: its winding is short-circuited': ({}, 0.0, 5.0, lambda t: run_up(t, 0.0, 5.0)),
     'a voltage above that of the supply': ({'voltage': 9.0}, 12.0, 0.0, lambda t: run_up(t, 9.0)),
-    'a voltage, while the current is limited': (
-        {'current': 4.0}, 12.0, 0.0, lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'a voltage, while the torque is limited': (
-        {'torque': 4.0 * CONSTANT}, 12.0, 0.0, lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'a current, until the supply gives no more': (
-        {'command': 'current', 'voltage': 12.0}, 4.0, 0.0,
-        lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
+    'a voltage, while the current is limited': ({'current': 4.0}, 12.0, 0.0,
+                                                lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'a voltage, while the torque is limited': ({'torque': 4.0 * CONSTANT}, 12.0, 0.0,
+                                               lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'a current, until the supply gives no more': ({'command': 'current', 'voltage': 12.0}, 4.0,
+                                                  0.0,
+                                                  lambda t: constant_then_run_up(t, 4.0, 12.0)),
     'a current above its limit, and the supply': (
         {'command': 'current', 'voltage': 12.0, 'current': 4.0}, 40.0, 0.0,
         lambda t: constant_then_run_up(t, 4.0, 12.0),
     ),
-    'an effort, until the supply gives no more': (
-        {'command': 'effort', 'voltage': 12.0}, 4.0, 0.0,
-        lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'an effort, with the losses of the gear': (
-        {'command': 'effort', **LOSSES}, 1.0, 0.0, lambda t: (t * t, 2.0 * t),
-    ),
+    'an effort, until the supply gives no more': ({'command': 'effort', 'voltage': 12.0}, 4.0, 0.0,
+                                                  lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'an effort, with the losses of the gear': ({'command': 'effort', **LOSSES}, 1.0, 0.0,
+                                               lambda t: (t * t, 2.0 * t)),
     'an effort that brakes, with more than the gear would drive': (
         {'command': 'effort', **LOSSES}, -1.0, 12.0,
         lambda t: (12.0 * t - 2.5 * t * t, 12.0 - 5.0 * t),

@@ -8,7 +8,7 @@
 
 """A profile: timelines by hand, its curves against closed forms and against scipy's splines."""
 
-from math import sqrt, tau
+from math import tau
 
 from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
@@ -159,15 +159,6 @@ def test_minimum_jerk_is_that_of_flash_and_hogan(x):
         time = SECOND + round(float(x) * 2.5 * SECOND)
         expected = [mp.diff(position, mp.mpf(time) / SECOND, n) for n in range(3)]
     assert profile(time) == pytest.approx([float(v) for v in expected], rel=0, abs=3e-14)
-
-
-def test_the_largest_acceleration_of_minimum_jerk():
-    """It is 10/√3·Δ/T², where the time is (3 − √3)/6 of the whole."""
-    profile = Profile(((0.0, 0.0), (2.0, 3.0)), 'minimum_jerk').motion_curve()
-    largest = max(profile(time)[2] for time in range(0, 2 * SECOND, MS))
-    assert largest == pytest.approx(10 / sqrt(3) * 3.0 / 4.0, rel=1e-5)
-    at = round((3 - sqrt(3)) / 6 * 2 * SECOND)
-    assert profile(at)[2] == pytest.approx(10 / sqrt(3) * 3.0 / 4.0, rel=1e-12)
 
 
 @pytest.mark.parametrize('interpolation', ['cubic', 'minimum_jerk'])

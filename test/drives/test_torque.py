@@ -19,7 +19,7 @@ import random
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros.dynamics import Friction, JointFriction, Loads
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Mass, Status
 from linkage_ros.messages import EffortCommand, Rejection
 from linkage_ros.stages.drives import Context, TorqueDrive
@@ -232,11 +232,6 @@ def test_the_motion_does_not_depend_on_when_it_is_looked_at(method):
     assert len(set(slow.values())) > 100
 
 
-def test_the_same_calls_give_the_same_bits():
-    when = range(BEGIN, BEGIN + SECOND, 1_234_567)
-    assert driven(when) == driven(when)
-
-
 def test_a_cylinder_gives_the_bucket_its_work():
     # Undamped: what force times way has given is in the bucket's weight and speed.
     built = drive(EXCAVATOR, GRAVITY, start=0.9, method='gauss_legendre', timeout=10.0)
@@ -377,27 +372,6 @@ def test_a_scene_is_driven_by_commands():
     spoilt = serialized(['crank_joint'], efforts=[nan])
     assert pipeline.offer(spoilt, BEGIN + 100 * MS) is Rejection.EFFORT_NOT_FINITE
     assert pipeline.newest_stamp == BEGIN
-
-
-def test_two_runs_of_a_scene_give_the_same_bytes():
-    def messages():
-        pipeline = scene('{start: 0.5, method: gauss_legendre}')
-        for k in range(100):
-            now = BEGIN + k * MS
-            if k % 7 == 0:
-                pipeline.offer(serialized(['crank_joint'], efforts=[0.001 * k]), now)
-            yield pipeline.tick(now).message
-
-    first = list(messages())
-    assert first == list(messages())
-    assert len(set(first)) == 100
-
-
-def test_what_is_wrong_in_a_scene_has_its_line():
-    with pytest.raises(FileError, match=r'scene\.yaml:2: drive\.torque\.brake: the brake is 0'):
-        scene('{on_timeout: brake}')
-    with pytest.raises(FileError, match='gauss_legendre'):
-        scene('{method: gauss_legender}')
 
 
 def test_it_reads_the_input_by_the_name_that_messages_have():
