@@ -8,12 +8,11 @@
 
 """A report shows curves, diagnostics and samples of a run as they were recorded."""
 
-import json
 from math import inf, nan
 from pathlib import Path
 
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.tools.view.report import page_data, ReportHeader, run_html
+from linkage_ros.tools.view.report import page_data
 from linkage_ros.tools.view.report.diagnostics_summary import _COUNTED
 import numpy as np
 import pytest
@@ -22,8 +21,10 @@ from .runs import (
     BEGIN,
     but,
     curve,
+    data_of,
     MS,
     on_lanes,
+    page_of_run,
     read,
     recorded,
     Said,
@@ -85,10 +86,6 @@ TORQUE = 'drive: {torque: {}}\nloads: {drive_inertia: 0.001}\n'
 FOUR_BAR_WITH_MASSES = four_bar_text(0.04, 0.12, 0.08, 0.1, [(0.1, 0, 1e-5)] * 3)
 
 
-def page(found):
-    return run_html(found, ReportHeader('t', [], [], []))
-
-
 @pytest.mark.parametrize('value', [nan, inf, -inf, 1e308])
 def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
     pytest.importorskip('plotly')
@@ -106,8 +103,7 @@ def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
             return iter(messages)
 
     changed = Changed(*(getattr(bag, name) for name in bag.__slots__))
-    text = page(read(changed))
-    json.loads(text.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)
+    data_of(page_of_run(read(changed)))
 
 
 # The diagnostics of a run: lost ticks, dropped messages, warnings, and when it ended.
