@@ -52,7 +52,7 @@ class Said(NamedTuple):
     node: str = 'linkage'
 
 
-def diagnostics(said: Sequence[Said]) -> bytes:
+def diagnostics(said: Sequence[Said], little: bool = True) -> bytes:
     """Return a DiagnosticArray, by rosbags."""
     pair = TYPES['diagnostic_msgs/msg/KeyValue']
     status = TYPES['diagnostic_msgs/msg/DiagnosticStatus']
@@ -65,7 +65,8 @@ def diagnostics(said: Sequence[Said]) -> bytes:
     ]  # fmt: skip
     kind = 'diagnostic_msgs/msg/DiagnosticArray'
     header = TYPES['std_msgs/msg/Header'](TYPES['builtin_interfaces/msg/Time'](1, 2), '')
-    return bytes(STORE.serialize_cdr(TYPES[kind](header, statuses), kind))
+    message = TYPES[kind](header, statuses)
+    return bytes(STORE.serialize_cdr(message, kind, little_endian=little))
 
 
 def turning(tick: int) -> Moment:

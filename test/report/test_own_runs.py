@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from .runs import BEGIN, but, curve, from_then_on, MS, on_lanes, read, recorded, Said, sample
-from .test_messages import encoded, GOOD, TWICE
+from .test_messages import GOOD, TWICE
 from ..node.ticked import Moment
 
 QUIET = 'faults: {quiet: {silence: {}}, worn: {stuck: {joint: rocker_joint}}}\n'
@@ -365,7 +365,7 @@ def test_one_topic_that_is_silent(tmp_path):
 
 
 def test_what_cannot_be_read_is_counted_by_topic(tmp_path):
-    rows = [('/j', 0, GOOD), ('/j', 1, encoded(TWICE)), ('/j', 2, b'no'), ('/k', 3, b'')]
+    rows = [('/j', 0, GOOD), ('/j', 1, TWICE), ('/j', 2, b'no'), ('/k', 3, b'')]
     found = foreign(tmp_path, rows)
     assert found.curves[0].rows == 1
     assert found.left_out == {
@@ -388,8 +388,3 @@ def test_other_topics_are_counted_and_not_drawn(tmp_path):
     assert not found.curves
     (topic,) = found.contents.topics
     assert (topic.messages, topic.size) == (5, 15)
-
-
-def test_curve_is_the_helper_that_it_says(tmp_path):
-    found = foreign(tmp_path, [('/j', ms, state({'a': ms / 2})) for ms in range(5)])
-    assert curve(found, 'a', 'position') == ([0, 1, 2, 3, 4], [0, 0.5, 1, 1.5, 2])

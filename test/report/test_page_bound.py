@@ -57,7 +57,7 @@ import numpy as np
 import pytest
 
 from .runs import BEGIN, but, data_of, diagnostics, MS, page_of_run, recorded, Said, sample
-from .test_messages import encoded, state
+from .test_messages import GOOD
 from ..support.sampling import sample_count
 
 pytest.importorskip('plotly')
@@ -358,44 +358,33 @@ def changed(data, random):
     return bytes(content)
 
 
-@given(st.binary(max_size=300))
-def test_no_bytes_break_the_reader_of_diagnostics(data):
-    for head in (b'', b'\0\1\0\0' + bytes(8) + b'\1\0\0\0\0\0\0\0'):
-        for status in read_statuses(head + data):
-            assert status.level in range(256)
-
-
 WHOLE = diagnostics(
     [Said(0, 'tick', {'a': 'b', 'Lost ticks': 3}, 1, 'late'), Said(0, 'crank', {})]
 )
+HEADS = (b'', b'\0\1\0\0' + bytes(8) + b'\1\0\0\0\0\0\0\0')
 
 
-@given(st.lists(st.tuples(st.integers(0, len(WHOLE) - 1), st.integers(0, 255)), max_size=6))
-def test_no_change_of_bytes_breaks_it(changes):
-    data = bytearray(WHOLE)
-    for at, value in changes:
-        data[at] = value
-    for status in read_statuses(bytes(data)):
+def damaged(good):
+    """Draw a message of which bytes are others."""
+
+    def change(changes):
+        data = bytearray(good)
+        for at, value in changes:
+            data[at] = value
+        return bytes(data)
+
+    places = st.tuples(st.integers(0, len(good) - 1), st.integers(0, 255))
+    return st.lists(places, max_size=6).map(change)
+
+
+@given(damaged(WHOLE) | st.builds(bytes.__add__, st.sampled_from(HEADS), st.binary(max_size=300)))
+def test_no_bytes_break_the_reader_of_diagnostics(data):
+    for status in read_statuses(data):
+        assert status.level in range(256)
         assert sum(map(len, status.values)) <= 10 * len(WHOLE)
 
 
-GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
-
-
-def replaced(change):
-    at, value = change
-    data = bytearray(GOOD)
-    data[at] = value
-    return bytes(data)
-
-
-@given(
-    st.lists(
-        st.binary(max_size=200)
-        | st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)).map(replaced),
-        max_size=8,
-    )
-)
+@given(st.lists(st.binary(max_size=200) | damaged(GOOD), max_size=8))
 def test_no_bytes_break_the_reader_of_joint_states(messages):
     reader = JointStates()
     block = reader.read(messages)
