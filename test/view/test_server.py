@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import contextmanager, ExitStack
 from itertools import pairwise
 import json
 import os
@@ -36,7 +36,7 @@ from linkage_ros.tools.view import bag_page, Conversation, LARGEST, MOST_PAGES, 
 from linkage_ros.tools.view.report import Window
 import pytest
 
-from .served import asked, opened, Served, served
+from .served import asked, in_loop, opened, Served, served
 from ..cli.recorded import Recorded, scene_file
 from ..support.commands import environment, linkage
 from ..support.sampling import sample_count
@@ -242,26 +242,19 @@ def bad_messages(count: int) -> Iterator[str | bytes]:
         yield rng.choice((rng.randbytes(100), letters, good[: rng.randrange(len(good))]))
 
 
-def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server: Served) -> None:
+@in_loop
+async def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server: Served) -> None:
     count = sample_count(10_000, 1000)
-
-    async def run() -> None:
-        async with opened(server.address) as page:
-
-            async def send() -> None:
-                for message in bad_messages(count):
-                    send_one = page.socket.send_bytes if isinstance(message, bytes) else None
-                    await (send_one or page.socket.send_str)(message)  # type: ignore[arg-type]
-
-            sending = asyncio.create_task(send())
-            for _ in range(count):
-                error = (await page.get())['error']
-                assert '\n' not in error['text']
-                assert len(error['text']) < 1000
-            await sending
-            assert ok(await page.ask('model', text=FOUR_BAR))['text'] == FOUR_BAR
-
-    asyncio.run(run())
+    async with opened(server.address) as page:
+        for message in bad_messages(count):
+            if isinstance(message, bytes):
+                await page.socket.send_bytes(message)
+            else:
+                await page.socket.send_str(message)
+            error = (await page.get())['error']
+            assert '\n' not in error['text']
+            assert len(error['text']) < 1000
+        assert ok(await page.ask('model', text=FOUR_BAR))['text'] == FOUR_BAR
     assert server.server.refused == {'a message that is not a request': count}
 
 
@@ -269,83 +262,73 @@ def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server: Serv
     'frame',
     [b'\x81\x81\x00\x00\x00\x00\xff', b'\xff' * 20, b'\xc1\x00', b'\x81\x7f' + b'\xff' * 8],
 )
-def test_bytes_that_are_no_messages_end_their_page_alone(server: Served, frame: bytes) -> None:
-    async def run() -> None:
-        async with opened(server.address) as broken, opened(server.address) as page:
-            transport = broken.socket._conn.transport  # type: ignore[union-attr]
-            transport.write(frame)
-            message = await broken.socket.receive(60.0)
-            assert message.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
-            ok(await page.ask('names'))
+@in_loop
+async def test_bytes_that_are_no_messages_end_their_page_alone(
+    server: Served, frame: bytes
+) -> None:
+    async with opened(server.address) as broken, opened(server.address) as page:
+        transport = broken.socket._conn.transport  # type: ignore[union-attr]
+        transport.write(frame)
+        message = await broken.socket.receive(60.0)
+        assert message.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
+        ok(await page.ask('names'))
 
-    asyncio.run(run())
 
-
-def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
+@in_loop
+async def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
     # An answer of a megabyte, of which more are asked for than all buffers hold.
     large = {'text': f'{FOUR_BAR}# {"x" * 700_000}\n', 'kind': 'yaml'}
-
-    async def run() -> None:
-        async with opened(server.address) as deaf, opened(server.address) as page:
-            transport = deaf.socket._conn.transport  # type: ignore[union-attr]
-            transport.pause_reading()
-            sending = asyncio.gather(*(deaf.send('export', **large) for _ in range(17)))
-            for _ in range(20):
-                ok(await page.ask('export', **large))
-            assert await asyncio.wait_for(sending, 60.0)
-            transport.abort()
-            ok(await page.ask('names'))
-
-    asyncio.run(run())
+    async with opened(server.address) as deaf, opened(server.address) as page:
+        transport = deaf.socket._conn.transport  # type: ignore[union-attr]
+        transport.pause_reading()
+        sending = asyncio.gather(*(deaf.send('export', **large) for _ in range(17)))
+        for _ in range(20):
+            ok(await page.ask('export', **large))
+        assert await asyncio.wait_for(sending, 60.0)
+        transport.abort()
+        ok(await page.ask('names'))
 
 
-def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None:
+@in_loop
+async def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None:
     count = 40
-
-    async def run() -> None:
-        async with opened(server.address) as page:
-            numbers = [await page.send('edit', text=FOUR_BAR, edit=LONGER) for _ in range(count)]
-            answers = [await page.get() for _ in numbers]
-        assert sorted(answer['id'] for answer in answers) == numbers
-        done = [answer['id'] for answer in answers if 'ok' in answer]
-        dropped = [answer['id'] for answer in answers if answer.get('dropped')]
-        assert sorted(done + dropped) == numbers
-        assert numbers[-1] in done
-        assert dropped
-
-    asyncio.run(run())
+    async with opened(server.address) as page:
+        numbers = [await page.send('edit', text=FOUR_BAR, edit=LONGER) for _ in range(count)]
+        answers = [await page.get() for _ in numbers]
+    assert sorted(answer['id'] for answer in answers) == numbers
+    done = [answer['id'] for answer in answers if 'ok' in answer]
+    dropped = [answer['id'] for answer in answers if answer.get('dropped')]
+    assert sorted(done + dropped) == numbers
+    assert numbers[-1] in done
+    assert dropped
 
 
-def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_closes(
+@in_loop
+async def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_closes(
     server: Served,
 ) -> None:
-    async def run() -> None:
-        pages = [opened(server.address) for _ in range(MOST_PAGES)]
-        for page in pages:
-            await page.__aenter__()
-        async with opened(server.address) as fifth:
-            message = await fifth.socket.receive(60.0)
-            assert (message.data, message.extra) == (1013, '4 pages are open; close one')
-        for page in pages:
-            await page.__aexit__(None, None, None)
-        async with opened(server.address) as page:
-            ok(await page.ask('names'))
-
-    asyncio.run(run())
+    pages = [opened(server.address) for _ in range(MOST_PAGES)]
+    for page in pages:
+        await page.__aenter__()
+    async with opened(server.address) as fifth:
+        message = await fifth.socket.receive(60.0)
+        assert (message.data, message.extra) == (1013, '4 pages are open; close one')
+    for page in pages:
+        await page.__aexit__(None, None, None)
+    async with opened(server.address) as page:
+        ok(await page.ask('names'))
     assert server.server.refused == {'a page too many': 1}
 
 
-def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
+@in_loop
+async def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
     server: Served,
 ) -> None:
-    async def run() -> None:
-        for _ in range(5):
-            async with opened(server.address) as page:
-                await page.send('edit', text=FOUR_BAR, edit=LONGER, whole=True)
+    for _ in range(5):
         async with opened(server.address) as page:
-            ok(await page.ask('edit', text=FOUR_BAR, edit=LONGER))
-
-    asyncio.run(run())
+            await page.send('edit', text=FOUR_BAR, edit=LONGER, whole=True)
+    async with opened(server.address) as page:
+        ok(await page.ask('edit', text=FOUR_BAR, edit=LONGER))
     assert not server.server.refused
 
 
@@ -356,23 +339,20 @@ def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
         (60.0, r'^names: ended the process that computes it; '),
     ],
 )
-def test_a_process_that_takes_too_long_or_dies_is_said_and_replaced(
+@in_loop
+async def test_a_process_that_takes_too_long_or_dies_is_said_and_replaced(
     longest: float, line: str
 ) -> None:
     names = 1, 'names', '{"id": 1, "do": "names"}'
-
-    async def run() -> None:
-        worker = Worker('mine', None, longest)
-        if longest > 1.0:
-            await worker.start()
-            os.kill(worker.pid, signal.SIGKILL)
-        with pytest.raises(LinkageError, match=line):
-            await worker.send_request(*names)
-        worker.longest = 60.0
-        assert 'ok' in json.loads(await worker.send_request(*names))
-        await worker.end()
-
-    asyncio.run(run())
+    worker = Worker('mine', None, longest)
+    if longest > 1.0:
+        await worker.start()
+        os.kill(worker.pid, signal.SIGKILL)
+    with pytest.raises(LinkageError, match=line):
+        await worker.send_request(*names)
+    worker.longest = 60.0
+    assert 'ok' in json.loads(await worker.send_request(*names))
+    await worker.end()
 
 
 # Saving.
@@ -390,34 +370,30 @@ def test_an_edit_is_saved_and_undone_to_the_same_bytes(server: Served, file: Pat
     assert [path.name for path in file.parent.iterdir()] == ['mine.yaml']
 
 
-def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
+@in_loop
+async def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
     server: Served, file: Path
 ) -> None:
-    async def run() -> None:
-        async with opened(server.address) as page:
-            ok(await page.ask('names'))
-            file.write_text(f'{FOUR_BAR}# by hand\n')
-            error = (await page.ask('save', text=FOUR_BAR))['error']['text']
-        assert error == (
-            'mine.yaml: has changed since this page read it; download this version, or load the '
-            'page again to go on from the file'
-        )
-
-    asyncio.run(run())
+    async with opened(server.address) as page:
+        ok(await page.ask('names'))
+        file.write_text(f'{FOUR_BAR}# by hand\n')
+        error = (await page.ask('save', text=FOUR_BAR))['error']['text']
+    assert error == (
+        'mine.yaml: has changed since this page read it; download this version, or load the '
+        'page again to go on from the file'
+    )
     assert file.read_text() == f'{FOUR_BAR}# by hand\n'
 
 
-def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
+@in_loop
+async def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
     server: Served, file: Path
 ) -> None:
-    async def run() -> None:
-        async with opened(server.address) as one, opened(server.address) as other:
-            ok(await other.ask('names'))
-            ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
-            assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
-            ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
-
-    asyncio.run(run())
+    async with opened(server.address) as one, opened(server.address) as other:
+        ok(await other.ask('names'))
+        ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
+        assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
+        ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
     assert file.read_text() == f'{FOUR_BAR}# one again\n'
 
 
@@ -437,20 +413,15 @@ def test_a_shipped_linkage_is_not_saved_and_the_error_says_what_to_do() -> None:
 # The command.
 
 
-def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.Popen[str], str]:
-    """Start ``linkage view``, and return its process and its address."""
-    limited = (
-        f'import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))'
-    )
+@contextmanager
+def started(
+    folder: Path, *arguments: str, files: int = 1024, end: int = signal.SIGINT
+) -> Iterator[tuple[subprocess.Popen[str], str, list[str]]]:
+    """Run ``linkage view``; give process, address, and at its end what it said; none is left."""
+    limits = f'resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))'
+    program = f'import resource, sys; {limits}; from linkage_ros.cli.main import main; '
     process = subprocess.Popen(
-        [
-            *(
-                sys.executable,
-                '-c',
-                f'{limited}; from linkage_ros.cli.main import main; sys.exit(main())',
-            ),
-            *('view', *arguments, '--no-browser'),
-        ],
+        [sys.executable, '-c', f'{program}sys.exit(main())', 'view', *arguments, '--no-browser'],
         cwd=folder,
         env=environment(folder),
         stdout=subprocess.PIPE,
@@ -458,45 +429,44 @@ def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.
         text=True,
     )
     assert process.stdout is not None
-    return process, process.stdout.readline().rpartition(' ')[2].strip()
+    said: list[str] = []
+    address = process.stdout.readline().rpartition(' ')[2].strip()
+    # Any thread of a process may have started another one.
+    tasks = Path(f'/proc/{process.pid}/task').iterdir()
+    workers = ' '.join((task / 'children').read_text() for task in tasks).split()
+    try:
+        yield process, address, said
+    finally:
+        process.send_signal(end)
+        said += process.communicate(timeout=30.0)
+    until = time.monotonic() + 30.0
+    while any(Path(f'/proc/{worker}').exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.05)
 
 
-def children(pid: int) -> set[int]:
-    """Return the processes that any thread of a process has started."""
-    tasks = Path(f'/proc/{pid}/task').iterdir()
-    return {int(child) for task in tasks for child in (task / 'children').read_text().split()}
-
-
-def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
+@in_loop
+async def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
-    process, address = start(tmp_path, 'mine.yaml')
-
-    async def run() -> None:
+    with started(tmp_path, 'mine.yaml', end=0) as (process, address, said):
         async with opened(address) as page, opened(address) as other:
             assert ok(await page.ask('model', text=FOUR_BAR))['name'] == 'mine'
             await other.send('export', kind='gif', text=FOUR_BAR)
             process.send_signal(signal.SIGINT)
             message = await page.socket.receive(60.0)
             assert (message.data, message.extra) == (1001, 'linkage view has ended')
-
-    workers = children(process.pid)
-    asyncio.run(run())
-    out, err = process.communicate(timeout=30.0)
-    assert (process.returncode, out, err) == (0, 'linkage view: ended\n', '')
-    assert workers
-    assert not any(Path(f'/proc/{worker}').exists() for worker in workers)
+    assert (process.returncode, said) == (0, ['linkage view: ended\n', ''])
 
 
-def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+@in_loop
+async def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
     """The scene has an effect of the user's own, from the folder of the command."""
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(
         'linkage: mine.yaml\nrate: 60\neffects: {mine.dead_zone: {width: 0.05}}\n'
     )
     shutil.copytree(EXAMPLES / 'mine', tmp_path / 'mine')
-    process, address = start(tmp_path, 'scene.yaml')
-
-    async def run() -> None:
+    with started(tmp_path, 'scene.yaml', end=signal.SIGKILL) as (_, address, said):
         async with opened(address) as page:
             reads = [
                 ok(await page.ask('read', t=n / 60, inputs=[0.02 * n], rates=[1.2]))['read']
@@ -505,67 +475,37 @@ def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
             changes = [b != a for a, b in pairwise(read['rocker_joint'] for read in reads)]
             assert 0 < sum(changes) < len(changes)
             assert ok(await page.ask('save', text=FOUR_BAR)) == {'file': 'mine.yaml'}
-
-    try:
-        asyncio.run(run())
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30.0)[1] == ''
-
-
-def test_a_server_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
-    process, _ = start(tmp_path, 'four_bar')
-    workers = children(process.pid)
-    assert workers
-    process.kill()
-    process.communicate(timeout=30.0)
-    until = time.monotonic() + 30.0
-    while any(Path(f'/proc/{worker}').exists() for worker in workers):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    assert said[1] == ''
 
 
 def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR)
-    process, address = start(tmp_path, 'mine.yaml')
-
-    async def run() -> None:
-        async with aiohttp.ClientSession() as session:
-            pages = []
-            for text in (FOUR_BAR, FOUR_BAR.replace('rocker.', 'rocker, longer.'), 'links: 1'):
-                file.write_text(text)
-                async with session.get(address) as answer:
-                    pages.append(await answer.text())
-        assert ['rocker, longer.' in page for page in pages] == [False, True, True]
-
-    try:
-        asyncio.run(run())
-    finally:
-        process.send_signal(signal.SIGTERM)
-        _, err = process.communicate(timeout=30.0)
-    assert len(err.splitlines()) == 1, err
-    (line,) = err.splitlines()
+    with started(tmp_path, 'mine.yaml', end=signal.SIGTERM) as (_, address, said):
+        for text, is_longer in (
+            (FOUR_BAR, False), (FOUR_BAR.replace('rocker.', 'rocker, longer.'), True),
+            ('links: 1', True),
+        ):  # fmt: skip
+            file.write_text(text)
+            with urlopen(address, timeout=60.0) as page:
+                assert ('rocker, longer.' in page.read().decode()) == is_longer
+    (line,) = said[1].splitlines()
     assert line.startswith('linkage view: mine.yaml:1: links: ')
     assert line.endswith('; the page shows it as it was')
 
 
 def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path: Path) -> None:
-    process, address = start(tmp_path, 'four_bar', files=64)
-    parts = urlsplit(address)
-    try:
+    with started(tmp_path, 'four_bar', files=64) as (process, address, said):
+        place = urlsplit(address).hostname, urlsplit(address).port
         with ExitStack() as connections:
             for _ in range(100):
-                place = parts.hostname, parts.port
                 connections.enter_context(socket.create_connection(place, timeout=60.0))
             assert process.stderr is not None
             line = process.stderr.readline()
         with urlopen(address, timeout=60.0) as page:
             assert page.status == 200
-    finally:
-        process.send_signal(signal.SIGINT)
-        _, rest = process.communicate(timeout=30.0)
-    assert (line, rest) == ('linkage view: refused a connection (Too many open files)\n', '')
+    assert line == 'linkage view: refused a connection (Too many open files)\n'
+    assert said[1] == ''
 
 
 def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
@@ -585,15 +525,11 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
     answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
     assert (answer.returncode, answer.stderr) == (0, '')
     assert (tmp_path / 'view.html').read_bytes() == expected
-    process, address = start(tmp_path, 'bag')
-    try:
+    with started(tmp_path, 'bag') as (_, address, _):
         with urlopen(address, timeout=60.0) as page:
             assert page.read() == expected
         with pytest.raises(HTTPError, match='404'):
             urlopen(f'{address}ws', timeout=60.0)
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30.0)
 
 
 @pytest.mark.parametrize(
