@@ -19,7 +19,7 @@ from linkage_ros.resources import shipped_path
 from linkage_ros.tools.view import read_request, RequestError, RequestHandler, requests
 import pytest
 
-from .test_server import BAD_MESSAGES, FOUR_BAR, LONGER
+from .test_server import BAD_MESSAGES, FOUR_BAR
 
 
 def asked(do: str, answers: RequestHandler | None = None, **content: Any) -> dict[str, Any]:
@@ -71,11 +71,6 @@ def test_the_model_of_a_text_has_this_text_and_its_name() -> None:
     found = ok('model', text=FOUR_BAR, whole=True)
     assert (found['name'], found['text']) == ('mine', FOUR_BAR)
     assert ok('model', text=FOUR_BAR, name='other')['name'] == 'other'
-
-
-def test_an_edit_is_answered_with_the_model_of_the_edited_text() -> None:
-    found = ok('edit', text=FOUR_BAR, edit=LONGER)
-    assert found['text'] == FOUR_BAR.replace('0.040', '0.041')
 
 
 def test_a_shipped_linkage_is_opened_by_its_name() -> None:
