@@ -10,6 +10,7 @@
 
 from base64 import b64decode
 from cmath import rect
+from contextlib import contextmanager
 from itertools import combinations, pairwise
 from math import pi
 import random
@@ -145,25 +146,25 @@ def drill_file(drill_bag):
 @pytest.fixture(scope='module')
 def read(browser, drill_file):
     """Give a page for those who leave it as it was."""
-    with opened(browser, drill_file) as shown:
-        yield shown
+    with quiet(browser, drill_file) as page:
+        yield page
 
 
 @pytest.fixture
 def drill(read):
     """Give the page, at the beginning of the run and with all of it in its plots."""
-    read.page.evaluate('Report.pause(); Report.zoom(null); Report.seek(0)')
-    read.page.locator('#traces').check()
-    read.page.evaluate('document.activeElement.blur(); scrollTo(0, 0)')
-    settle(read.page)
+    read.evaluate('Report.pause(); Report.zoom(null); Report.seek(0)')
+    read.locator('#traces').check()
+    read.evaluate('document.activeElement.blur(); scrollTo(0, 0)')
+    settle(read)
     return read
 
 
 @pytest.fixture(scope='module')
 def long_run(browser, folder):
     bag, rockers = bags.long(folder / 'long')
-    with opened(browser, page_of(bag)) as shown:
-        yield shown, rockers
+    with quiet(browser, page_of(bag)) as page:
+        yield page, rockers
 
 
 @pytest.fixture(scope='module')
@@ -174,9 +175,8 @@ def foreign_file(folder):
 @pytest.fixture(scope='module')
 def turning_page(browser, folder):
     """Give the page of a crank that turns twice in 4 s."""
-    with opened(browser, page_of(bags.turning(folder / 'turning', 'continuous'))) as shown:
-        yield shown.page
-        assert not shown.said
+    with quiet(browser, page_of(bags.turning(folder / 'turning', 'continuous'))) as page:
+        yield page
 
 
 @pytest.fixture
@@ -186,6 +186,16 @@ def turning(turning_page):
     turning_page.locator('#range').select_option('continuous')
     settle(turning_page)
     return turning_page
+
+
+@contextmanager
+def quiet(browser, file, **options):
+    """Open a page; at its end it has asked for nothing, said nothing, and fits its window."""
+    with opened(browser, file, **options) as shown:
+        yield shown.page
+        assert not shown.said
+        assert shown.asked == [file.as_uri()]
+        assert not shown.is_wider_than_its_window()
 
 
 def settle(page):
@@ -264,12 +274,9 @@ def recorded(drill_file):
 
 @pytest.mark.parametrize(('width', 'scheme'), [(400, 'dark'), (1600, 'light')])
 def test_it_opens_without_a_word_a_request_or_a_scroll_bar(browser, drill_file, width, scheme):
-    with opened(browser, drill_file, width=width, color_scheme=scheme) as shown:
-        page = shown.page
+    with quiet(browser, drill_file, width=width, color_scheme=scheme) as page:
         assert page.title() == 'Run of drill & <b>bold</b>'
-        assert shown.asked == [drill_file.as_uri()]
         assert page.evaluate(WIDER) == []
-        assert not shown.is_wider_than_its_window()
         ink, paper = map(brightness, page.evaluate(COLOURS))
         assert (paper > 220 and ink < 80) if scheme == 'light' else (paper < 60 and ink > 200)
         assert all(count for _, count in page.evaluate(DRAWN))
@@ -278,23 +285,20 @@ def test_it_opens_without_a_word_a_request_or_a_scroll_bar(browser, drill_file, 
         for time in (0.0, 2.05, 5.1):
             page.evaluate('(time) => Report.seek(time)', time)
             assert page.evaluate(BROKEN) == []
-        assert not shown.said
 
 
 def test_it_opens_at_the_first_pose(browser, folder):
     """A crank may come long after the run began: an empty picture would say nothing."""
-    with opened(browser, page_of(bags.drill(folder / 'late', begin=0.6))) as shown:
-        assert shown.page.evaluate(PINS) is not None
-        time = float(readout(shown.page)['time'].removesuffix(' s'))
+    with quiet(browser, page_of(bags.drill(folder / 'late', begin=0.6))) as page:
+        assert page.evaluate(PINS) is not None
+        time = float(readout(page)['time'].removesuffix(' s'))
         assert time == pytest.approx(0.6, abs=0.05)
-        assert not shown.said
 
 
 def test_light_and_dark_are_what_the_system_and_the_switch_say_and_paper_is_light(
     browser, drill_file
 ):
-    with opened(browser, drill_file, width=1600, color_scheme='light') as shown:
-        page = shown.page
+    with quiet(browser, drill_file, width=1600, color_scheme='light') as page:
 
         def looks():
             settle(page)
@@ -325,13 +329,11 @@ def test_light_and_dark_are_what_the_system_and_the_switch_say_and_paper_is_ligh
         assert not any(each.is_visible() for each in page.locator('.controls, #scheme').all())
         page.emulate_media(media='screen', color_scheme='dark')
         assert looks() == dark
-        assert not shown.said
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_file, scheme):
-    with opened(browser, drill_file, forced_colors='active', color_scheme=scheme) as shown:
-        page = shown.page
+    with quiet(browser, drill_file, forced_colors='active', color_scheme=scheme) as page:
         assert painted_faces(page) == [scheme == 'light', scheme == 'dark']
         for place in ('canvas', '[data-plot=rates_rad] .main-svg'):
             ground = page.locator(place).first.evaluate(
@@ -346,14 +348,12 @@ def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_
                 '(each) => [getComputedStyle(each).color, getComputedStyle(each).backgroundColor]'
             )
             assert abs(brightness(ink) - brightness(ground)) > 100
-        assert not shown.said
 
 
 def test_it_takes_the_width_of_its_window_and_a_foreign_font_does_not_break_it(
     browser, drill_file
 ):
-    with opened(browser, drill_file) as shown:
-        page = shown.page
+    with quiet(browser, drill_file) as page:
         for width in (1600, 400, 1000):
             page.set_viewport_size({'width': width, 'height': 900})
             page.wait_for_function(
@@ -361,28 +361,24 @@ def test_it_takes_the_width_of_its_window_and_a_foreign_font_does_not_break_it(
                   Math.abs(figure.clientWidth
                     - figure.querySelector('.main-svg').clientWidth) < 2)"""
             )
-            assert not shown.is_wider_than_its_window()
+            assert page.evaluate(WIDER) == []
             assert any(painted_faces(page))
         page.add_style_tag(content='* { font: 22px/1.6 monospace !important; }')
         page.set_viewport_size({'width': 420, 'height': 900})
         settle(page)
-        assert not shown.is_wider_than_its_window()
         assert all(count for _, count in page.evaluate(DRAWN))
         page.locator('#onward').click()
         assert page.evaluate('Report.number') == 1
-        assert not shown.said
 
 
 def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
-    with opened(browser, drill_file, width=400, has_touch=True, is_mobile=True) as shown:
+    with quiet(browser, drill_file, width=400, has_touch=True, is_mobile=True) as page:
         layout = 'document.querySelector("[data-plot=rates_rad] .plot").layout'
-        assert shown.page.evaluate(f'{layout}.xaxis.fixedrange')
-        assert shown.page.evaluate(f'{layout}.dragmode') is False
-        assert not shown.is_wider_than_its_window()
-        x, y = pixel_of(shown.page, 'rates_rad', 6.3, 0.0)
-        shown.page.touchscreen.tap(x, y)
-        shown.page.wait_for_function('() => Report.time > 6')
-        assert not shown.said
+        assert page.evaluate(f'{layout}.xaxis.fixedrange')
+        assert page.evaluate(f'{layout}.dragmode') is False
+        x, y = pixel_of(page, 'rates_rad', 6.3, 0.0)
+        page.touchscreen.tap(x, y)
+        page.wait_for_function('() => Report.time > 6')
 
 
 # It moves.
@@ -390,17 +386,17 @@ def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
 
 def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
     times, pins = recorded
-    end = drill.page.evaluate('Report.whole[1]')
+    end = drill.evaluate('Report.whole[1]')
     draws = random.Random(8)
     posed = 0
     for share in [0.0, 1.0, *(draws.random() for _ in range(60))]:
-        time = scrub(drill.page, share)
+        time = scrub(drill, share)
         assert time == pytest.approx(share * end, abs=1e-6 * end)
         newest = np.searchsorted(times, time + 1e-9) - 1
         # Three periods without a joint state are a silence.
         following = times[newest + 1] if newest + 1 < len(times) else times[newest]
         silent = following - times[newest] > 0.03
-        shown = drill.page.evaluate(PINS)
+        shown = drill.evaluate(PINS)
         if silent:
             assert shown is None
             continue
@@ -409,24 +405,23 @@ def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
         assert np.abs(found - pins[newest]).max() < FLOAT32
     assert posed > 30
     # A sensor that is wrong is seen as such.
-    scrub(drill.page, 0.99)
-    newest = np.searchsorted(times, drill.page.evaluate('Report.time') + 1e-9) - 1
+    scrub(drill, 0.99)
+    newest = np.searchsorted(times, drill.evaluate('Report.time') + 1e-9) - 1
     apart = abs(pins[newest][1] - pins[newest][2])
     assert apart > 1e-3
-    assert readout(drill.page)['links come apart by'] == f'{1e3 * apart:.2f} mm'
+    assert readout(drill)['links come apart by'] == f'{1e3 * apart:.2f} mm'
 
 
 def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
     times, pins = recorded
-    page = drill.page
-    page.locator('#traces').uncheck()
+    drill.locator('#traces').uncheck()
 
     def colour_at(place):
-        return page.evaluate(COLOUR_AT, [place.real, place.imag])
+        return drill.evaluate(COLOUR_AT, [place.real, place.imag])
 
     middles = {}
     for time in (0.5, 1.65):
-        page.evaluate('(time) => Report.seek(time)', time)
+        drill.evaluate('(time) => Report.seek(time)', time)
         newest = np.searchsorted(times, time + 1e-9) - 1
         middles[time] = pins[newest][0] / 2
         for pin_a, pin_b, face in ((0, pins[newest][0], INPUT_FACE),
@@ -436,24 +431,24 @@ def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
     assert abs(middles[0.5] - middles[1.65]) > 0.01
     # Where the crank was before, there is paper.
     assert colour_at(middles[0.5]) == ''
-    page.locator('#traces').check()
+    drill.locator('#traces').check()
 
 
 @pytest.mark.parametrize('time', [1.25, 3.4, 5.1])
 def test_where_no_joint_state_was_recorded_no_pose_is_drawn_and_the_page_says_so(drill, time):
-    assert INPUT_FACE in drill.page.evaluate(PAINTED)[0]
-    drill.page.evaluate('(time) => Report.seek(time)', time)
-    (painted,) = drill.page.evaluate(PAINTED)
+    assert INPUT_FACE in drill.evaluate(PAINTED)[0]
+    drill.evaluate('(time) => Report.seek(time)', time)
+    (painted,) = drill.evaluate(PAINTED)
     assert INPUT_FACE not in painted
     assert LINK_FACE not in painted
-    told = readout(drill.page)
+    told = readout(drill)
     assert told['pose'] == 'none recorded here'
     assert 'gap in joint states' in told['going on']
     assert 'rocker_joint' not in told
 
 
 def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
-    told = readout(drill.page)
+    told = readout(drill)
     assert told['time'] == '0.000000 s'
     coupler, rocker = bags.follow(bags.A, bags.B, bags.C, bags.D, 0.9 * pi * 0.003)
     for joint, value in (('coupler_joint', coupler), ('rocker_joint', rocker)):
@@ -462,13 +457,12 @@ def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
         assert unit == 'rad'
         assert float(degrees.strip('(°)')) == pytest.approx(value * 180 / pi, abs=0.0051)
     assert 'going on' not in told
-    drill.page.evaluate('Report.seek(2.05)')
-    assert 'samples rejected: position or rate not finite' in readout(drill.page)['going on']
+    drill.evaluate('Report.seek(2.05)')
+    assert 'samples rejected: position or rate not finite' in readout(drill)['going on']
 
 
 def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_file):
-    with opened(browser, drill_file) as shown:
-        page = shown.page
+    with quiet(browser, drill_file) as page:
         page.clock.install(time=0)
         page.clock.pause_at(1000)
         for speed in ('1', '0.25', '2'):
@@ -498,53 +492,48 @@ def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_f
         page.locator('#play').click()
         page.clock.run_for(100)
         assert 0 < page.evaluate('Report.time') < 0.2
-        assert not shown.said
 
 
 def test_buttons_and_keys_step_from_picture_to_picture(drill, recorded):
     times, _ = recorded
-    page = drill.page
     numbers = []
     for act in (
-        lambda: page.locator('#onward').click(),
-        lambda: page.keyboard.press('ArrowRight'),
-        lambda: page.locator('#scrub').press('ArrowRight'),
-        lambda: page.locator('#back').click(),
-        lambda: page.keyboard.press('ArrowLeft'),
+        lambda: drill.locator('#onward').click(),
+        lambda: drill.keyboard.press('ArrowRight'),
+        lambda: drill.locator('#scrub').press('ArrowRight'),
+        lambda: drill.locator('#back').click(),
+        lambda: drill.keyboard.press('ArrowLeft'),
     ):
         act()
-        number = page.evaluate('Report.number')
-        assert page.evaluate('Report.time') == pytest.approx(times[number], abs=1e-9)
+        number = drill.evaluate('Report.number')
+        assert drill.evaluate('Report.time') == pytest.approx(times[number], abs=1e-9)
         numbers.append(number)
     assert numbers == [1, 2, 3, 2, 1]
     for _ in range(3):
-        page.locator('#back').click()
-    assert page.evaluate('Report.number') == 0
-    assert not drill.said
+        drill.locator('#back').click()
+    assert drill.evaluate('Report.number') == 0
 
 
 def test_space_plays_and_pauses_unless_it_is_meant_for_something_else(drill):
-    page = drill.page
-    page.keyboard.press(' ')
-    assert page.evaluate('Report.playing')
-    page.keyboard.press(' ')
-    assert not page.evaluate('Report.playing')
-    page.locator('summary').press(' ')
-    assert page.locator('details').get_attribute('open') is not None
-    assert not page.evaluate('Report.playing')
-    page.locator('summary').press(' ')
-    page.locator('#traces').press(' ')
-    assert not page.evaluate('Report.playing')
-    assert not page.locator('#traces').is_checked()
-    page.locator('#traces').check()
-    before = page.evaluate('Report.number')
-    page.keyboard.press('Control+ArrowRight')
-    assert page.evaluate('Report.number') == before
+    drill.keyboard.press(' ')
+    assert drill.evaluate('Report.playing')
+    drill.keyboard.press(' ')
+    assert not drill.evaluate('Report.playing')
+    drill.locator('summary').press(' ')
+    assert drill.locator('details').get_attribute('open') is not None
+    assert not drill.evaluate('Report.playing')
+    drill.locator('summary').press(' ')
+    drill.locator('#traces').press(' ')
+    assert not drill.evaluate('Report.playing')
+    assert not drill.locator('#traces').is_checked()
+    drill.locator('#traces').check()
+    before = drill.evaluate('Report.number')
+    drill.keyboard.press('Control+ArrowRight')
+    assert drill.evaluate('Report.number') == before
 
 
 def test_each_linkage_of_a_scene_has_its_picture(browser, folder):
-    with opened(browser, page_of(bags.fingers(folder / 'fingers'))) as shown:
-        page = shown.page
+    with quiet(browser, page_of(bags.fingers(folder / 'fingers'))) as page:
         assert page.locator('.pictures figcaption').all_inner_texts() == ['left', 'right']
         page.evaluate('Report.seek(1.0)')
         tips = page.evaluate("""() => Report.linkages.map(
@@ -558,32 +547,29 @@ def test_each_linkage_of_a_scene_has_its_picture(browser, folder):
         assert [plot for plot, _ in page.evaluate(DRAWN) if plot.startswith('crossed')] == [
             'crossed_0', 'crossed_1',
         ]  # fmt: skip
-        assert not shown.said
 
 
 # Its plots.
 
 
 def test_a_zoom_in_one_plot_is_one_in_all_and_a_double_click_shows_all_again(drill):
-    page = drill.page
-    whole = page.evaluate('Report.whole')
-    assert page.evaluate(RANGES) == [whole] * 5
-    drag(page, 'rates_rad', 2.0, 4.0)
-    ranges = page.evaluate(RANGES)
+    whole = drill.evaluate('Report.whole')
+    assert drill.evaluate(RANGES) == [whole] * 5
+    drag(drill, 'rates_rad', 2.0, 4.0)
+    ranges = drill.evaluate(RANGES)
     assert ranges == [ranges[0]] * 5
     assert ranges[0] == pytest.approx([2.0, 4.0], abs=0.05)
     # The bar is for all of the run, whatever is shown of it.
-    assert scrub(page, 1.0) == whole[1]
-    lanes = page.evaluate("document.querySelector('[data-plot=events] .plot').data")
+    assert scrub(drill, 1.0) == whole[1]
+    lanes = drill.evaluate("document.querySelector('[data-plot=events] .plot').data")
     shown = [x for lane in lanes for x in lane['x'] if x is not None]
     assert shown
     assert all(whole[0] <= x <= whole[1] for x in shown)
-    x, y = pixel_of(page, 'age', 3.0, 100.0)
-    page.mouse.dblclick(x, y)
-    settle(page)
-    assert page.evaluate(RANGES) == [whole] * 5
-    assert page.evaluate('Report.whole') == whole
-    assert not drill.said
+    x, y = pixel_of(drill, 'age', 3.0, 100.0)
+    drill.mouse.dblclick(x, y)
+    settle(drill)
+    assert drill.evaluate(RANGES) == [whole] * 5
+    assert drill.evaluate('Report.whole') == whole
 
 
 def drag(page, plot, begin, end):
@@ -603,8 +589,7 @@ def drag(page, plot, begin, end):
 
 
 def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
-    shown, rockers = long_run
-    page = shown.page
+    page, rockers = long_run
     name = ['positions_rad', 'rocker_joint']
     trace = page.evaluate(TRACE, name)
     rows = [trace['rows']]
@@ -642,43 +627,40 @@ def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
     assert (np.abs(wrapped) == pi).sum() <= 2 * 19
     assert np.abs(wrapped).max() <= pi
     assert longest_step(page) < 0.5
-    assert not shown.said
 
 
 def test_the_pointer_tells_what_a_point_and_a_span_are(drill):
-    page = drill.page
-    trace = page.evaluate(TRACE, ['rates_rad', 'crank_joint'])
+    trace = drill.evaluate(TRACE, ['rates_rad', 'crank_joint'])
     place = next(i for i, x in enumerate(trace['x']) if x is not None and x > 6.2)
     time, value = trace['x'][place], trace['y'][place]
-    height = page.evaluate(
+    height = drill.evaluate(
         "document.querySelector('[data-plot=events] .plot').layout.yaxis.tickvals[2]"
     )
     for plot, at, told in (
         ('rates_rad', (time, value), ('crank_joint', f'{time:.6f} s', f'{value:.9g} rad/s')),
         ('events', (5.03, height), ('no pose, by diagnostics', '4.500000 s to 5.500000 s (1 s)')),
     ):
-        page.mouse.move(*pixel_of(page, plot, *at))
-        text = page.locator('.hovertext')
+        drill.mouse.move(*pixel_of(drill, plot, *at))
+        text = drill.locator('.hovertext')
         text.wait_for()
         assert all(word in text.text_content() for word in told)
-        page.mouse.move(1, 1)
+        drill.mouse.move(1, 1)
         text.wait_for(state='detached')
     for plot, unit in (('crossed_0', ' rad'), ('spread_age', ('tick', ' ticks')), ('age', ' ms')):
-        texts = [text for text in page.evaluate(f'{data_in(plot)}[0].text') if text]
+        texts = [text for text in drill.evaluate(f'{data_in(plot)}[0].text') if text]
         assert texts
         assert all(text.endswith(unit) for text in texts if 'NaN' not in text)
 
 
 @pytest.mark.parametrize('y', [0.0, -2.0], ids=['between curves', 'below'])
 def test_a_click_into_a_plot_goes_there(drill, y):
-    page = drill.page
-    x, y = pixel_of(page, 'rates_rad', 6.3, y)
-    page.mouse.click(x, y)
-    assert page.evaluate('Report.time') == pytest.approx(6.3, abs=0.05)
-    for line in page.locator('.cursor').all():
+    x, y = pixel_of(drill, 'rates_rad', 6.3, y)
+    drill.mouse.click(x, y)
+    assert drill.evaluate('Report.time') == pytest.approx(6.3, abs=0.05)
+    for line in drill.locator('.cursor').all():
         assert line.bounding_box()['x'] == pytest.approx(x, abs=5)
-    assert float(page.locator('#scrub').input_value()) / 1e6 == pytest.approx(6.3 / 7.98, abs=0.01)
-    assert not drill.said
+    share = float(drill.locator('#scrub').input_value()) / 1e6
+    assert share == pytest.approx(6.3 / 7.98, abs=0.01)
 
 
 def test_what_happened_stands_on_the_time_line(drill, drill_file):
@@ -689,7 +671,7 @@ def test_what_happened_stands_on_the_time_line(drill, drill_file):
         for (begin, end, _, text), wanted in zip(lanes[title], expected, strict=True):
             assert (begin, end) == pytest.approx(wanted[:2], abs=TICK)
             assert wanted[2] in text
-    drawn = drill.page.evaluate(
+    drawn = drill.evaluate(
         f'{data_in("events")}.filter((lane) => lane.name).map(({{name, x}}) => [name, x])'
     )
     for title, times in drawn:
@@ -697,7 +679,7 @@ def test_what_happened_stands_on_the_time_line(drill, drill_file):
         assert times.count(None) == len(spans)
         assert {x for x in times if x is not None} >= {x for span in spans for x in span[:2]}
     assert not lanes
-    titles = drill.page.locator('[data-plot=events] .ytick text').all_text_contents()
+    titles = drill.locator('[data-plot=events] .ytick text').all_text_contents()
     # A title of two lines has no space where it is broken.
     assert [title.replace(' ', '') for title in titles] == [
         title.replace(' ', '') for title, _ in drawn
@@ -707,7 +689,7 @@ def test_what_happened_stands_on_the_time_line(drill, drill_file):
 def test_a_joint_has_one_colour_in_all_plots_and_joints_have_their_own(drill):
     found = {}
     for plot in ('positions_rad', 'rates_rad', 'crossed_0'):
-        for trace in drill.page.evaluate(data_in(plot)):
+        for trace in drill.evaluate(data_in(plot)):
             found.setdefault(trace['name'], set()).add(trace['marker']['color'])
     assert set(found) == {'crank_joint', 'coupler_joint', 'rocker_joint'}
     assert all(len(colours) == 1 for colours in found.values())
@@ -737,12 +719,12 @@ def test_each_fault_is_named_at_its_bar_no_name_lies_on_another_and_wide_tables_
     browser, faulty_file, width
 ):
     names, file = faulty_file
-    with opened(browser, file, width=width) as page:
-        told = page.page.locator('[data-plot=events] .annotation-text').all_text_contents()
+    with quiet(browser, file, width=width) as page:
+        told = page.locator('[data-plot=events] .annotation-text').all_text_contents()
         assert sorted(told) == sorted(names)
-        boxes = page.page.evaluate(BOXES, '.annotation-text')
-        rows = page.page.evaluate(BOXES, '.ytick text')
-        ((left, _, right, _),) = page.page.evaluate(BOXES, '.nsewdrag')
+        boxes = page.evaluate(BOXES, '.annotation-text')
+        rows = page.evaluate(BOXES, '.ytick text')
+        ((left, _, right, _),) = page.evaluate(BOXES, '.nsewdrag')
         assert all(left <= box[0] and box[2] <= right + 1 for box in boxes)
         # The names of rows have a gutter of their own, left of the bars and the time.
         assert all(box[2] <= left for box in rows)
@@ -750,111 +732,97 @@ def test_each_fault_is_named_at_its_bar_no_name_lies_on_another_and_wide_tables_
         for one, other in combinations([*boxes, *rows], 2):
             apart = one[2] <= other[0] or other[2] <= one[0]
             assert apart or one[3] <= other[1] + 2 or other[3] <= one[1] + 2
-        assert page.page.evaluate(WIDER) == []
-        topics = page.page.locator('figure:has(figcaption:text-is("Topics")) .scroll')
+        assert page.evaluate(WIDER) == []
+        topics = page.locator('figure:has(figcaption:text-is("Topics")) .scroll')
         inner, outer = topics.evaluate('(each) => [each.scrollWidth, each.clientWidth]')
         if width == 400:
             assert inner > outer
             topics.focus()
-            page.page.keyboard.press('ArrowRight')
-            page.page.wait_for_function(
+            page.keyboard.press('ArrowRight')
+            page.wait_for_function(
                 '() => [...document.querySelectorAll(".scroll")].some((each) => each.scrollLeft)'
             )
-        assert not page.said
 
 
 # Its switches and keys.
 
 
 def test_the_switch_to_degrees_changes_titles_values_and_the_readout(turning):
-    page = turning
-    radians = {key: values(page, plot=key) for key in ('positions_rad', 'rates_rad')}
-    assert page.evaluate(PLOT, 'rates_rad') == {
+    radians = {key: values(turning, plot=key) for key in ('positions_rad', 'rates_rad')}
+    assert turning.evaluate(PLOT, 'rates_rad') == {
         'caption': 'Rates of angles [rad/s]', 'axis': '[rad/s]'
     }  # fmt: skip
-    page.evaluate('Report.seek(2.5)')
-    assert readout(page)['crank_joint'] == '7.85398 rad (1 turn + 90.00°)'
-    page.locator('#unit').select_option('degrees')
-    settle(page)
-    assert page.evaluate(PLOT, 'positions_rad') == {'caption': 'Angles [°]', 'axis': '[°]'}
-    assert page.evaluate(PLOT, 'rates_rad') == {
+    turning.evaluate('Report.seek(2.5)')
+    assert readout(turning)['crank_joint'] == '7.85398 rad (1 turn + 90.00°)'
+    turning.locator('#unit').select_option('degrees')
+    settle(turning)
+    assert turning.evaluate(PLOT, 'positions_rad') == {'caption': 'Angles [°]', 'axis': '[°]'}
+    assert turning.evaluate(PLOT, 'rates_rad') == {
         'caption': 'Rates of angles [°/s]', 'axis': '[°/s]'
     }  # fmt: skip
     for key, before in radians.items():
-        assert values(page, plot=key) == pytest.approx(before / DEGREE)
-    assert readout(page)['crank_joint'] == '450.000° (1 turn + 90.00°)'
+        assert values(turning, plot=key) == pytest.approx(before / DEGREE)
+    assert readout(turning)['crank_joint'] == '450.000° (1 turn + 90.00°)'
     over = "document.querySelector('[data-plot=crossed_0] .plot').layout"
-    assert page.evaluate(f'{over}.xaxis.range') == [0, 360]
-    assert page.evaluate(f'{over}.yaxis.title.text') == '[°]'
-    page.locator('#unit').select_option('rad')
-    settle(page)
-    assert (values(page) == radians['positions_rad']).all()
+    assert turning.evaluate(f'{over}.xaxis.range') == [0, 360]
+    assert turning.evaluate(f'{over}.yaxis.title.text') == '[°]'
+    turning.locator('#unit').select_option('rad')
+    settle(turning)
+    assert (values(turning) == radians['positions_rad']).all()
 
 
 def test_within_half_a_turn_continuous_angles_are_interrupted_where_they_jump(turning):
-    page = turning
-    continuous = values(page)
+    continuous = values(turning)
     assert np.ptp(continuous) == pytest.approx(4 * pi)
-    page.locator('#range').select_option('wrapped')
-    settle(page)
-    wrapped = values(page)
+    turning.locator('#range').select_option('wrapped')
+    settle(turning)
+    wrapped = values(turning)
     assert np.exp(1j * wrapped) == pytest.approx(np.exp(1j * continuous))
     assert np.abs(wrapped).max() <= pi
-    assert longest_step(page) < 0.1
-    page.evaluate('Report.seek(2.5)')
-    assert readout(page)['crank_joint'] == '1.57080 rad (90.00°)'
+    assert longest_step(turning) < 0.1
+    turning.evaluate('Report.seek(2.5)')
+    assert readout(turning)['crank_joint'] == '1.57080 rad (90.00°)'
 
 
 def test_angles_recorded_within_a_turn_are_shown_so_until_they_are_made_continuous(
     browser, folder
 ):
-    with opened(browser, page_of(bags.turning(folder / 'wrapped', 'wrapped'))) as page:
-        assert page.page.locator('#range').input_value() == 'wrapped'
-        assert np.abs(values(page.page)).max() <= pi
-        page.page.locator('#range').select_option('continuous')
-        settle(page.page)
+    with quiet(browser, page_of(bags.turning(folder / 'wrapped', 'wrapped'))) as page:
+        assert page.locator('#range').input_value() == 'wrapped'
+        assert np.abs(values(page)).max() <= pi
+        page.locator('#range').select_option('continuous')
+        settle(page)
         expected = 0.01 * pi * np.arange(401)
-        assert values(page.page) == pytest.approx(expected, abs=1e-12)
-        assert not page.said
+        assert values(page) == pytest.approx(expected, abs=1e-12)
 
 
 def test_every_control_is_reached_and_worked_by_keys_alone(turning):
-    page = turning
     reached = set()
     for _ in range(20):
-        page.keyboard.press('Tab')
-        reached.add(page.evaluate('document.activeElement.id'))
-    assert {
-        'scheme',
-        'play',
-        'back',
-        'onward',
-        'scrub',
-        'speed',
-        'traces',
-        'unit',
-        'range',
-    } <= reached
-    page.evaluate('document.activeElement.blur()')
-    page.keyboard.press('End')
-    assert page.evaluate('Report.time === Report.whole[1]')
-    page.keyboard.press('Home')
-    assert page.evaluate('Report.time') == 0
-    page.evaluate('Report.seek(2)')
-    page.keyboard.press('+')
-    assert page.evaluate('Report.view') == pytest.approx([2 - 2 / 1.5, 2 + 2 / 1.5])
-    page.keyboard.press('-')
-    assert page.evaluate('Report.view') == pytest.approx([0, 4])
-    page.keyboard.press('+')
-    page.keyboard.press('0')
-    assert page.evaluate('Report.view') == [0, 4]
-    page.keyboard.press('d')
-    page.keyboard.press('w')
-    assert page.locator('#unit').input_value() == 'degrees'
-    assert page.locator('#range').input_value() == 'wrapped'
+        turning.keyboard.press('Tab')
+        reached.add(turning.evaluate('document.activeElement.id'))
+    controls = 'scheme play back onward scrub speed traces unit range'
+    assert {*controls.split()} <= reached
+    turning.evaluate('document.activeElement.blur()')
+    turning.keyboard.press('End')
+    assert turning.evaluate('Report.time === Report.whole[1]')
+    turning.keyboard.press('Home')
+    assert turning.evaluate('Report.time') == 0
+    turning.evaluate('Report.seek(2)')
+    turning.keyboard.press('+')
+    assert turning.evaluate('Report.view') == pytest.approx([2 - 2 / 1.5, 2 + 2 / 1.5])
+    turning.keyboard.press('-')
+    assert turning.evaluate('Report.view') == pytest.approx([0, 4])
+    turning.keyboard.press('+')
+    turning.keyboard.press('0')
+    assert turning.evaluate('Report.view') == [0, 4]
+    turning.keyboard.press('d')
+    turning.keyboard.press('w')
+    assert turning.locator('#unit').input_value() == 'degrees'
+    assert turning.locator('#range').input_value() == 'wrapped'
     # In a list, a letter chooses among its items.
-    page.locator('#speed').press('d')
-    assert page.locator('#unit').input_value() == 'degrees'
+    turning.locator('#speed').press('d')
+    assert turning.locator('#unit').input_value() == 'degrees'
 
 
 # Bags of others.
@@ -862,42 +830,34 @@ def test_every_control_is_reached_and_worked_by_keys_alone(turning):
 
 def test_names_that_are_markup_stay_names(browser, folder, foreign_file):
     for file in (foreign_file, page_of(bags.named(folder / 'named'))):
-        with opened(browser, file, width=400) as shown:
-            page = shown.page
+        with quiet(browser, file, width=400) as page:
             page.mouse.move(200, 400)
             assert page.evaluate('window.hit') is None
             assert page.locator('img, b:not(.hovertext b)').count() == 0
-            assert not shown.said
-            assert len(shown.asked) == 1
-            assert not shown.is_wider_than_its_window()
             assert bags.NAMES[1] in page.locator('body').inner_text()
             legend = page.locator('.legendtext').all_text_contents()
             assert any(text.startswith(r'$\sqrt{2}$ & <b>') for text in legend)
             assert all(count for _, count in page.evaluate(DRAWN))
             page.evaluate('Report.seek(1.0)')
             assert page.evaluate('window.hit') is None
-            assert not shown.said
 
 
 def test_a_bag_without_a_scene_has_plots_and_no_player(browser, foreign_file):
-    with opened(browser, foreign_file) as shown:
-        assert 'No scene of linkage_ros' in shown.page.locator('.warnings').inner_text()
-        assert shown.page.locator('canvas, .controls').count() == 0
-        assert [plot for plot, _ in shown.page.evaluate(DRAWN)] == ['positions', 'rates']
-        drag(shown.page, 'rates', 0.5, 1.0)
-        ranges = shown.page.evaluate(RANGES)
+    with quiet(browser, foreign_file) as page:
+        assert 'No scene of linkage_ros' in page.locator('.warnings').inner_text()
+        assert page.locator('canvas, .controls').count() == 0
+        assert [plot for plot, _ in page.evaluate(DRAWN)] == ['positions', 'rates']
+        drag(page, 'rates', 0.5, 1.0)
+        ranges = page.evaluate(RANGES)
         assert ranges[0] == ranges[1] == pytest.approx([0.5, 1.0], abs=0.02)
-        assert not shown.said
 
 
 def test_a_bag_without_a_message_says_so(browser, folder):
-    with opened(browser, page_of(bags.empty(folder / 'empty'))) as shown:
-        text = shown.page.locator('body').inner_text()
+    with quiet(browser, page_of(bags.empty(folder / 'empty'))) as page:
+        text = page.locator('body').inner_text()
         assert 'The bag holds no messages.' in text
         assert 'No joint states are in this bag.' in text
-        assert shown.page.locator('canvas').count() == 0
-        shown.page.keyboard.press(' ')
-        for plot in shown.page.locator('.nsewdrag').all():
+        assert page.locator('canvas').count() == 0
+        page.keyboard.press(' ')
+        for plot in page.locator('.nsewdrag').all():
             plot.click(force=True)
-        assert not shown.said
-        assert not shown.is_wider_than_its_window()
