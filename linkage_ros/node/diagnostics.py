@@ -275,7 +275,7 @@ def _describe_memory(snapshots: RunSnapshots) -> tuple[str, list[Condition], Val
     values: Values = {}
     for topic in topics:
         values[f'Received: {topic.name}'] = topic.received
-        values[f'In memory: {topic.name}'] = topic.kept
+        values[f'In memory: {topic.name}'] = topic.recorded
         values[f'Discarded: {topic.name}'] = topic.discarded
         values[f'Dropped: {topic.name}'] = topic.dropped
     values |= {

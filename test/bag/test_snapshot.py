@@ -158,7 +158,9 @@ def memory(topics):
 
 
 def closes(counts):
-    return all(c.received == c.kept + c.discarded + c.dropped and c.kept >= 0 for c in counts)
+    return all(
+        c.received == c.recorded + c.discarded + c.dropped and c.recorded >= 0 for c in counts
+    )
 
 
 def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
@@ -168,7 +170,7 @@ def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
     kept = memory.take_content()
     assert list(kept.messages()) == [tuple(message) for message in messages[:5000]]
     assert kept.is_complete
-    assert [(c.received, c.kept) for c in memory.stop()] == [(2500, 2500), (2500, 2500)]
+    assert [(c.received, c.recorded) for c in memory.stop()] == [(2500, 2500), (2500, 2500)]
 
 
 def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
@@ -179,7 +181,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
     assert not kept.is_complete
     counts = memory.read_counts()
     assert closes(counts)
-    assert tuple(c.kept for c in counts) == kept.counts
+    assert tuple(c.recorded for c in counts) == kept.counts
     assert all(c.discarded > 4000 for c in counts)
     there = list(kept.messages())
     begin = len(messages) - len(there)
@@ -208,7 +210,7 @@ def test_threads_that_offer_at_once_lose_no_count(memory, messages):
     assert closes(counts)
     assert [c.received for c in counts] == [10_000, 10_000]
     assert [c.dropped for c in counts] == [0, 0]
-    assert tuple(c.kept for c in counts) == kept.counts
+    assert tuple(c.recorded for c in counts) == kept.counts
 
 
 def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
@@ -219,7 +221,7 @@ def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
     assert list(memory.take_content().messages()) == [
         tuple(m) for m in (*messages[:2], *messages[4:6])
     ]
-    assert [(c.received, c.kept, c.dropped) for c in memory.stop()] == [(3, 2, 1), (3, 2, 1)]
+    assert [(c.received, c.recorded, c.dropped) for c in memory.stop()] == [(3, 2, 1), (3, 2, 1)]
 
 
 def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memory, messages):
@@ -231,7 +233,7 @@ def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memo
     # A message of the thread's own batch may have been on its way.
     counts = memory.stop()
     assert closes(counts)
-    assert 100 <= sum(c.kept for c in counts) <= 150
+    assert 100 <= sum(c.recorded for c in counts) <= 150
 
 
 def test_what_waits_for_the_thread_is_bounded_in_bytes(memory, messages):
@@ -242,7 +244,7 @@ def test_what_waits_for_the_thread_is_bounded_in_bytes(memory, messages):
         counts = memory.read_counts()
         # Ten of eleven places each; the thread may have been at one of the first 50 places.
         assert closes(counts)
-        assert 10 <= counts[0].kept <= 15
+        assert 10 <= counts[0].recorded <= 15
     assert closes(memory.stop())
 
 
@@ -262,7 +264,7 @@ def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
     assert 'ended early: ZeroDivisionError: a slip; please report this' in str(memory.failure)
     with pytest.raises(RecordingError, match='a slip'):
         memory.take_content()
-    assert [(c.received, c.kept, c.discarded, c.dropped) for c in memory.stop()] == [
+    assert [(c.received, c.recorded, c.discarded, c.dropped) for c in memory.stop()] == [
         (2, 0, 1, 1),
         (1, 0, 1, 0),
     ]
@@ -271,7 +273,7 @@ def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
 def test_after_the_end_nothing_is_kept(memory, messages):
     memory = memory()
     memory.offer(*messages[0])
-    assert [c.kept for c in memory.stop()] == [1, 0]
+    assert [c.recorded for c in memory.stop()] == [1, 0]
     memory.offer(*messages[0])
     assert [c.dropped for c in memory.read_counts()] == [1, 0]
     with pytest.raises(RecordingError, match='has ended; ask while the node is active'):

@@ -69,7 +69,6 @@ def test_the_joint_states_deserialize_by_the_type_in_the_bag(bag, readers):
 def test_the_summary_says_what_is_in_the_file(bag, messages):
     times = [message.log_time for message in messages]
     assert bag.counts == (6000, 6000)
-    assert bag.refused == (0, 0)
     assert (bag.start, bag.duration) == (min(times), max(times) - min(times))
     assert bag.size == (bag.folder / bag.file).stat().st_size
 
@@ -171,7 +170,6 @@ def test_a_time_that_does_not_fit_costs_that_message_only(
     summary = writer.close()
     kept = [messages[0], *([odd] if taken else []), messages[2]]
     assert summary.counts == (2, int(taken))
-    assert summary.refused == (0, int(not taken))
     assert [data for *_, data in readers.mcap(tmp_path / 'run' / 'run_0.mcap')] == [
         message.data for message in kept
     ]
