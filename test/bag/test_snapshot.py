@@ -22,11 +22,9 @@ from hypothesis import given, strategies
 from linkage_ros.bag import (
     BagWriter,
     LastSeconds,
-    PLACE,
     read_bag,
     SnapshotMemory,
     SnapshotWriting,
-    Storage,
 )
 from linkage_ros.errors import RecordingError
 import pytest
@@ -236,18 +234,6 @@ def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memo
     assert 100 <= sum(c.recorded for c in counts) <= 150
 
 
-def test_what_waits_for_the_thread_is_bounded_in_bytes(memory, messages):
-    memory = memory(capacity=100)
-    with memory._lock:
-        for _ in range(200):
-            memory.offer(*messages[0]._replace(data=bytes(10 * PLACE)))
-        counts = memory.read_counts()
-        # Ten of eleven places each; the thread may have been at one of the first 50 places.
-        assert closes(counts)
-        assert 10 <= counts[0].recorded <= 15
-    assert closes(memory.stop())
-
-
 def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
     memory, messages, monkeypatch
 ):
@@ -318,18 +304,6 @@ def test_two_snapshots_are_two_bags_that_overlap(tmp_path, topics, messages, mem
         received, dropped = said_in(folder)
         assert list(received.values()) == list(kept.counts)
         assert list(dropped.values()) == [0, 0]
-
-
-@pytest.mark.parametrize('compression', ['lz4', 'zstd'])
-def test_a_snapshot_is_packed_as_any_bag(tmp_path, topics, messages, memory, readers, compression):
-    memory = memory()
-    for message in messages[:2000]:
-        memory.offer(*message)
-    storage = Storage(compression=compression, snapshot_seconds=1000.0)
-    folder = tmp_path / 'run'
-    written(memory.take_content(), lambda: BagWriter(folder, topics, storage=storage))
-    readers.agree(folder, topics, messages[:2000])
-    assert (folder / 'run_0.mcap').stat().st_size < 250_000
 
 
 def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(

@@ -10,7 +10,6 @@
 
 import errno
 from io import BytesIO
-from itertools import groupby
 import os
 import subprocess
 import threading
@@ -115,16 +114,6 @@ def test_chunks_are_small_uncompressed_and_checked(bag):
     assert {chunk.compression for chunk in chunks} == {''}
     assert all(chunk.uncompressed_crc for chunk in chunks)
     assert max(chunk.uncompressed_size for chunk in chunks) < 70_000
-
-
-def test_each_topic_numbers_its_messages(bag):
-    with (bag.folder / bag.file).open('rb') as stream:
-        numbered = sorted(
-            (channel.topic, message.sequence)
-            for _, channel, message in make_reader(stream).iter_messages()
-        )
-    for _, group in groupby(numbered, key=lambda pair: pair[0]):
-        assert [sequence for _, sequence in group] == list(range(6000))
 
 
 @pytest.mark.parametrize('custom', [{}, {'a': 'b'}])
