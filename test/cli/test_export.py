@@ -548,8 +548,8 @@ def test_blocks_follow_each_other(
 
 BAD = [
     # what is typed behind the bag, what the answer says
-    (['-o', 'x.txt'], "x.txt: ends in '.txt'; name a file that ends in .csv or .parquet"),
-    (['-o', 'x'], 'x: has no ending; name a file that ends in .csv or .parquet'),
+    (['-o', 'x.txt'], "x.txt: ends in '.txt'; name a file that ends in .csv or .xlsx or .parquet"),
+    (['-o', 'x'], 'x: has no ending; name a file that ends in .csv or .xlsx or .parquet'),
     (['-o', 'no/x.csv'], 'no/x.csv: there is no folder no; make it: mkdir -p no'),
     pytest.param(
         ['-o', 'no/x.parquet'],
