@@ -223,9 +223,9 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
             {
                 'name': topic.name,
                 'type': topic.type,
-                'messages': messages,
+                'messages': each.messages,
                 'rate_hz': each.mean_rate,
-                'size_bytes': size,
+                'size_bytes': each.size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,
                 'qos_understood': topic.qos.understood,
@@ -236,7 +236,7 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
                 else None,
             }
             for each in contents.topics
-            for topic, messages, size, _, _ in [each]
+            for topic in [each.topic]
         ],
         'versions': {
             'linkage_ros': _text_or_none(run.get('linkage_ros')),
