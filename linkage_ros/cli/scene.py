@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from os.path import isfile
@@ -42,6 +43,7 @@ from linkage_ros.description import (
     scene_notes,
     scene_schema,
     Section,
+    Units,
 )
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
@@ -69,7 +71,14 @@ _STAGE = (
     Column('in this scene', 'parameters'),
     Column('', 'needed_by'),
 )
-_FAULT = ('name', 'kind', Column('in this scene', 'parameters'), 'injected')
+_FAULT = (
+    'name',
+    'kind',
+    Column('in this scene', 'parameters'),
+    'injected',
+    Column(None, 'at', 's'),
+    Column(None, 'seconds', 's'),
+)
 _TOPIC = (
     Column('', 'what'),
     Column('topic', 'name'),
@@ -144,22 +153,26 @@ def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
+    units, linkage = line.scene_linkage.content.units, line.scene_linkage.linkage
+    slides = {name: joint.unit == 'm' for name, joint in linkage.joints.items()}
+    slides |= {given.joint: given.unit == 'm' for given in linkage.inputs}
     for index, stage in enumerate(_list_stages(line)):
         yield (
             str(index),
             stage.name,
             stage.where,
             first_docstring_line(type(stage.parameters)),
-            _parameters_text(stage.parameters),
+            _parameters_text(stage.parameters, units, slides),
             f'needed by {", ".join(stage.needed_by)}' if stage.needed_by else '',
         )
 
 
-def _fault_rows(scene: Scene) -> Iterator[tuple[str, ...]]:
+def _fault_rows(scene: Scene) -> Iterator[tuple[Any, ...]]:
     for name, fault in scene.faults.items():
         times = ', '.join(f'{time:g}' for time in fault.at)
         when = f'at {times} s, for {fault.seconds:g} s' if fault.at else 'on demand only'
-        yield name, fault.kind, _parameters_text(fault.parameters), when
+        parameters = _parameters_text(fault.parameters, Units(), {})
+        yield name, fault.kind, parameters, when, list(fault.at), fault.seconds
 
 
 def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
@@ -176,27 +189,35 @@ def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
         yield 'serves', _shorten_list(services), 'std_srvs/srv/SetBool', ''
 
 
-def _parameters_text(parameters: Any) -> str:
-    """Return the parameters that differ from their defaults."""
-    texts = [
-        f'{entry.name} {_value_text(getattr(parameters, entry.name))}'
-        + (f' {kind.unit}' if kind.unit else '')
-        for entry, kind in declared_fields(type(parameters))
-        if is_required(entry)
-        or _value_text(getattr(parameters, entry.name)) != _value_text(default_of(entry))
-    ]
+def _parameters_text(parameters: Any, units: Units, slides: Mapping[str, bool]) -> str:
+    """
+    Return the parameters that differ from their defaults, in the units of a file.
+
+    ``slides`` says of each joint whether it slides.
+    """
+
+    def value_text(value: Any, unit: str, units: Units) -> str:
+        if isinstance(value, tuple | list):
+            return f'[{", ".join(value_text(one, unit, units) for one in value)}]'
+        if isinstance(value, dict):
+            texts = (
+                f'{key}: {value_text(one, unit, replace(units, slides=slides.get(key)))}'
+                for key, one in value.items()
+            )
+            return f'{{{", ".join(texts)}}}'
+        if hasattr(value, '__dataclass_fields__'):
+            return f'{{{_parameters_text(value, units, slides)}}}'
+        return f'{units.to_file_unit(value, unit):g}' if isinstance(value, float) else str(value)
+
+    texts = []
+    for entry, kind in declared_fields(type(parameters)):
+        unit = kind.unit or getattr(getattr(kind, 'of', kind), 'unit', '')  # of each, if of many
+        text = value_text(getattr(parameters, entry.name), unit, units)
+        if is_required(entry) or text != value_text(default_of(entry), unit, units):
+            suffix = f' {units.file_unit(kind.unit)}' if kind.unit else ''
+            texts.append(f'{entry.name} {text}{suffix}')
     text = ', '.join(texts)
     return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'
-
-
-def _value_text(value: Any) -> str:
-    if isinstance(value, tuple | list):
-        return f'[{", ".join(map(_value_text, value))}]'
-    if isinstance(value, dict):
-        return f'{{{", ".join(f"{key}: {_value_text(one)}" for key, one in value.items())}}}'
-    if hasattr(value, '__dataclass_fields__'):
-        return f'{{{_parameters_text(value)}}}'
-    return f'{value:g}' if isinstance(value, float) else str(value)
 
 
 def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:

@@ -23,8 +23,8 @@ from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Topic
 from linkage_ros.cli import (
     COMMANDS as ALL_COMMANDS,
     export,
+    find_command,
     info,
-    module_of,
     parser_of,
     PrintableStream,
     replay,
@@ -327,7 +327,7 @@ WITH_A_SCENE = (
 
 
 def takes_a_bag(command: str) -> bool:
-    parser = parser_of(command, import_module(module_of(command)))
+    parser = parser_of(command, find_command(command))
     return any(action.dest == 'bag' for action in parser._actions)
 
 
