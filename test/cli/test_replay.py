@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from hypothesis import assume, example, given, strategies as st
-from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Storage
+from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE
 from linkage_ros.cli import replay
 from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
@@ -40,9 +40,11 @@ from .conftest import json_keys, json_keys_of, Run
 from .recorded import (
     answer,
     BEGIN,
+    Edit,
     JOINT_STATE,
     MS,
     Recorded,
+    rewritten,
     scene_file,
     topic,
 )
@@ -89,35 +91,6 @@ def recorded(folder: Path, text: str, ticks: int = TICKS, **options: Any) -> Pat
     return Recorded(folder / 'bag', scene, crank, **options).run(ticks)
 
 
-Edit = Callable[[int, BagMessage], BagMessage | None]
-
-"""Makes of a message, by its number, what is written; nothing for none."""
-
-
-def rewritten(
-    bag_path: Path,
-    name: str,
-    edit: Edit,
-    twice: str = '',
-    storage: Storage | None = None,
-    custom: Mapping[str, str] | None = None,
-    **said: object,
-) -> Path:
-    """Write a bag once more with other messages, so that its checksums fit, and another run."""
-    bag = read_bag(bag_path)
-    files = {key: ('', data) for key, data in bag.attachments.items()}
-    account = json.loads(bag.attachments[RUN_FILE]) | said
-    files[RUN_FILE] = ('', json.dumps(account).encode())
-    numbers = {each.name: index for index, each in enumerate(bag.topics)}
-    writer = BagWriter(bag_path.with_name(name), bag.topics, files, storage)
-    for index, message in enumerate(bag.messages()):
-        edited = edit(index, message)
-        for _ in range(1 + (message.topic == twice) if edited else 0):
-            writer.write(numbers[edited.topic], *edited[1:])
-    writer.close(custom)
-    return writer.folder
-
-
 def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[str, Any]]:
     """Return exit code and account of ``linkage replay --json``."""
     capsys.readouterr()
@@ -158,7 +131,7 @@ def test_on_a_shared_topic_messages_without_an_open_linkage_are_compared(tmp_pat
 def test_two_linkages_that_withhold_at_one_tick_say_so_twice(tmp_path, capsys):
     # As the tick loop has it: for each linkage without a reading, where no other has one.
     bag = recorded(tmp_path, SCENES['two that withhold'])
-    twice = rewritten(bag, 'twice', lambda _, message: message, twice='/linkage/withheld')
+    twice = rewritten(bag, 'twice', twice='/linkage/withheld')
     code, account = told(capsys, twice)
     assert (code, account['verdict']) == (0, 'identical')
     assert 2 * account['withheld_ticks'] == sum(
@@ -276,22 +249,12 @@ def test_what_the_recorder_dropped_is_no_difference(tmp_path, capsys):
 
 def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {dropout: {probability: 0.3}}\n')
-    scene = read_bag(bag).attachments['scene.yaml']
+    files = read_bag(bag).attachments
 
-    def without(name: str, data: bytes) -> Path:
-        found = read_bag(bag)
-        files = {key: ('', value) for key, value in found.attachments.items()}
-        files['scene.yaml'] = ('', data)
-        numbers = {each.name: index for index, each in enumerate(found.topics)}
-        writer = BagWriter(tmp_path / name, found.topics, files)
-        for message in found.messages():
-            writer.write(numbers[message.topic], *message[1:])
-        writer.close()
-        return writer.folder
-
-    other = scene.replace(b'0.3', b'0.0')
-    assert other != scene
-    code, account = told(capsys, without('never', other))
+    other = files['scene.yaml'].replace(b'0.3', b'0.0')
+    assert other != files['scene.yaml']
+    never = rewritten(bag, 'never', attachments={**files, 'scene.yaml': other})
+    code, account = told(capsys, never)
     assert code == 3
     assert account['first_difference']['what'] == 'withheld then, published now'
     withheld = [m for m in read_bag(bag).messages() if m.topic == '/linkage/withheld']

@@ -36,6 +36,7 @@ from .recorded import (
     JOINT_STATE,
     MS,
     Recorded,
+    rewritten,
     scene_file,
     SECOND,
     told as messages_of,
@@ -226,18 +227,11 @@ def test_a_wish_to_stop_is_heard_while_the_samples_are_looked_for(tmp_path):
 def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys):
     bag = recorded(tmp_path)
 
-    def made_in(message: BagMessage, time: int) -> BagMessage:
-        states = message.topic == '/joint_states'
-        return message._replace(publish_time=time) if states else message
+    def edit(_: int, message: BagMessage) -> BagMessage:
+        odd = message.log_time == BEGIN + 100 * MS + MS // 4 and message.topic == '/joint_states'
+        return message._replace(publish_time=1) if odd else message
 
-    found = read_bag(bag)
-    files = {name: ('', data) for name, data in found.attachments.items()}
-    numbers = {each.name: index for index, each in enumerate(found.topics)}
-    writer = BagWriter(tmp_path / 'odd', found.topics, files)
-    for message in found.messages():
-        odd = message.log_time == BEGIN + 100 * MS + MS // 4
-        writer.write(numbers[message.topic], *(made_in(message, 1) if odd else message)[1:])
-    writer.close()
+    rewritten(bag, 'odd', edit)
     scene = other(tmp_path, 'effects: {bias: {joints: {rocker_joint: 0.125}}}\n')
     account = told(capsys, tmp_path / 'odd', '--scene', scene)
     assert TICKS - 2 <= account['joint_states'] <= TICKS + 2

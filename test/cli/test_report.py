@@ -25,7 +25,7 @@ from linkage_ros.tools.view import report_command as command
 import pytest
 
 from .conftest import Run
-from .recorded import answer, JOINT_STATE, Recorded, scene_file, topic
+from .recorded import answer, JOINT_STATE, Recorded, rewritten, scene_file, topic
 
 pytest.importorskip('plotly', reason='is within the page')
 
@@ -205,12 +205,7 @@ def test_a_part_beyond_the_end_says_so(bag: Path, tmp_path: Path) -> None:
 
 
 def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:
-    read = read_bag(bag)
-    numbers = {each.name: index for index, each in enumerate(read.topics)}
-    writer = BagWriter(tmp_path / 'foreign', read.topics)
-    for message in read.messages():
-        writer.write(numbers[message.topic], *message[1:])
-    writer.close()
+    rewritten(bag, 'foreign', attachments={})
     assert answer(command, tmp_path / 'foreign') == 0
     page = tmp_path / 'foreign.html'
     (warning,) = warnings_of(page)
@@ -301,14 +296,7 @@ SCENES = {
 def test_a_scene_that_cannot_be_read_here_is_told_and_the_rest_is_shown(
     bag: Path, tmp_path: Path, name: str
 ) -> None:
-    read = read_bag(bag)
-    numbers = {each.name: index for index, each in enumerate(read.topics)}
-    attached = {key: ('', data) for key, data in read.attachments.items()}
-    attached['scene.yaml'] = '', SCENES[name]
-    writer = BagWriter(tmp_path / 'odd', read.topics, attached)
-    for message in read.messages():
-        writer.write(numbers[message.topic], *message[1:])
-    writer.close()
+    rewritten(bag, 'odd', attachments={**read_bag(bag).attachments, 'scene.yaml': SCENES[name]})
     assert answer(command, tmp_path / 'odd') == 0
     (warning,) = warnings_of(tmp_path / 'odd.html')
     assert warning.startswith('No scene of linkage_ros, so no linkage: ')
@@ -350,16 +338,9 @@ def test_it_can_be_stopped_and_leaves_nothing(bag: Path) -> None:
 
 def test_what_is_in_a_bag_is_no_part_of_the_page_but_text(bag: Path, tmp_path: Path) -> None:
     name = '</script><script>alert(1)</script>'
-    read = read_bag(bag)
-    run = json.loads(read.attachments['run.json']) | {'scene': name, 'linkage_ros': name}
-    attached = {key: ('', data) for key, data in read.attachments.items()}
-    attached['run.json'] = '', json.dumps(run).encode()
-    odd = [replace(each, name=each.name.replace('withheld', name)) for each in read.topics]
-    writer = BagWriter(tmp_path / 'odd', odd, attached)
-    numbers = {each.name: index for index, each in enumerate(read.topics)}
-    for message in read.messages():
-        writer.write(numbers[message.topic], *message[1:])
-    writer.close()
+    topics = read_bag(bag).topics
+    odd = [replace(each, name=each.name.replace('withheld', name)) for each in topics]
+    rewritten(bag, 'odd', topics=odd, scene=name, linkage_ros=name)
     assert answer(command, tmp_path / 'odd') == 0
     text = (tmp_path / 'odd.html').read_text()
     assert name not in text
