@@ -109,10 +109,16 @@ class Calls:
         """Ask for the state."""
         return self._clients['get_state'].call_async(GetState.Request())
 
-    def use_system_time(self) -> Any:
-        """Ask the node to use the system clock again."""
-        value = ParameterValue(type=1, bool_value=False)
-        request = SetParameters.Request(parameters=[Parameter(name='use_sim_time', value=value)])
+    def restore(self, scene: Path) -> Any:
+        """Ask the node to use the system clock and its own scene again."""
+        clock = ParameterValue(type=1, bool_value=False)
+        named = ParameterValue(type=4, string_value=str(scene))
+        request = SetParameters.Request(
+            parameters=[
+                Parameter(name='use_sim_time', value=clock),
+                Parameter(name='scene', value=named),
+            ]
+        )
         return self._clients['set_parameters'].call_async(request)
 
     def _parameter(self) -> Parameter:
@@ -155,17 +161,18 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
         folder = Path(name)
         linkage = shipped_path('linkages/four_bar.yaml')
-        (folder / 'attacked.yaml').write_text(_SCENE.format(linkage=linkage))
+        scene = folder / 'attacked.yaml'
+        scene.write_text(_SCENE.format(linkage=linkage))
         # Below 102, so that the ports stay below the kernel's ephemeral ones.
         graph = Graph(private_domain(), folder, longest=round(seconds) + 200)
         node_arguments = (
-            *('--ros-args', '-p', f'scene:={folder / "attacked.yaml"}'),
+            *('--ros-args', '-p', f'scene:={scene}'),
             *('-p', f'runs_directory:={folder}', '-p', 'diagnostics_period:=0.5'),
         )
         try:
             with graph.run_module('linkage_ros.node.linkage_node', node_arguments) as node:
                 with graph.run_module(
-                    'campaigns.attacks.graph', (str(seconds), str(seed))
+                    'campaigns.attacks.graph', (str(seconds), str(seed), str(scene))
                 ) as attacker:
                     outcome = attacker.read_answer(patience=seconds + 8 * _PATIENCE)
                 node.check_running()
@@ -344,7 +351,7 @@ class Attacker:
 
         for number in (4, 2, 1, 3):  # deactivate, clean up, configure, activate
             if number == 1:
-                ask(calls.use_system_time(), 'no answer to a parameter')
+                ask(calls.restore(self._scene), 'no answer to a parameter')
             ask(calls.transition(number), f'no answer to transition {number}')
         state = ask(calls.state(), 'no answer to get_state')
         if state is None or state.current_state.label != 'active':
@@ -353,7 +360,7 @@ class Attacker:
 
 def main() -> int:
     """Attack, and print the outcome."""
-    attacker = Attacker(float(sys.argv[1]), int(sys.argv[2]))
+    attacker = Attacker(float(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]))
     attacker.run()
     print(json.dumps({'findings': attacker.findings[:20], 'tried': attacker.tried}), flush=True)
     return 0

@@ -70,7 +70,7 @@ class End(NamedTuple):
         velocity = add(velocity, multiply(make_vector(0.0, turn), arm))
         if motion.solved_accelerations is None:
             return place, velocity
-        change, *pull = motion.accelerations[k : k + 3]
+        change, *pull = (motion.accelerations[k + i] for i in range(3))
         swirl = multiply(make_vector(-turn * turn, change), arm)
         return place, velocity, add(make_vector(*pull), swirl)
 

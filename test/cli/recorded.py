@@ -182,7 +182,6 @@ def rewritten(
     attachments: Mapping[str, bytes] | None = None,
     topics: Sequence[Topic] = (),
     more: Sequence[BagMessage] = (),
-    twice: str = '',
     storage: Storage | None = None,
     custom: Mapping[str, str] | None = None,
     **said: object,
@@ -190,8 +189,8 @@ def rewritten(
     """
     Write a bag once more beside it, so that its checksums fit.
 
-    ``attachments`` and ``topics`` stand for its own, ``more`` messages come last, the messages of
-    a topic come ``twice``, and its run account says also what is ``said``.
+    ``attachments`` and ``topics`` stand for its own, ``more`` messages come last, and
+    its run account says also what is ``said``.
     """
     bag = read_bag(bag_path)
     files = dict(bag.attachments if attachments is None else attachments)
@@ -204,7 +203,7 @@ def rewritten(
     writer = BagWriter(bag_path.parent / name, topics, attached, storage)
     for index, message in enumerate(chain(bag.messages(), more)):
         edited = edit(index, message)
-        for _ in range(1 + (message.topic == twice) if edited else 0):
+        if edited:
             writer.write(numbers[edited.topic], *edited[1:])
     writer.close(custom)
     return writer.folder

@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from datetime import datetime
 import json
@@ -21,7 +20,6 @@ from typing import Any
 
 from linkage_ros.bag import BagMessage, BagWriter, METADATA_FILE, RUN_FILE
 from linkage_ros.cli import info
-from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
@@ -411,23 +409,6 @@ def test_what_a_terminal_would_obey_is_spelled_out(
     out = capsys.readouterr().out
     assert '/a\\x1b[2J\\n' in out
     assert '\x1b' not in out
-
-
-def bad_bags(folder: Path) -> Iterator[tuple[str, str]]:
-    (folder / 'text.mcap').write_text('no bag at all')
-    (folder / 'empty.mcap').touch()
-    (folder / 'nothing').mkdir()
-    yield 'text.mcap', 'is a text file'
-    yield 'empty.mcap', 'is empty'
-    yield 'nothing', 'holds no .mcap file'
-    yield 'gone', 'does not exist'
-
-
-def test_what_is_no_bag_is_answered_in_a_line(tmp_path: Path) -> None:
-    for name, reason in bad_bags(tmp_path):
-        with pytest.raises(LinkageError, match=reason) as caught:
-            answer(info, tmp_path / name)
-        assert '\n' not in str(caught.value)
 
 
 @pytest.mark.parametrize(('beyond', 'states', 'limited'), [('publish', 10, 4), ('silent', 6, 0)])

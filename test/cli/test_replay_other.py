@@ -362,14 +362,6 @@ def test_a_long_silence_is_passed_over(tmp_path, capsys):
 
 
 BAD = {
-    'a drive of its own': (
-        PLAIN, 'drive: {sine: {amplitude: 1.0, frequency: 1.0}}\n', FOUR_BAR,
-        'other.yaml: its drive is sine',
-    ),
-    'wrenches': (
-        PLAIN, 'effects: {effort: {}}\nloads: {wrenches: {coupler: {}}}\n', FOUR_BAR,
-        'its loads.wrenches have topics, and another scene takes no messages from these; leave',
-    ),
     'other joints': (
         PLAIN, '', GENERAL.replace('coupler_joint', 'rod').replace('rocker_joint', 'swing'),
         'publishes rod, swing, and ',

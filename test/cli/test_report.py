@@ -24,7 +24,6 @@ from linkage_ros.signals import StoppedError
 from linkage_ros.tools.view import report_command as command
 import pytest
 
-from .conftest import Run
 from .recorded import answer, JOINT_STATE, Recorded, rewritten, scene_file, topic
 
 pytest.importorskip('plotly', reason='is within the page')
@@ -106,26 +105,14 @@ def test_from_within_the_bag_it_is_written_beside_it(
     assert (bag.parent / 'bag.html').is_file()
 
 
-REFUSED = {
-    'a folder': ('taken.html', 'taken.html: is a folder; name another file with -o'),
-    'no folder': ('gone/x.html', 'gone/x.html: there is no folder gone; make it: mkdir -p gone'),
-    'another kind': ('x.pdf', "x.pdf: ends in '.pdf'; name a file that ends in .html or .htm"),
-    'no kind': ('x', 'x: has no ending; name a file that ends in .html or .htm'),
-    'a device': ('/dev/full', '/dev/full: has no ending; name a file'),
-    'where nobody can write': ('/proc/x.html', '/proc/x.html: cannot be written (No such file'),
-    'too long': (f'{"x" * 300}.html', f'{"x" * 300}.html: cannot be written (File name too long'),
-}
-
-
-@pytest.mark.parametrize('name', REFUSED)
-def test_files_that_are_refused(
-    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path('taken.html').mkdir()
+@pytest.mark.parametrize('name', ['taken.html', f'{"x" * 300}.html'])
+def test_files_that_are_refused(bag: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / 'taken.html').mkdir()
     before = {*tmp_path.rglob('*')}
-    file, line = REFUSED[name]
-    assert refused(bag, '-o', file).startswith(line)
+    reason = (
+        'is a folder; name' if name == 'taken.html' else 'cannot be written (File name too long'
+    )
+    assert refused(bag, '-o', tmp_path / name).startswith(f'{tmp_path / name}: {reason}')
     assert {*tmp_path.rglob('*')} == before
 
 
@@ -154,38 +141,6 @@ def test_a_link_stays_a_link(bag: Path, tmp_path: Path) -> None:
     assert answer(command, bag, '-o', tmp_path / 'x.html') == 0
     assert (tmp_path / 'x.html').is_symlink()
     assert (there / 'page.html').stat().st_size > 10**6
-
-
-TIMES = {
-    'negative': (
-        ['--since', '-1'],
-        '--since: -1.0 is not a time in a run; write seconds from 0 on',
-    ),
-    'nan': (['--until', 'nan'], '--until: nan is not a time in a run; write seconds from 0 on'),
-    'infinite': (
-        ['--until', 'inf'],
-        '--until: inf is not a time in a run; write seconds from 0 on',
-    ),
-    'too far': (
-        ['--since', '1e10'],
-        '--since: 10000000000.0 is not a time in a run; write seconds',
-    ),
-    'reversed': (['--since', '2', '--until', '1'], '--until: 1.0 is not after --since; write a'),
-    'nothing': (['--since', '1', '--until', '1'], '--until: 1.0 is not after --since; write a'),
-}
-
-
-@pytest.mark.parametrize('name', TIMES)
-def test_times_that_are_refused(bag: Path, name: str) -> None:
-    typed, line = TIMES[name]
-    assert refused(bag, *typed).startswith(line)
-
-
-def test_what_is_no_number_is_refused(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        answer(command, bag, '--since', 'soon')
-    assert ended.value.code == 2
-    assert "invalid float value: 'soon'" in capsys.readouterr().err
 
 
 def test_a_part_of_a_run(bag: Path, tmp_path: Path) -> None:
@@ -310,13 +265,6 @@ def test_what_is_no_bag_is_a_line(tmp_path: Path, content: bytes) -> None:
     file.write_bytes(content)
     assert refused(file).startswith(f'{file}: ')
     assert {*tmp_path.iterdir()} == {file}
-
-
-def test_no_bag_at_all_is_a_line(linkage: Run) -> None:
-    told = linkage('report', 'nowhere')
-    assert (told.returncode, told.stdout) == (2, '')
-    assert told.stderr.startswith('linkage report: nowhere: ')
-    assert told.stderr.count('\n') == 1
 
 
 def test_without_plotly_it_says_so_before_the_bag_is_read(

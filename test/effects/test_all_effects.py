@@ -140,6 +140,10 @@ def test_the_rest_of_a_motion_is_passed_on(effect):
     found = given.stage(within)(before)
     changed = {name for name in found._fields if getattr(found, name) != getattr(before, name)}
     assert changed <= NEW_FIELDS[effect]
+    # What links and pins yield adds up.
+    alone = given.stage(within)(before._replace(deflection=()))
+    total = [0.5 + part for part in alone.deflection] or [0.5, 0.5]
+    assert found.deflection == pytest.approx(total, abs=1e-15)
 
 
 @pytest.mark.parametrize('effect', READ_FIELDS)
@@ -156,12 +160,12 @@ def test_the_rest_of_a_reading_is_passed_on(effect):
 
 
 def test_at_a_toggle_no_mechanism_effect_has_anything_to_say():
-    motion = moved(
-        context(linkage_of(SINGULAR)),
-        (0.0, 1.0, 0.0),
-        {'effort': (), 'pin_forces': (), 'clearance': ({'A': 1e-5},)},
-    )
+    within = context(linkage_of(SINGULAR))
+    yielding = {'clearance': ({'A': 1e-5},), 'compliance': ({'coupler': 1e4},)}
+    motion = moved(within, (0.0, 1.0, 0.0), {'effort': (), 'pin_forces': (), **yielding})
     assert motion.position.status is Status.TOGGLE
     assert motion.position.joints
     assert motion.velocity is motion.acceleration is None
     assert motion.efforts == motion.reactions == motion.deflection == ()
+    read = reading(7, *motion.position.joints)
+    assert effect_class('pin_forces')().writer(within)(9, motion, read) == b''

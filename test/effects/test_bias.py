@@ -10,11 +10,11 @@
 
 from hypothesis import given, strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.stages.effects import BiasEffect, EccentricDisc
+from linkage_ros.stages.effects import BiasEffect, EccentricDisc, EncoderEffect, JointEncoder
 from mpmath import mp
 import pytest
 
-from .sensors import ANGLES, BEGIN, context, likely, MS, published, reading, SLIDE
+from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE
 
 
 @pytest.mark.parametrize(
@@ -90,12 +90,12 @@ def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, sc
 
 
 @pytest.mark.parametrize(
-    ('parameters', 'where', 'line'),
+    ('sensor', 'parameters', 'line'),
     [
-        (BiasEffect(), ANGLES, 'names no joint'),
-        (BiasEffect(eccentricities={'rod_slide': EccentricDisc(0.1)}), SLIDE, 'has no disc'),
+        (BiasEffect, {'eccentricities': {'rod_slide': EccentricDisc(0.1)}}, 'has no disc'),
+        (EncoderEffect, {'joints': {'rod_slide': JointEncoder(8, multi_turn=True)}}, 'a slide'),
     ],
 )
-def test_what_has_no_error_is_refused(parameters, where, line):
-    with pytest.raises(DefinitionError, match=line):
-        parameters.sensor(context(where))
+def test_what_a_slide_cannot_have_is_refused(sensor, parameters, line):
+    with pytest.raises(DefinitionError, match=f'rod_slide.*{line}'):
+        sensor(**parameters).sensor(context(SLIDE))

@@ -16,7 +16,7 @@ from linkage_ros.stages.effects import ComplianceEffect
 import pytest
 
 from .four_bar_by_hand import FourBar, mp, turn
-from .loaded import context, GRAVITY, moved, SINGULAR
+from .loaded import context, GRAVITY, moved
 from ..support.messages import read_joint_state
 from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
@@ -126,28 +126,6 @@ def test_two_links_stretch_as_each_of_them_does():
     alone = [shift(within, motion, links) for links in (one, other)]
     both = shift(within, motion, one | other)
     assert both == pytest.approx([a + b for a, b in zip(*alone, strict=True)], rel=1e-12)
-
-
-def test_twice_as_stiff_is_half_the_shift():
-    within, motion = context(FOUR_BAR), MOTIONS[2]
-    soft, stiff = (shift(within, motion, {'coupler': k}) for k in (1e4, 2e4))
-    assert soft == pytest.approx([2.0 * value for value in stiff], rel=1e-12)
-
-
-def test_at_a_toggle_nothing_yields():
-    within = context(linkage_of(SINGULAR))
-    assert shift(within, (0.0, 1.0, 0.0), {'coupler': 1e4}) == ()
-
-
-def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
-    within = context(FOUR_BAR)
-    before = moved(within, MOTIONS[2], {'pin_forces': ()})
-    stage = ComplianceEffect({'coupler': 1e4}).stage(within)
-    alone = stage(before)
-    assert alone == before._replace(deflection=alone.deflection)
-    further = stage(before._replace(deflection=(0.5, -0.25)))
-    expected = (0.5 + alone.deflection[0], -0.25 + alone.deflection[1])
-    assert further == before._replace(deflection=expected)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from linkage_ros.errors import FileError
 import pytest
 
 from ..support.messages import read_joint_state
-from ..support.scenes import PENDULUM, pipeline_of, scene_of
+from ..support.scenes import PENDULUM, pipeline_of
 
 GRAVITY = 9.81
 MS = 1_000_000
@@ -233,16 +233,6 @@ masses: {ram: {mass: 4, center: [0, 0], inertia: 0.001}}
         assert efforts[0] == pytest.approx(expected, abs=1e-10)
         kinds.add(pushed)
     assert len(kinds) == 2
-
-
-def test_torque_with_backlash_is_refused_in_one_line():
-    for effects in ('{backlash: {play: 0.1}}', '{velocity: {}, backlash: {play: 0}}'):
-        with pytest.raises(FileError) as refused:
-            scene_of(f'drive: {{torque: {{}}}}\neffects: {effects}', PENDULUM)
-        assert str(refused.value) == (
-            'here: scene.yaml:3: effects.backlash: is play without masses, and torque moves '
-            'masses; write drive.torque.play: {width: …, inertia: …} instead'
-        )
 
 
 def test_of_several_linkages_that_with_torque_may_have_none():

@@ -88,13 +88,6 @@ def test_before_the_first_tick_there_is_nothing_to_see():
     assert max(found) > 10.0
 
 
-def test_the_stamp_does_not_know():
-    sensor = JitterEffect(0.01).sensor(context())
-    for i in range(100):
-        now = BEGIN + i * MS
-        assert sensor(now, reading(now, 1.0)).stamp == now
-
-
 def test_none_changes_nothing():
     for distribution in ('uniform', 'half_normal'):
         assert set(earlier(0.0, distribution, n=100)) == {0.0}

@@ -161,38 +161,6 @@ def test_pins_and_blocks_lie_in_their_places(linkage):
             assert any(abs(middle - place) < 2.0 * rim.scale.x for place in points.values())
 
 
-@given(theta=st.floats(0.0, tau))
-def test_a_four_bar_by_the_law_of_cosines(theta):
-    # a = 40 mm, b = 120 mm, c = 80 mm, d = 100 mm; B left of A→O4.
-    markers = FOUR_BAR.markers(theta)
-    a = 0.04 * rect(1.0, theta)
-    s = abs(0.1 - a)
-    b = a + 0.12 * rect(1.0, phase(0.1 - a) + acos((0.12**2 + s**2 - 0.08**2) / (2.0 * 0.12 * s)))
-    for expected in (0j, a, b, 0.1 + 0j):
-        assert min(abs(expected - pin) for pin in places(named(markers, 'pins')[0])) < 1e-12
-    # Each bar holds its two pins, half a bar from its edge.
-    crank, coupler, rocker = named(markers, 'edges')[2], *named(markers, 'edges')[:2]
-    bars = [(0j, a), (a, b), (b, 0.1 + 0j)]
-    for edge in (crank, coupler, rocker):
-        ends = min(bars, key=lambda pair: sum(_outside(edge, end) for end in pair))
-        assert sum(_outside(edge, end) for end in ends) == 0.0
-        bars.remove(ends)
-    assert not bars
-
-
-FOUR_BAR = Held('four_bar')
-
-
-def _outside(edge, place):
-    """Return how far a place lies outside of a convex outline, counter-clockwise."""
-    corners = places(edge)
-    worst = 0.0
-    for one, other in pairwise(corners):
-        if abs(other - one) > 1e-12:
-            worst = max(worst, -((place - one) / (other - one)).imag * abs(other - one))
-    return worst
-
-
 def test_parts_lie_on_each_other_as_they_are_drawn():
     markers = Held('excavator_bucket').markers(1.0)
     heights = [marker.pose.position.z for marker in markers if marker.ns in ('links', 'sliders')]

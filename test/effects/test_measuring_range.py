@@ -9,9 +9,7 @@
 """Measuring range: readings end at its limits, and nothing else changes."""
 
 from hypothesis import given, strategies as st
-from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.effects import JointRange, MeasuringRangeEffect
-import pytest
 
 from .sensors import BEGIN, context, published, reading
 
@@ -31,16 +29,6 @@ def test_readings_are_the_nearest_within_the_range(value, rate, effort):
     assert found.rates == (rate, sorted([-3.0, rate, 3.0])[1])
     assert found.efforts == (effort, sorted([-0.5, effort, 0.5])[1])
     assert found.stamp == BEGIN
-
-
-def test_without_rates_and_efforts_there_are_none():
-    found = limited(rate=1.0)(BEGIN, reading(BEGIN, 7.0, 8.0))
-    assert found == reading(BEGIN, 7.0, 8.0)
-
-
-def test_limits_that_cross_are_refused():
-    with pytest.raises(DefinitionError, match='low 2 rad is not below high 1 rad; write'):
-        limited(low=2.0, high=1.0)
 
 
 def test_it_ends_what_bias_and_noise_have_made():

@@ -11,7 +11,6 @@
 from itertools import accumulate, cycle, islice, pairwise
 from math import exp, sqrt
 
-from linkage_ros.errors import DefinitionError
 from linkage_ros.stages.effects import JointNoise, NoiseEffect
 import pytest
 
@@ -134,22 +133,6 @@ def test_the_noise_of_efforts_is_in_the_efforts_only():
     assert_white([read.efforts[1] for read in found], 0.3)
     assert {read.joints for read in found} == {(0.0, 0.0)}
     assert sensor(BEGIN, reading(BEGIN, 0.0, 0.0)).efforts == ()
-
-
-@pytest.mark.parametrize(
-    ('parameters', 'line'),
-    [
-        (
-            {'white': 0.1, 'density': 0.1},
-            'density: is white noise too; leave white or density out',
-        ),
-        ({'drift': 0.1}, 'drift: needs correlation_time; write correlation_time too'),
-        ({'correlation_time': 0.1}, 'correlation_time: needs drift; write drift too'),
-    ],
-)
-def test_parameters_that_do_not_go_together_are_refused(parameters, line):
-    with pytest.raises(DefinitionError, match=line):
-        noisy({'rocker_joint': JointNoise(**parameters)}, [])
 
 
 def test_what_one_joint_has_does_not_change_the_other():

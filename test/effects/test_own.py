@@ -19,7 +19,7 @@ from linkage_ros.bag import BagWriter, RUN_FILE, Topic
 from linkage_ros.description import find_violations, load_scene, read_yaml, scene_schema
 from linkage_ros.errors import FileError
 from linkage_ros.messages import JointStateWriter, time_message
-from linkage_ros.replay import user_effects_here
+from linkage_ros.replay import scene_files, user_effects_here
 from linkage_ros.stages.effects import EFFECTS
 from linkage_ros.tick import Pipeline
 import pytest
@@ -404,9 +404,8 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
     assert versions['here'][f'{mine}.add'] == f'sha256 {now}'
 
 
-def test_the_node_writes_it_into_its_bag(tmp_path, package):
-    run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
+def test_a_bag_says_which_module_it_was(tmp_path, package):
     mine = package(add=ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
-    files = run_recording._make_attachments(scene, [], 'with the run', tmp_path)
-    assert json.loads(files[RUN_FILE][1])['effects'] == user_effects_here(scene)
+    files = scene_files(scene, [], 'with the run', tmp_path)
+    assert json.loads(files[RUN_FILE])['effects'] == user_effects_here(scene)

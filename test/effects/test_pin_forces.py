@@ -12,13 +12,11 @@ from cmath import rect
 
 from hypothesis import given, strategies as st
 from linkage_ros.description import parse_scene
-from linkage_ros.kinematics import Status
-from linkage_ros.stages.effects import PinForcesEffect, SensorReading
 from linkage_ros.tick import Pipeline
 import pytest
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, moved, SINGULAR
+from .loaded import context, GRAVITY, moved
 from ..support.messages import read_joint_state, STORE
 from ..support.scenes import linkage_of, LINKAGES, PENDULUM, shipped
 
@@ -52,15 +50,6 @@ def test_those_of_a_four_bar_are_in_balance(motion):
     for name, force in zip(('O2', 'A', 'B', 'O4'), forces, strict=True):
         expected = (float(force.real), float(force.imag), 0.0)
         assert found[name] == pytest.approx(expected, rel=1e-10, abs=1e-12)
-
-
-def test_at_a_toggle_there_are_none_and_no_message():
-    within = context(linkage_of(SINGULAR))
-    motion = moved(within, (0.0, 1.0, 0.0), {'pin_forces': ()})
-    assert motion.position.status is Status.TOGGLE
-    assert motion.reactions == ()
-    reading = SensorReading(7, motion.position.joints, (), (), ())
-    assert PinForcesEffect().writer(within)(9, motion, reading) == b''
 
 
 def test_where_the_balance_has_no_solution_there_are_none():

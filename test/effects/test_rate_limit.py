@@ -18,14 +18,11 @@ import pytest
 from .sensors import BEGIN, context, MS, published, reading
 
 
-def limited(rate, hold='repeat'):
-    return RateLimitEffect(rate, hold=hold).sensor(context())
-
-
-def sampled_at(rate, times):
+def sampled_at(rate, times, **clock):
     """Return for each time, in [ns] since the first, that of the sample that is published."""
-    sensor = limited(rate)
-    return [sensor(BEGIN + t, reading(BEGIN + t, t)).joints[0] for t in times]
+    sensor = RateLimitEffect(rate, **clock).sensor(context())
+    found = [sensor(BEGIN + t, reading(BEGIN + t, t)) for t in times]
+    return [read and read.joints[0] for read in found]
 
 
 @pytest.mark.parametrize(
@@ -55,13 +52,21 @@ def test_half_a_nanosecond_is_rounded_up():
     assert sampled_at(1024.0, [0, 2_929_687, 2_929_688]) == [0, 2_929_687, 2_929_688]
 
 
-@given(st.floats(0.001, 20_000.0), st.integers(1, 10**12))
-def test_a_sample_is_due_to_the_nanosecond_however_many_came_before(rate, k):
-    due = floor(k * Fraction(10**9) / Fraction(rate) + Fraction(1, 2))
-    before = floor((k - 1) * Fraction(10**9) / Fraction(rate) + Fraction(1, 2))
+@given(
+    st.floats(0.001, 20_000.0),
+    st.integers(1, 10**12),
+    st.floats(-1000.0, 1000.0),
+    st.integers(1, 10**9),
+)
+def test_a_sample_is_due_to_the_nanosecond_however_many_came_before(rate, k, ppm, first):
+    # By a clock that runs fast, whose first sample is later than the first tick.
+    real = Fraction(rate) * (1 + Fraction(ppm) / 10**6)
+    due, before = (first + floor(n * Fraction(10**9) / real + Fraction(1, 2)) for n in (k, k - 1))
+    clock = {'ppm': ppm, 'phase': first * 1e-9}
     # Once after long silence, and once where the sample before it was taken.
-    assert sampled_at(rate, [0, due]) == [0, due]
-    assert sampled_at(rate, [0, before, due - 1, due]) == [0, before, before, due]
+    assert sampled_at(rate, [0, first - 1, first, due], **clock) == [None, None, first, due]
+    times = [0, first, before, due - 1, due]
+    assert sampled_at(rate, times, **clock) == [None, first, before, before, due]
 
 
 def test_a_day_of_samples_at_three_hertz_does_not_drift():
@@ -73,7 +78,7 @@ def test_a_day_of_samples_at_three_hertz_does_not_drift():
 
 
 def test_what_is_held_bears_the_stamp_of_the_tick():
-    sensor = limited(100.0)
+    sensor = RateLimitEffect(100.0).sensor(context())
     rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     first = reading(BEGIN, 0.5, 0.25, **rest)
     assert sensor(BEGIN, first) == first
@@ -82,37 +87,9 @@ def test_what_is_held_bears_the_stamp_of_the_tick():
         assert sensor(now, reading(now, 9.0, 9.0)) == first._replace(stamp=now)
 
 
-def test_silent_between_samples():
-    sensor = limited(300.0, 'silent')
-    found = [sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, 1.0 * ms)) for ms in range(11)]
-    assert [read and read.joints[0] for read in found] == [
-        *(0.0, None, None, None, 4.0, None, None, 7.0, None, None, 10.0)
-    ]  # fmt: skip
-    assert found[4].stamp == BEGIN + 4 * MS
-
-
 def test_a_scene_holds_readings_or_is_silent_between_samples():
     ideal = published('')
     for n, held in enumerate(published('rate_limit: {rate: 100}')):
         assert held == ideal[n // 10 * 10]._replace(stamp=BEGIN + n * MS)
     silent = published('rate_limit: {rate: 100, hold: silent}')
     assert silent == [read if n % 10 == 0 else None for n, read in enumerate(ideal)]
-
-
-def test_a_sensor_begins_when_its_own_first_sample_is_due():
-    # 100 samples a second from 3.5 ms on; ticks each ms. Before there is nothing to read.
-    sensor = RateLimitEffect(100.0, phase=0.0035).sensor(context())
-    found = [sensor(BEGIN + ms * MS, reading(BEGIN + ms * MS, ms)) for ms in range(30)]
-    assert found[:4] == [None] * 4
-    assert [each.joints[0] for each in found[4:]] == [4] * 10 + [14] * 10 + [24] * 6
-
-
-@given(st.floats(-1000.0, 1000.0), st.integers(1, 10**9))
-def test_a_clock_that_runs_fast_is_as_fast_to_the_nanosecond(ppm, k):
-    sensor = RateLimitEffect(250.0, ppm=ppm).sensor(context())
-    rate = Fraction(250) * (1 + Fraction(ppm) / 10**6)
-    due = floor(k * Fraction(10**9) / rate + Fraction(1, 2))
-    before = floor((k - 1) * Fraction(10**9) / rate + Fraction(1, 2))
-    times = [0, before, due - 1, due]
-    found = [sensor(BEGIN + t, reading(BEGIN + t, t)).joints[0] for t in times]
-    assert found == [0, before, before, due]

@@ -88,7 +88,8 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
 
 def test_a_disk_with_less_room_than_is_to_stay(graph, tmp_path, write_scene, start):
     record = f'record: {{directory: {tmp_path}, name: bag, min_free_bytes: 1000000000000000}}'
-    node = start(write_scene('scarce', f'rate: 100\n{record}'))
+    # With an argument it is a process of its own, which has an exit code.
+    node = start(write_scene('scarce', f'rate: 100\n{record}'), '-p', 'autostart:=true')
     message = graph.wait_for_level('recording', ERROR).message
     assert (
         'bytes are free on its disk, fewer than min_free_bytes: 1,000,000,000,000,000' in message

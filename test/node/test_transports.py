@@ -37,6 +37,8 @@ RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\nrate: 1000'
 OWN_NETWORK = [shutil.which('unshare') or 'unshare', '--map-root-user', '--net']
 
+REAL_STARTS = True  # Transports are chosen when a process starts
+
 # A process that hosts the node among others: rclpy is initialised before the node is created.
 COMPONENT = """
 import rclpy
@@ -44,8 +46,6 @@ rclpy.init()
 from linkage_ros.node.node import LinkageNode
 from linkage_ros.signals import stop_on_signals
 from rclpy.executors import SingleThreadedExecutor
-
-REAL_STARTS = True
 stop = stop_on_signals()
 node = LinkageNode()
 executor = SingleThreadedExecutor()

@@ -6,10 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Acceleration: the slope of the rates, from velocity alone, and none at a toggle."""
+"""Velocity and acceleration: slopes of positions and rates, and neither at a toggle."""
 
 from dataclasses import replace
-from math import inf, isfinite, nan
+from math import inf, isfinite, nan, remainder, tau
 
 from hypothesis import given, strategies as st
 from linkage_ros.stages.drives import Context, CrankState
@@ -25,54 +25,60 @@ from .sensors import ANGLES, SLIDE
 from ..support.messages import STORE
 from ..support.scenes import closure_of
 
-STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
 EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
+angles, rates = st.floats(-10.0, 10.0), st.floats(-10.0, 10.0)
+loops = pytest.mark.parametrize('loop', [ANGLES, SLIDE], ids=['four-bar', 'slider-crank'])
 
 
 def moved(loop, angle, rate, alpha=0.0):
     """Return the motion that leaves velocity and acceleration."""
-    position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (alpha,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    motion = VelocityEffect().stage(context)(
-        MechanismState(crank, position, None, None, (), (), ())
-    )
-    return AccelerationEffect().stage(context)(motion)
+    motion = MechanismState(crank, loop.position(angle), None, None, (), (), ())
+    for effect in (VelocityEffect(), AccelerationEffect()):
+        motion = effect.stage(context)(motion)
+    return motion
 
 
-@given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
-@pytest.mark.parametrize('loop', [ANGLES, SLIDE], ids=['four-bar', 'slider-crank'])
-def test_it_is_the_slope_of_the_rates(loop, angle, rate, alpha):
+@given(angles, rates, rates)
+@loops
+def test_they_are_the_slopes_of_position_and_rates(loop, angle, rate, alpha):
     # The crank's own motion: θ(t) = angle + rate·t + alpha·t²/2.
     step = 1e-5
     before, after = (
-        moved(loop, angle + rate * t + alpha * t * t / 2.0, rate + alpha * t).velocity.joints
+        moved(loop, angle + rate * t + alpha * t * t / 2.0, rate + alpha * t)
         for t in (-step, step)
     )
-    slopes = [(a - b) / (2.0 * step) for a, b in zip(after, before, strict=True)]
+    found = moved(loop, angle, rate, alpha)
+    ends = zip(*(loop.position(angle + t).joints for t in (step, -step)), strict=True)
+    slopes = [remainder(a - b, tau) / (2.0 * step) * rate for a, b in ends]
+    assert list(found.velocity.joints) == pytest.approx(slopes, abs=1e-6 * abs(rate))
+    ends = zip(after.velocity.joints, before.velocity.joints, strict=True)
+    slopes = [(a - b) / (2.0 * step) for a, b in ends]
     size = rate * rate + abs(alpha) + 1.0
-    found = moved(loop, angle, rate, alpha).acceleration.joints
-    assert list(found) == pytest.approx(slopes, abs=1e-6 * size)
+    assert list(found.acceleration.joints) == pytest.approx(slopes, abs=1e-6 * size)
 
 
-@given(st.floats(-10.0, 10.0))
+@given(angles)
 def test_a_crank_at_rest_has_joints_at_rest(angle):
-    assert all(value == 0.0 for value in moved(ANGLES, angle, 0.0).acceleration.joints)
+    found = moved(ANGLES, angle, 0.0)
+    assert not any((*found.velocity.joints, *found.acceleration.joints))
 
 
-@given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
-def test_a_crank_at_a_constant_rate_still_has_it(angle, rate):
+@given(angles, rates)
+def test_a_crank_at_a_constant_rate_still_has_an_acceleration(angle, rate):
     # What the topic drive gives: the unknown acceleration of the crank is 0, not the joints'.
     one, two = (moved(SLIDE, angle, r).acceleration.joints for r in (rate, 2.0 * rate))
     assert list(two) == pytest.approx([4.0 * value for value in one], rel=1e-12, abs=1e-300)
 
 
 @given(st.floats(-17.0, -1.0))
-def test_next_to_a_toggle_it_is_finite_or_none(exponent):
+def test_next_to_a_toggle_they_are_finite_or_none(exponent):
     angle = EVERY_OTHER.input_ranges[0].highest - 10.0**exponent
     if EVERY_OTHER.position(angle).joints:
-        found = moved(EVERY_OTHER, angle, 1e10, 1e10).acceleration
-        assert found is None or all(map(isfinite, found.joints))
+        found = moved(EVERY_OTHER, angle, 1e10, 1e10)
+        for each in (found.velocity, found.acceleration):
+            assert each is None or all(map(isfinite, each.joints))
 
 
 @pytest.mark.parametrize('value', [inf, -inf, nan])
