@@ -126,6 +126,11 @@ class Table(NamedTuple):
         )
 
 
+def attributes_json(of: object, columns: Iterable[Column]) -> dict[str, Any]:
+    """Return the attributes of an object that columns name, as JSON holds them."""
+    return {column.key: getattr(of, column.key) for column in columns}
+
+
 def table_of_rows(
     title: str, key: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]
 ) -> Table:

@@ -32,7 +32,6 @@ from rosbags.rosbag2 import (
     Writer as RosbagsWriter,
 )
 
-from .conftest import json_keys
 from .recorded import (
     answer,
     BEGIN,
@@ -214,10 +213,6 @@ def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any)
         assert near['inputs'][0] == pytest.approx(
             start + rate * (near['time_ns'] - BEGIN) * 1e-9, abs=1e-12
         )
-
-
-def test_json_has_the_documented_keys(bag: Path, tell: Any) -> None:
-    assert set(tell(bag)) == json_keys('info')
 
 
 def test_the_file_alone_says_what_the_folder_says(bag: Path, tell: Any) -> None:
