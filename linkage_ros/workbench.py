@@ -46,9 +46,9 @@ def find_tool(name: str) -> ModuleType:
     try:
         return import_module(TOOLS[name])
     except ModuleNotFoundError as error:
-        missing = error.name or ''
-        if not missing or not TOOLS[name].startswith(missing):
+        absent = error.name or ''
+        if not absent or not TOOLS[name].startswith(absent):
             raise  # a package that the tool needs
         raise LinkageError(
-            missing, 'is not installed', 'install the whole of linkage_ros'
+            absent, 'is not installed', 'install the whole of linkage_ros'
         ) from None

@@ -11,8 +11,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from math import ceil, tau
 import sys
 from threading import Event
@@ -52,11 +53,6 @@ _SINGULAR = {
     Status.INDETERMINATE: 'without a pose',
 }
 """Names of singular inputs, by kind."""
-
-_PARTS = 5
-"""Parts of the description that take time."""
-
-_LIMITS = ('low', 'high', 'velocity', 'effort')
 
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
@@ -118,13 +114,17 @@ def describe_linkage(
     account = _structure_json(closure) | {'groups': [one._asdict() for one in groups]}
     account |= tables_json(tables[1:])
     # Most of the time goes by here.
-    for index, part in enumerate((_examine_reach, _examine_residual, _other_assemblies)):
-        advance(index, _PARTS)
-        account |= part(closure, sweep)
-    for index, curves in enumerate((_transmission_table, _conditioning_table)):
-        advance(index + 3, _PARTS)
-        tables.append(curves(closure, sweep))
-        account |= tables_json(tables[-1:])
+    parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
+        *(_examine_reach, _examine_residual, _other_assemblies),
+        *(_transmission_table, _conditioning_table),
+    )
+    for index, part in enumerate(parts):
+        advance(index, len(parts))
+        found = part(closure, sweep)
+        if isinstance(found, Table):
+            tables.append(found)
+            found = tables_json([found])
+        account |= found
     return account, tables
 
 
@@ -133,7 +133,7 @@ def _structure_json(closure: Closure) -> dict[str, Any]:
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
     named = [point for points in linkage.links.values() for point in points]
-    units = dict(zip(linkage.joints, map(_joint_unit, closure.turning), strict=True))
+    units = {name: joint.unit for name, joint in linkage.joints.items()}
     units |= {given.joint: given.unit for given in linkage.inputs}
     return {
         'moving_links': len(linkage.links) - 1,
@@ -150,7 +150,7 @@ def _structure_json(closure: Closure) -> dict[str, Any]:
         ],
         'limits': [
             {'joint': name, 'unit': units[name]}
-            | {key: finite_or_none(getattr(limits, key)) for key in _LIMITS}
+            | {key: finite_or_none(value) for key, value in asdict(limits).items()}
             for name, limits in linkage.limits.items()
         ],
         'unwrapped': _counts_turns(closure),
@@ -167,7 +167,7 @@ def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
     for name in names:
         with suppress(DefinitionError):  # It does not move.
             for branch in closure.branches(name):
-                unit = _joint_unit(branch.turning)
+                unit = 'rad' if branch.turning else 'm'
                 yield (
                     *(name, branch.number, branch.least, branch.most, unit),
                     *(Quantity(end, unit) for end in (branch.low, branch.high)),
@@ -182,10 +182,6 @@ def _counts_turns(closure: Closure) -> bool:
     parts = (getattr(step, 'diagonal', getattr(step, 'rail', None)) for step in closure.steps)
     crossed = (sum(getattr(part, 'crosses', ())) for part in parts)
     return is_iterated(closure) or any(number == 1 for number in crossed)
-
-
-def _joint_unit(turning: bool) -> str:
-    return 'rad' if turning else 'm'
 
 
 def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
@@ -370,8 +366,8 @@ def _transmission_table(closure: Closure, sweep: InputSweep | None) -> Table:
 
 
 def _conditioning_table(closure: Closure, sweep: InputSweep | None) -> Table:
-    ends = [Column('>least', 'least.conditioning', form='.4f')]
-    ends.append(Column(None, 'greatest.conditioning'))
+    least = Column('>least', 'least.conditioning', form='.4f')
+    ends = [least, Column(None, 'greatest.conditioning')]
     found = {} if sweep is None else conditioning_curves(sweep)
     title = 'Conditioning over the range, of iterated links'
     return _extremes_table(title, 'conditioning', closure, found, ends)

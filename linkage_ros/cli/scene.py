@@ -23,7 +23,7 @@ from os.path import isfile
 from pathlib import Path
 import sys
 from threading import Event
-from typing import Any, NamedTuple
+from typing import Any
 
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
 from linkage_ros.cli.result import add_result, Result, show_result, tables_json
@@ -133,37 +133,24 @@ def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]
     return list(groups.values())
 
 
-class Stage(NamedTuple):
-    """A stage of a tick: its place, its parameters, and the effects of the file that need it."""
-
-    name: str
-    where: str
-    parameters: Any
-    needed_by: tuple[str, ...]
-
-
-def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
-    """Yield the drive of a linkage and its effects, in the order of a tick."""
+def _list_stages(linkage: LinkagePipeline) -> Iterator[tuple[str, str, Any, tuple[str, ...]]]:
+    """Yield the stages of a tick in order: name, place, parameters, the effects that need it."""
     name, parameters = linkage.scene_linkage.drive
-    yield Stage(name, 'drive', parameters, ())
+    yield name, 'drive', parameters, ()
     given = linkage.scene_linkage.effects
     for name, effect in linkage.wanted.effects.items():
-        needed_by = () if name in given else effects_requiring(name, given)
-        yield Stage(name, effect.place, effect, needed_by)
+        yield name, effect.place, effect, () if name in given else effects_requiring(name, given)
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
     units, linkage = line.scene_linkage.content.units, line.scene_linkage.linkage
     slides = {name: joint.unit == 'm' for name, joint in linkage.joints.items()}
     slides |= {given.joint: given.unit == 'm' for given in linkage.inputs}
-    for index, stage in enumerate(_list_stages(line)):
+    for index, (name, where, parameters, needed_by) in enumerate(_list_stages(line)):
         yield (
-            str(index),
-            stage.name,
-            stage.where,
-            first_docstring_line(type(stage.parameters)),
-            _parameters_text(stage.parameters, units, slides),
-            f'needed by {", ".join(stage.needed_by)}' if stage.needed_by else '',
+            *(str(index), name, where, first_docstring_line(type(parameters))),
+            _parameters_text(parameters, units, slides),
+            f'needed by {", ".join(needed_by)}' if needed_by else '',
         )
 
 
@@ -228,12 +215,8 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
     account = scene_json(scene)
     for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
         linkage['stages'] = [
-            {
-                **_named_parameters(stage.name, stage.parameters),
-                'where': stage.where,
-                'needed_by': list(stage.needed_by),
-            }
-            for stage in _list_stages(line)
+            {'name': name, 'parameters': _as_json(own), 'where': where, 'needed_by': [*needed_by]}
+            for name, where, own, needed_by in _list_stages(line)
         ]
     record = scene.record
     return account | {
@@ -242,7 +225,8 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         'record': record and {'directory': record.directory, 'name': record.name or None},
         'fault_parameters': [
             {
-                **_named_parameters(name, fault.parameters),
+                'name': name,
+                'parameters': _as_json(fault.parameters),
                 'kind': fault.kind,
                 'at_s': list(fault.at),
                 'seconds': fault.seconds,
@@ -256,10 +240,6 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         ],
         'services': [f'~/inject/{name}' for name in scene.faults],
     }
-
-
-def _named_parameters(name: str, parameters: Any) -> dict[str, Any]:
-    return {'name': name, 'parameters': _as_json(parameters)}
 
 
 def _as_json(value: Any) -> Any:
