@@ -77,7 +77,7 @@ TESTS: dict[str, Sequence[str]] = {
     'stages/drives/topic': ('drives', 'test_pipeline.py'),
     'stages/drives/torque': ('drives', 'dynamics'),
     'stages/effects/delay': ('effects/test_delay.py', 'effects', 'test_contracts.py'),
-    'tick/pipeline': (*TICK, 'test_contracts.py', 'effects'),
+    'tick/linkage_pipeline': (*TICK, 'test_contracts.py', 'effects'),
     'tick/tick_loop': (*TICK, 'node'),
     'bag/writer': BAG,
     'bag/recorder': ('bag/test_recorder.py', *BAG),

@@ -208,12 +208,11 @@ def _listed(names: tuple[str, ...]) -> str:
 
 def parameters(kind: str, name: str) -> str:
     """Return the table of parameters of a drive, an effect or a fault."""
-    _, heads, rows = table_of(kind, name)
-    if len(heads) == 1:
+    table = table_of(kind, name)
+    if len(table.heads) == 1:
         return 'It has no parameters.'
-    return '\n'.join(
-        markdown.table_lines(Table('', heads, [(f'`{row[0]}`', *row[1:]) for row in rows]))
-    )
+    rows = [(f'`{row[0]}`', *row[1:]) for row in table.rows]
+    return '\n'.join(markdown.table_lines(Table('', table.heads, rows)))
 
 
 def loads() -> str:

@@ -245,8 +245,9 @@ def malformed(random: Random) -> bytes:
 class Attacker:
     """The attacking node."""
 
-    def __init__(self, seconds: float, seed: int) -> None:
+    def __init__(self, seconds: float, seed: int, scene: Path) -> None:
         rclpy.init()
+        self._scene = scene
         self._spin = lambda wait: rclpy.spin_once(self.node, timeout_sec=wait)
         self.node = Node('attacker')
         self.findings: list[str] = []

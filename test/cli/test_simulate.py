@@ -148,7 +148,11 @@ REFUSED = {
     ('demo', '-o', 'x'): 'drive: topic waits for samples',
     ('jansen_leg', '-o', 'x'): 'drive: topic waits for samples',
     ('torque_crank', '--set', 'rate=0', '-o', 'x'): 'torque has none; name a rate',
-    ('torque_crank', '-o', 'x.txt'): "ends in '.txt'; name a file that ends in .csv or .parquet",
+    (
+        'torque_crank',
+        '-o',
+        'x.txt',
+    ): "ends in '.txt'; name a file that ends in .csv or .xlsx",
     ('torque_crank', '-o', 'there'): 'there: exists already',
     ('torque_crank', '-o', 'x', '--seconds', '1e9'): 'more than 100,000,000',
     ('torque_crank', '-o', 'x', '--seconds', '-1'): '-1 is not between 0 and 1e+09',

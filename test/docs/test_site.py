@@ -158,7 +158,6 @@ def test_every_command_is_in_its_reference(pages):
         ('reference/commands.html', 'one line names place, reason and remedy'),
         ('reference/commands.html', 'linkage gallery worn_press -o my_press.yaml'),
         ('reference/commands.html', '--schema scene|linkage'),
-        ('reference/commands.html', 'at this rate [Hz]; without a number 40'),
         ('reference/parameters.html', 'counts in a turn, or in a metre of a slide'),
         ('reference/files.html', 'a whole number from 0 to 9007199254740992'),
         ('reference/files.html', 'masses.NAME.inertia'),

@@ -51,10 +51,6 @@ from linkage_ros.stages.effects.encoder import (
     EncoderEffect as EncoderEffect,
     JointEncoder as JointEncoder,
 )
-from linkage_ros.stages.effects.forces import (
-    EffortEffect as EffortEffect,
-    PinForcesEffect as PinForcesEffect,
-)
 from linkage_ros.stages.effects.friction import (
     FrictionEffect as FrictionEffect,
 )

@@ -186,7 +186,7 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
 @pytest.mark.parametrize('name', GALLERY)
 def test_javascript_is_as_near_as_its_functions(name, tmp_path):
     what = subject(closure_of(name))
-    given = states(what.closure, COUNT // 5, name)
+    given = states(what.closure, max(COUNT // 5, 100), name)
     assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS
 
 

@@ -45,5 +45,5 @@ def test_c_has_the_bits_of_the_steps(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize('name', CASES)
 def test_javascript_is_as_near_as_its_functions(name: str, tmp_path: Path) -> None:
     what = subject(Closure(CASES[name]()))
-    given = states(what.closure, COUNT // 5, name)
+    given = states(what.closure, max(COUNT // 5, 100), name)
     assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS
