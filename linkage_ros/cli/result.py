@@ -120,7 +120,8 @@ def _file_tables(result: Result, units: DisplayUnits) -> list[FileTable]:
 
 def _file_table(table: Table, units: DisplayUnits) -> FileTable:
     """Return a table for a file; several numbers in a cell take a column each."""
-    heads, columns = [], []
+    heads: list[str] = []
+    columns: list[list[Any]] = []
     for index, column in enumerate(table.typed_columns):
         values = [row[index] for row in table.rows]
         head = column.file_head(units)

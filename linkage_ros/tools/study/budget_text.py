@@ -221,8 +221,8 @@ def _error_cell(error: float) -> Quantity:
 
 
 def _price_cell(price: Price | None) -> Quantity:
-    is_told = price is not None and not price.is_noise
-    return Quantity(price.tick.middle if is_told else None, shown=price_text(price))
+    time = None if price is None or price.is_noise else price.tick.middle
+    return Quantity(time, shown=price_text(price))
 
 
 def _core_cell(share: float | None) -> Quantity:
