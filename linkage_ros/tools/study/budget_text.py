@@ -286,12 +286,13 @@ def _deliberate_row(knob: Knob) -> Row:
     own = knob.own_setting
     after = f', after {knob.after:g} s' if knob.after is not None else ''
     is_silent = not own.error.worst
+    rms, worst = (
+        _NONE if is_silent else _error_cell(error) for error in (own.error.rms, own.error.worst)
+    )
     return Row(
         f'on purpose: {knob.name}{after}',
-        *(
-            _NONE if is_silent else _error_cell(error)
-            for error in (own.error.rms, own.error.worst)
-        ),
+        rms,
+        worst,
         _price_cell(own.price),
         _core_cell(None if own.price is None or own.price.is_noise else own.price.core_share),
         '–',
