@@ -132,7 +132,7 @@ def _section(shown: Shown, budget: Budget, picture: str) -> Iterator[str]:
     yield ''
     yield f'![Error against cost of {shown.scene}](accuracy/{picture})'
     yield ''
-    made = budget_table(budget)
+    made = budget_table(budget).as_texts()
     yield from table(made.heads, made.rows)
     yield ''
     yield from (f'{escaped(line).capitalize()}.' for line in closing_lines(budget)[:1])

@@ -164,10 +164,10 @@ def order() -> str:
 def place(kind: str, name: str) -> str:
     """Return the summary of a drive, an effect or a fault, and its place in the order."""
     owner = parameters_of(kind, name)
-    module = import_module(REGISTRIES[kind][name] if kind == 'drive' else owner.__module__)
+    module = import_module(owner.__module__)
     lines = [f'*{_summary(kind, name)}*', '']
     if kind == 'drive':
-        topic = getattr(module, 'TOPIC', '')
+        topic = owner.listens_to
         listens = f'Listens to `{topic}`, sensor_msgs/msg/JointState.' if topic else ''
         lines.append(listens or 'Listens to no topic.')
     elif kind == 'fault':

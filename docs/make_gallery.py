@@ -196,7 +196,7 @@ def _sequence(closure: Closure) -> str:
             steps.append(f'{kind} {driven}')
         else:
             beside = assembly if how == 'closed form' else how
-            steps.append(f'{kind} {links} ({beside})')
+            steps.append(f'{kind} {", ".join(links)} ({beside})')
     return '; '.join(steps)
 
 

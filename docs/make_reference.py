@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from importlib import import_module
 from inspect import cleandoc
 from itertools import chain, zip_longest
 import json
@@ -28,7 +27,7 @@ from typing import Any
 from linkage_ros.cli import (
     COMMANDS,
     EXIT_CODES,
-    module_of,
+    find_command,
     parser_of,
     REGISTRIES,
     Table,
@@ -69,7 +68,7 @@ def commands() -> str:
 
 
 def _command(name: str) -> Iterator[str]:
-    parser = parser_of(name, import_module(module_of(name)))
+    parser = parser_of(name, find_command(name))
     yield f'## linkage {name}\n'
     yield from (f'{plain(part)}\n' for part in cleandoc(parser.description or '').split('\n\n'))
     # The width of a page.

@@ -46,6 +46,9 @@ def find_tool(name: str) -> ModuleType:
     try:
         return import_module(TOOLS[name])
     except ModuleNotFoundError as error:
-        if not TOOLS[name].startswith(error.name or TOOLS[name]):
+        absent = error.name or ''
+        if not absent or not TOOLS[name].startswith(absent):
             raise  # a package that the tool needs
-        raise LinkageError(name, 'is not installed', 'install the whole of linkage_ros') from None
+        raise LinkageError(
+            absent, 'is not installed', 'install the whole of linkage_ros'
+        ) from None

@@ -12,11 +12,9 @@ Parameters of each effect, drive and fault: how they are read from a scene, and 
 A row is what stands behind the name in a scene file; in a message, … stands for any text.
 """
 
-from importlib import import_module
-
 from linkage_ros.description import declared_fields, is_required
 from linkage_ros.dynamics import JointFriction
-from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.drives import Drive, drive_class, DRIVES
 from linkage_ros.stages.effects import (
     BacklashEffect,
     BASES,
@@ -159,10 +157,12 @@ def test_an_effect_of_defaults_needs_no_key(effect):
     assert effect in scene.linkages[0].effects
 
 
-def test_each_drive_has_its_module_and_its_parameters():
-    for name, module in DRIVES.items():
-        assert module.rpartition('.')[2] == name
-        assert declared_fields(import_module(module).PARAMETERS) is not None
+def test_each_drive_has_its_class():
+    for name in DRIVES:
+        drive = drive_class(name)
+        assert issubclass(drive, Drive)
+        assert drive.__name__ == f'{name.title().replace("_", "")}Drive'
+        assert declared_fields(drive)
 
 
 def test_each_effect_has_its_class_and_its_place():

@@ -38,7 +38,6 @@ class Expected(NamedTuple):
     # Packages of ours of which more is imported; that of the effects always is.
     packages: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()  # Further topics
-    numpy: bool = False  # Whether numpy is imported
 
 
 RATES = ('velocity', 'acceleration')
@@ -48,9 +47,9 @@ SCENES = dict.fromkeys(EFFECTS, Expected()) | {
     'acceleration': Expected(('velocity',), ('velocity',), topics=('~/motion',)),
     'friction': Expected((*RATES, 'effort'), ('effort',), ('dynamics',)),
     'effort': Expected(RATES, ('effort',), ('dynamics',)),
-    'pin_forces': Expected(RATES, (), ('dynamics',), ('~/pin_forces',), numpy=True),
-    'compliance': Expected(FORCES, packages=('dynamics',), numpy=True),
-    'clearance': Expected(FORCES, packages=('dynamics',), numpy=True),
+    'pin_forces': Expected(RATES, (), ('dynamics',), ('~/pin_forces',)),
+    'compliance': Expected(FORCES, packages=('dynamics',)),
+    'clearance': Expected(FORCES, packages=('dynamics',)),
     'jitter': Expected(('velocity',)),
     'delay': Expected(('velocity',)),
     'markers': Expected(topics=('~/markers',)),
@@ -143,7 +142,10 @@ OPTIONAL = {'dynamics', 'tools'}
 """Packages of which nothing is in a tick, unless the scene asks for it."""
 
 
-EFFECT_MODULES = {name: path.rpartition('.')[0] for name, path in EFFECTS.items()}
+EFFECT_MODULES, DRIVE_MODULES = (
+    {name: path.rpartition('.')[0] for name, path in registry.items()}
+    for registry in (EFFECTS, DRIVES)
+)
 
 
 def of_registry(names, modules):
@@ -151,9 +153,9 @@ def of_registry(names, modules):
     return {name for name, module in names.items() if module in modules}
 
 
-def sharing(effects):
-    """Return effects, and those that stand in the same files."""
-    return of_registry(EFFECT_MODULES, {EFFECT_MODULES[effect] for effect in effects})
+def sharing(names, modules=EFFECT_MODULES):
+    """Return effects or drives, and those that stand in the same files."""
+    return of_registry(modules, {modules[name] for name in names})
 
 
 def packages(modules):
@@ -180,7 +182,7 @@ def test_an_empty_scene_has_nothing(bare):
     for found in (bare.modules, bare.passed):
         assert not of_registry(EFFECT_MODULES, found)
         assert FAULTS_MODULE not in found
-        assert of_registry(DRIVES, found) == {'constant_rate'}
+        assert of_registry(DRIVE_MODULES, found) == sharing({'constant_rate'}, DRIVE_MODULES)
     assert not packages(bare.passed) & OPTIONAL
     assert not bare.stages
     assert not bare.arrays
@@ -203,17 +205,18 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     assert look.topics == list(expected.topics)
     assert packages(look.modules - bare.modules) == {'stages.effects', *expected.packages}
     assert packages(look.passed) & OPTIONAL <= set(expected.packages)
-    assert of_registry(DRIVES, look.modules) == {'constant_rate'}
+    assert of_registry(DRIVE_MODULES, look.modules) == sharing({'constant_rate'}, DRIVE_MODULES)
     assert FAULTS_MODULE not in look.modules
-    assert ('numpy' in look.modules) == expected.numpy
+    assert 'numpy' not in look.modules
 
 
 @pytest.mark.parametrize('drive', DRIVE_SCENES)
 def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
     look = Look(tmp_path, f'drive: {{{DRIVE_SCENES[drive]}}}')
-    assert of_registry(DRIVES, look.modules) == {drive}
+    drives = sharing({drive}, DRIVE_MODULES)
+    assert of_registry(DRIVE_MODULES, look.modules) == drives
     # The lines of the topic drive stand in the tick that is written for the scene.
-    assert of_registry(DRIVES, look.passed) == {drive} - {'topic'}
+    assert of_registry(DRIVE_MODULES, look.passed) == drives - {'topic'}
     assert ('dynamics' in packages(look.modules - bare.modules)) == (drive == 'torque')
     assert 'numpy' not in look.modules
 

@@ -25,7 +25,9 @@ def test_a_tool_that_is_not_installed_is_told(module, monkeypatch):
     monkeypatch.setitem(TOOLS, 'plot', module)
     with pytest.raises(LinkageError) as caught:
         find_tool('plot')
-    assert str(caught.value) == 'plot: is not installed; install the whole of linkage_ros'
+    assert str(caught.value) == (
+        'linkage_ros.nowhere: is not installed; install the whole of linkage_ros'
+    )
 
 
 def test_a_package_that_a_tool_lacks_is_not_the_tool(monkeypatch):

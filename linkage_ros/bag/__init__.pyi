@@ -6,7 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.bag.bag_file import compression_type as compression_type
+from linkage_ros.bag.bag_file import (
+    compression_type as compression_type,
+    COMPRESSIONS as COMPRESSIONS,
+)
 from linkage_ros.bag.contents import (
     Contents as Contents,
     contents_of as contents_of,
@@ -28,9 +31,9 @@ from linkage_ros.bag.metadata import (
     metadata_text as metadata_text,
     NO_START as NO_START,
     qos_text as qos_text,
-    RecordingStats as RecordingStats,
     ROOT_KEY as ROOT_KEY,
     STATS_RECORD as STATS_RECORD,
+    TopicCounts as TopicCounts,
     UNFINISHED as UNFINISHED,
     UNFINISHED_DATA as UNFINISHED_DATA,
     write_metadata as write_metadata,
@@ -52,11 +55,11 @@ from linkage_ros.bag.reader import (
 )
 from linkage_ros.bag.recorder import (
     DirectRecorder as DirectRecorder,
+    FLUSH_AFTER as FLUSH_AFTER,
     MessageSink as MessageSink,
     PLACE as PLACE,
     Recorder as Recorder,
     RecordingSummary as RecordingSummary,
-    TopicCounts as TopicCounts,
 )
 from linkage_ros.bag.recover import (
     expected_counts as expected_counts,
@@ -90,15 +93,9 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.bag.salvage import find_next_whole as find_next_whole, Salvage as Salvage
 from linkage_ros.bag.snapshot import (
-    KeptCounts as KeptCounts,
     LastSeconds as LastSeconds,
     SnapshotMemory as SnapshotMemory,
     SnapshotWriting as SnapshotWriting,
-)
-from linkage_ros.bag.storage import (
-    COMPRESSIONS as COMPRESSIONS,
-    FLUSH_AFTER as FLUSH_AFTER,
-    Storage as Storage,
 )
 from linkage_ros.bag.topic import (
     CHANNELS_FILE as CHANNELS_FILE,
@@ -106,4 +103,4 @@ from linkage_ros.bag.topic import (
     QosProfile as QosProfile,
     Topic as Topic,
 )
-from linkage_ros.bag.writer import BagWriter as BagWriter
+from linkage_ros.bag.writer import BagWriter as BagWriter, Storage as Storage

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -36,14 +37,23 @@ RECORD_SIZE = 31
 """Size of a message record without the message itself [bytes]."""
 
 
-class TopicContents(NamedTuple):
-    """Messages of one topic in a bag: number, size in [bytes], first and last log time in [ns]."""
+@dataclass(slots=True)
+class TopicContents:
+    """Messages of one topic in a bag."""
 
     topic: Topic
-    messages: int
-    size: int
-    first: int
-    last: int
+    messages: int = 0
+    size: int = 0  # In [bytes]
+    # Least and greatest log time, in [ns]; 0 without messages.
+    first: int = 0
+    last: int = 0
+
+    def add_messages(self, messages: int, size: int, first: int, last: int) -> None:
+        """Add messages with their size [bytes], and least and greatest log time, in [ns]."""
+        self.first = min(self.first, first) if self.messages else first
+        self.last = max(self.last, last)
+        self.messages += messages
+        self.size += size
 
     @property
     def mean_rate(self) -> float | None:
@@ -63,48 +73,23 @@ class Contents(NamedTuple):
     stopped: bool  # Whether reading was stopped early
 
 
-class Tally:
-    """Counts the messages of a topic."""
-
-    __slots__ = ('first', 'last', 'messages', 'size', 'topic')
-
-    def __init__(self, topic: Topic) -> None:
-        self.topic = topic
-        self.messages = self.size = self.last = 0
-        self.first = 2**64
-
-    def add_messages(self, messages: int, size: int, first: int, last: int) -> None:
-        """Add messages with their size [bytes], and least and greatest log time, in [ns]."""
-        self.messages += messages
-        self.size += size
-        self.first = min(self.first, first)
-        self.last = max(self.last, last)
-
-
-class Tallies(dict[str, Tally]):
+class Tallies(dict[str, TopicContents]):
     """Counts of all topics, by name: first the bag's topics, then others as they appear."""
 
     def __init__(self, bag: Bag) -> None:
-        super().__init__({topic.name: Tally(topic) for topic in bag.topics})
+        super().__init__({topic.name: TopicContents(topic) for topic in bag.topics})
 
-    def __missing__(self, name: str) -> Tally:
+    def __missing__(self, name: str) -> TopicContents:
         # Its channel is missing in the index.
-        tally = self[name] = Tally(Topic(name, '', '', ''))
-        return tally
+        contents = self[name] = TopicContents(Topic(name, '', '', ''))
+        return contents
 
     def to_contents(self, damage: str, stopped: bool) -> Contents:
         """Return the counts."""
-        held = [tally for tally in self.values() if tally.messages]
-        return Contents(
-            tuple(
-                TopicContents(t.topic, t.messages, t.size, t.first if t.messages else 0, t.last)
-                for t in self.values()
-            ),
-            min((tally.first for tally in held), default=None),
-            max((tally.last for tally in held), default=None),
-            damage,
-            stopped,
-        )
+        held = [topic for topic in self.values() if topic.messages]
+        begin = min((topic.first for topic in held), default=None)
+        end = max((topic.last for topic in held), default=None)
+        return Contents(tuple(self.values()), begin, end, damage, stopped)
 
 
 def contents_of(

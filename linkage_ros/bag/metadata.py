@@ -23,7 +23,7 @@ import json
 import os
 from pathlib import Path
 import re
-from typing import Any, NamedTuple
+from typing import Any
 
 from linkage_ros.bag.topic import QosProfile, Topic
 import yaml
@@ -40,7 +40,7 @@ _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
 _PREFIX = 'linkage_ros.'
 
 STATS_RECORD = f'{_PREFIX}account'
-"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
+"""Name of the metadata record with the `TopicCounts` at the end of a bag's last file."""
 
 DISCARDED = f'{_PREFIX}let_go'
 """Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
@@ -64,14 +64,37 @@ class BagSummary:
     file: str  # Name of its MCAP file; of several the last
     topics: tuple[Topic, ...]  # The topics, in the order of their numbers
     counts: tuple[int, ...]  # Messages in the file, for each topic
-    # Messages that were not written because one of their times is out of range, for each topic.
-    refused: tuple[int, ...]
     start: int  # Least log time [ns]; `NO_START` without messages
     duration: int  # Greatest minus least log time [ns]
     size: int  # Size of the MCAP file, or files [bytes]
     parts: tuple[BagSummary, ...] = ()  # Summaries of the files, if there are several
     # Messages in files that were removed to keep newer ones, for each topic; () for none.
     discarded: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCounts:
+    """
+    Counts of one topic's messages in a recording, or in the memory of the last seconds.
+
+    At every instant ``received == recorded + dropped + discarded + waiting``.
+    """
+
+    name: str
+    received: int  # Messages offered
+    recorded: int  # Messages in the bag, or in memory
+    # Messages for which disk or memory was too slow or too full, or whose times fit into no bag.
+    dropped: int
+    # Messages in files that were removed for newer ones; of a memory: too old, or no room for them
+    discarded: int = 0
+    waiting: int = 0  # Messages in the queue, or with the recorder's thread
+
+
+def count_topics(summary: BagSummary, received: Sequence[int]) -> list[TopicCounts]:
+    """Return the counts of a bag that was offered these numbers of messages; the rest dropped."""
+    names = [topic.name for topic in summary.topics]
+    counts = zip(names, received, summary.counts, summary.discarded, strict=True)
+    return [TopicCounts(name, n, kept, n - kept - gone, gone) for name, n, kept, gone in counts]
 
 
 @lru_cache
@@ -118,9 +141,7 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
     return f'{ROOT_KEY}:\n{_indent(text)}' if root else text
 
 
-def merge_summaries(
-    parts: Sequence[BagSummary], refused: Sequence[int], discarded: Sequence[int]
-) -> BagSummary:
+def merge_summaries(parts: Sequence[BagSummary], discarded: Sequence[int]) -> BagSummary:
     """Return the summary of a bag of these files; of a single file, its own summary."""
     last = parts[-1]
     start = min(part.start for part in parts)
@@ -130,7 +151,6 @@ def merge_summaries(
         file=last.file,
         topics=last.topics,
         counts=tuple(map(sum, zip(*(part.counts for part in parts), strict=True))),
-        refused=tuple(refused),
         start=start,
         duration=max(ends) - start if ends else 0,
         size=sum(part.size for part in parts),
@@ -220,41 +240,34 @@ def _dump_yaml(content: Any) -> str:
     return text
 
 
-class RecordingStats(NamedTuple):
-    """Messages by topic: ``received == recorded + dropped + discarded``."""
-
-    received: Sequence[int]  # Messages offered to the recorder
-    recorded: Sequence[int]  # Messages in the bag
-    # Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
-    dropped: Sequence[int]
-    discarded: Sequence[int]  # Messages in files that were removed to keep newer ones
-
-
 def custom_data(
-    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
+    custom: Mapping[str, str], summary: BagSummary, account: Sequence[TopicCounts] | None
 ) -> dict[str, str]:
     """Return a bag's ``custom_data``: ``custom``, and the statistics once they are known."""
     entries = dict(custom)
     if any(summary.discarded):
-        entries[DISCARDED] = _by_topic(summary.discarded, summary)
+        names = (topic.name for topic in summary.topics)
+        entries[DISCARDED] = json.dumps(dict(zip(names, summary.discarded, strict=True)))
     if account:
-        entries[f'{_PREFIX}received'] = _by_topic(account.received, summary)
-        entries[f'{_PREFIX}dropped'] = _by_topic(account.dropped, summary)
+        entries[f'{_PREFIX}received'] = json.dumps({t.name: t.received for t in account})
+        entries[f'{_PREFIX}dropped'] = json.dumps({t.name: t.dropped for t in account})
     return entries
 
 
 def last_records(
-    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
+    custom: Mapping[str, str], summary: BagSummary, account: Sequence[TopicCounts] | None
 ) -> dict[str, dict[str, str]]:
     """Return the metadata records at the end of a file, by name; arguments as `custom_data`."""
     text = metadata_text(summary, custom_data(custom, summary, account), root=False)
     records = {'rosbag2': {'serialized_metadata': text}}
     if account:
-        words = ('received', 'recorded', 'dropped', 'let_go')
         counts = {
-            word: _by_topic(counts, summary) for word, counts in zip(words, account, strict=True)
+            'received': {topic.name: topic.received for topic in account},
+            'recorded': {topic.name: topic.recorded for topic in account},
+            'dropped': {topic.name: topic.dropped for topic in account},
+            'let_go': {topic.name: topic.discarded for topic in account},
         }
-        records[STATS_RECORD] = counts
+        records[STATS_RECORD] = {word: json.dumps(by_topic) for word, by_topic in counts.items()}
     return records
 
 
@@ -270,7 +283,3 @@ def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
         return {}
     entries = counts.items() if isinstance(counts, dict) else ()
     return {topic: count for topic, count in entries if type(count) is int and count >= 0}
-
-
-def _by_topic(counts: Sequence[int], summary: BagSummary) -> str:
-    return json.dumps({t.name: n for t, n in zip(summary.topics, counts, strict=True)})

@@ -27,10 +27,15 @@ import threading
 import time
 from typing import Protocol
 
-from linkage_ros.bag.metadata import BagSummary, RecordingStats
-from linkage_ros.bag.storage import FLUSH_AFTER
+from linkage_ros.bag.metadata import BagSummary, count_topics, TopicCounts
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
+
+FLUSH_AFTER = 0.9
+"""
+Fraction of the flush period after which the next flush begins: waking, writing and waiting for the
+disk take time too, and messages older than the period must be on the disk.
+"""
 
 POLL = 0.02
 """Period at which a thread checks the queue, in [s]."""
@@ -163,24 +168,6 @@ class MessageQueue:
 
 
 @dataclass(frozen=True, slots=True)
-class TopicCounts:
-    """
-    Counts of one topic's messages.
-
-    At every instant ``received == recorded + dropped + discarded + waiting``. Waiting messages are
-    in the queue or with the recorder's thread; discarded messages were recorded in a file that was
-    removed for a newer one.
-    """
-
-    name: str
-    received: int
-    recorded: int
-    dropped: int
-    waiting: int
-    discarded: int = 0
-
-
-@dataclass(frozen=True, slots=True)
 class RecordingSummary:
     """Outcome of a recording."""
 
@@ -219,7 +206,7 @@ class Recorder:
         self._taken_and_lost = ([0] * len(writer.topics), [0] * len(writer.topics))
         self._flushed_counts = (0,) * len(writer.topics)
         self._custom: dict[str, str] = {}
-        writer.make_statistics = self._final_statistics
+        writer.make_statistics = self._count_topics
         self._summary: RecordingSummary | None = None
         self._stopping = threading.Event()
         # A daemon thread: a disk that never answers must not keep the process alive.
@@ -240,7 +227,7 @@ class Recorder:
             # Read last, so that a message in transit counts as waiting, and never twice.
             received = self._queue.received[index].read_count() + opened[index]
             waiting = received - recorded - dropped - gone
-            counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
+            counts.append(TopicCounts(topic.name, received, recorded, dropped, gone, waiting))
         return tuple(counts)
 
     def stop(
@@ -335,19 +322,11 @@ class Recorder:
                 if more:
                     time.sleep(NAP)
 
-    def _final_statistics(self, summary: BagSummary) -> RecordingStats:
-        """Return the final statistics, when no more are taken; `dropped` is the remainder."""
-        received = [
-            tally.read_count() + opened
-            for tally, opened in zip(
-                self._queue.received, self._writer.opening_counts, strict=True
-            )
-        ]
-        dropped = [
-            came - there - gone
-            for came, there, gone in zip(received, summary.counts, summary.discarded, strict=True)
-        ]
-        return RecordingStats(received, summary.counts, dropped, summary.discarded)
+    def _count_topics(self, summary: BagSummary) -> list[TopicCounts]:
+        """Return the final counts, when no more messages are taken."""
+        received, opened = self._queue.received, self._writer.opening_counts
+        pairs = zip(received, opened, strict=True)
+        return count_topics(summary, [counter.read_count() + more for counter, more in pairs])
 
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""

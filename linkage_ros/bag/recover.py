@@ -231,7 +231,6 @@ class RecoveredBag:
             file=Path(self._file.name).name,
             topics=tuple(self._topics.values()),
             counts=tuple(self.counts[name] for name in self._topics),
-            refused=(0,) * len(self._topics),
             start=self._start,
             duration=max(0, self._end - self._start),
             size=self._file.tell(),

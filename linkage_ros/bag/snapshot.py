@@ -20,13 +20,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from struct import Struct
 import threading
 import time
 from typing import NamedTuple
 
-from linkage_ros.bag.metadata import BagSummary, RecordingStats
+from linkage_ros.bag.metadata import count_topics, TopicCounts
 from linkage_ros.bag.recorder import BATCH, MessageQueue, NAP, POLL, Recorder, RecordingSummary
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter, TIME_END
@@ -182,16 +181,6 @@ class LastSeconds:
             self._newest, self._newest_size = [], 0
 
 
-class KeptCounts(NamedTuple):
-    """Counts of one topic's messages; always ``received == kept + discarded + dropped``."""
-
-    name: str
-    received: int  # Messages offered
-    kept: int  # Messages in memory
-    discarded: int  # Too old, or removed for lack of memory
-    dropped: int  # That no bag can hold, or that came while the memory's thread was too slow
-
-
 class SnapshotMemory:
     """
     Memory of the last ``seconds`` [s] of the offered messages, as in `LastSeconds`.
@@ -220,7 +209,7 @@ class SnapshotMemory:
         )
         self._thread.start()
 
-    def read_counts(self) -> tuple[KeptCounts, ...]:
+    def read_counts(self) -> tuple[TopicCounts, ...]:
         """Return the current counts; messages that wait for the thread count as kept."""
         counts = []
         for index, topic in enumerate(self.topics):
@@ -231,7 +220,7 @@ class SnapshotMemory:
             # Read last, so that a message in transit counts as kept, and never twice.
             received = self._queue.received[index].read_count()
             kept = received - discarded - dropped
-            counts.append(KeptCounts(topic.name, received, kept, discarded, dropped))
+            counts.append(TopicCounts(topic.name, received, kept, dropped, discarded))
         return tuple(counts)
 
     def take_content(self) -> KeptMessages:
@@ -250,7 +239,7 @@ class SnapshotMemory:
                 pass
             return self._last.kept_content()
 
-    def stop(self) -> tuple[KeptCounts, ...]:
+    def stop(self) -> tuple[TopicCounts, ...]:
         """End the memory; return the last counts, with the messages kept to the end."""
         self._queue.is_open = False
         self._stopping.set()
@@ -294,7 +283,7 @@ class SnapshotMemory:
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
         )
         for index, counts in enumerate(self.read_counts()):
-            self._last.discarded[index] += counts.kept
+            self._last.discarded[index] += counts.recorded
 
 
 class SnapshotWriting:
@@ -334,7 +323,7 @@ class SnapshotWriting:
 
     def _write_bag(self, writer: BagWriter) -> RecordingSummary:
         recorder = Recorder(writer, capacity=_AHEAD + BATCH)
-        writer.make_statistics = partial(self._final_statistics, writer)
+        writer.make_statistics = lambda bag: count_topics(bag, self._received_counts(writer))
         for index, message in enumerate(self.kept.messages()):
             if index % BATCH == 0:
                 time.sleep(NAP)
@@ -367,10 +356,3 @@ class SnapshotWriting:
     def _received_counts(self, writer: BagWriter) -> list[int]:
         """Return the number of messages of each topic to write."""
         return list(map(sum, zip(self.kept.counts, writer.opening_counts, strict=True)))
-
-    def _final_statistics(self, writer: BagWriter, summary: BagSummary) -> RecordingStats:
-        received = self._received_counts(writer)
-        dropped = [
-            there - written for there, written in zip(received, summary.counts, strict=True)
-        ]
-        return RecordingStats(received, summary.counts, dropped, (0,) * len(dropped))

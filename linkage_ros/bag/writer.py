@@ -19,12 +19,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from itertools import count
+import os
 from pathlib import Path
 import time
 from typing import NoReturn
 
-from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
+from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type, NONE
 from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
 from linkage_ros.bag.metadata import (
     BagSummary,
@@ -32,12 +34,11 @@ from linkage_ros.bag.metadata import (
     FAILURE,
     last_records,
     merge_summaries,
-    RecordingStats,
     sync_folder,
+    TopicCounts,
     UNFINISHED_DATA,
     write_metadata,
 )
-from linkage_ros.bag.storage import describe_scarcity, Storage
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.errors import RecordingError
 
@@ -49,6 +50,33 @@ TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 _RENEWAL = 0.8  # [s]; less than the time between two flushes at a period of 1 s
 _ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # avoids many small files on a full disk [bytes]
+
+# Data written between two checks of free space: a chunk and the data of a flush [bytes]. It is
+# kept free in addition, so that the required space is never missing.
+_ON_ITS_WAY = 256 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """
+    Storage settings of a bag; by default written continuously, in uncompressed files of 1 GiB.
+
+    Until a file ends, mcap keeps in memory the positions of its chunks and messages, so the size
+    of a file must be limited.
+    """
+
+    # Time whose messages a power cut may lose [s]: the flush period, and a tenth more.
+    flush_period: float = 1.0
+    split_bytes: int = 2**30  # Size after which the next file begins [bytes]; 0 for never
+    # Duration after which the next file begins [s], by log times; 0 for never.
+    split_seconds: float = 0.0
+    keep_files: int = 0  # Number of files to keep; 0 for all
+    min_free_bytes: int = 0  # Space to leave free on the disk [bytes]
+    compression: str = NONE  # 'none', 'lz4' or 'zstd'
+    # Duration of the run to keep in memory until a snapshot is requested [s], by log times; 0 to
+    # write the bag continuously.
+    snapshot_seconds: float = 0.0
+    snapshot_bytes: int = 256_000_000  # Most memory for it [bytes]
 
 
 class BagWriter:
@@ -79,7 +107,7 @@ class BagWriter:
         self.discarded = (0,) * len(self.topics)
         # Returns the statistics of all messages, given the summary of the bag; None for a bag
         # without statistics.
-        self.make_statistics: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
+        self.make_statistics: Callable[[BagSummary], Sequence[TopicCounts] | None] = lambda _: None
         channels = 'application/mcap', channels_file(self.topics)
         self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
         self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
@@ -89,7 +117,6 @@ class BagWriter:
         # Number of messages of each topic written because of `opening`, not by `write`.
         self.opening_counts = (0,) * len(self.topics)
         self._sequences = [0] * len(self.topics)
-        self._refused = [0] * len(self.topics)
         self._ended_files: list[BagSummary] = []
         self._files_to_remove: list[Path] = []  # files to remove that still exist
         self._due = 0.0
@@ -124,14 +151,13 @@ class BagWriter:
         Take a message (CDR with header, times in [ns]); return whether it was accepted.
 
         The message is on the disk after the next `flush` at the latest. A message with negative
-        times, or times beyond 63 bits, is refused and counted: in mcap it would corrupt its chunk.
+        times, or times beyond 63 bits, is refused: in mcap it would corrupt its chunk.
         Raise `RecordingError` once the recording has ended; the bag is closed as well as the disk
         allows.
         """
         if self._failure:
             raise self._failure
         if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
-            self._refused[topic] += 1
             return False
         if self._splits and self._is_full(log_time):
             self._begin_next_file()
@@ -257,9 +283,7 @@ class BagWriter:
         excess = max(0, len(parts) - most) if most else 0
         gone, kept = parts[:excess], parts[excess:]
         discarded = [self.discarded, *(part.counts for part in gone)]
-        summary = merge_summaries(
-            kept, self._refused, tuple(map(sum, zip(*discarded, strict=True)))
-        )
+        summary = merge_summaries(kept, tuple(map(sum, zip(*discarded, strict=True))))
         if not self._try_to_renew(summary):
             return
         self._ended_files, self.discarded = kept[:-1], summary.discarded
@@ -339,9 +363,16 @@ class BagWriter:
 
     def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
         """Raise RecordingError if too little is free, without the files' reserve."""
-        scarce = describe_scarcity(self.folder, self.storage.min_free_bytes)
-        if scarce:
-            raise RecordingError(self.folder, f'{what}: {scarce}', remedy)
+        if not (least := self.storage.min_free_bytes):
+            return
+        disk = os.statvfs(self.folder)
+        free = disk.f_bavail * disk.f_frsize
+        if free < least + _ON_ITS_WAY:
+            reason = (
+                f'{what}: {free:,} bytes are free on its disk, fewer than min_free_bytes: '
+                f'{least:,} and {_ON_ITS_WAY:,} to go on'
+            )
+            raise RecordingError(self.folder, reason, remedy)
 
     def _end_recording(self, error: OSError | RecordingError) -> NoReturn:
         self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
@@ -380,7 +411,7 @@ class BagWriter:
         return [*self._ended_files, self._file.summarize(self.topics)]
 
     def _summarize(self) -> BagSummary:
-        return merge_summaries(self._file_summaries(), self._refused, self.discarded)
+        return merge_summaries(self._file_summaries(), self.discarded)
 
 
 def _remove_folder(folder: Path) -> None:

@@ -45,7 +45,7 @@ from linkage_ros.cli.info import bag_tables as bag_tables
 from linkage_ros.cli.main import (
     COMMANDS as COMMANDS,
     EXIT_CODES as EXIT_CODES,
-    module_of as module_of,
+    find_command as find_command,
     Parser as Parser,
     parser_of as parser_of,
 )
@@ -67,6 +67,7 @@ from linkage_ros.cli.scene import (
 from linkage_ros.cli.table import (
     Column as Column,
     facts_table as facts_table,
+    Quantity as Quantity,
     Table as Table,
     table_of_rows as table_of_rows,
 )

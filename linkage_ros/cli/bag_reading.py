@@ -46,7 +46,7 @@ from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, escape_unprintable, list_names
 from linkage_ros.kinematics import four_bars
-from linkage_ros.replay import ExaminedRun, recorded_scene, WorstResiduals
+from linkage_ros.replay import recorded_scene, WorstResiduals
 from linkage_ros.signals import heed_signals, StoppedError
 
 _MIB = 2**20
@@ -223,9 +223,9 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
             {
                 'name': topic.name,
                 'type': topic.type,
-                'messages': messages,
+                'messages': each.messages,
                 'rate_hz': each.mean_rate,
-                'size_bytes': size,
+                'size_bytes': each.size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,
                 'qos_understood': topic.qos.understood,
@@ -236,7 +236,7 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
                 else None,
             }
             for each in contents.topics
-            for topic, messages, size, _, _ in [each]
+            for topic in [each.topic]
         ],
         'versions': {
             'linkage_ros': _text_or_none(run.get('linkage_ros')),
@@ -266,7 +266,20 @@ def scene_json(scene: Scene) -> dict[str, Any]:
 
 def worst_account(worst: WorstResiduals) -> dict[str, Any]:
     """Return the worst residuals of a linkage, to be merged with its description."""
-    account: dict[str, Any] = {
+    residual = near = None
+    if worst.residual is not None:
+        value, place = worst.residual
+        residual = {'residual_m': value, 'time_ns': place.time, 'inputs': list(place.inputs)}
+    if worst.nearest is not None:
+        nearness, place = worst.nearest
+        near = {
+            'conditioning': nearness.conditioning,
+            'transmission_angle_rad': nearness.transmission_angle,
+            'input_to_toggle': finite_or_none(nearness.toggle_distance),
+            'time_ns': place.time,
+            'inputs': list(place.inputs),
+        }
+    return {
         'four_bars': [
             {'kind': bar.kind.name, 'lengths_m': list(bar.lengths)}
             for bar in four_bars(worst.closure.structure)
@@ -274,29 +287,9 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
         'states': worst.states,
         'toggles': worst.toggles,
         'limited': worst.limited,
-        'worst_residual': None,
-        'nearest_to_toggle': None,
+        'worst_residual': residual,
+        'nearest_to_toggle': near,
     }
-    if worst.residual is not None:
-        residual, place = worst.residual
-        account['worst_residual'] = {
-            'residual_m': residual, 'time_ns': place.time, 'inputs': list(place.inputs)
-        }  # fmt: skip
-    if worst.nearest is not None:
-        near, place = worst.nearest
-        account['nearest_to_toggle'] = {
-            'conditioning': near.conditioning,
-            'transmission_angle_rad': near.transmission_angle,
-            'input_to_toggle': finite_or_none(near.toggle_distance),
-            'time_ns': place.time,
-            'inputs': list(place.inputs),
-        }
-    return account
-
-
-def replay_account(examined: ExaminedRun) -> dict[str, Any]:
-    """Return how well the replayed scene agrees with the bag."""
-    return {'joint_states': examined.joint_states, 'same_bytes': examined.same}
 
 
 def local_time_text(time: int | None) -> str | None:

@@ -13,14 +13,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from math import ceil, tau
 import sys
 from threading import Event
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import add_file, add_radians, DisplayUnits, finite_or_none
-from linkage_ros.cli.result import add_result, Result, show_result
-from linkage_ros.cli.table import Column, facts_table, Table, table_of_rows
+from linkage_ros.cli.result import add_result, Result, show_result, tables_json
+from linkage_ros.cli.table import Column, facts_table, Quantity, Table, UNIT
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.description import is_spatial, linkage_content, linkage_notes, read_closure
 from linkage_ros.errors import DefinitionError, LinkageError
@@ -31,14 +32,15 @@ from linkage_ros.kinematics import (
     conditioning_curves,
     Driven,
     Dyad,
-    Extreme,
     four_bars,
     Group,
     InputSweep,
     is_iterated,
     Iterated,
+    Linkage,
     links_of,
     sides_at,
+    SpaceLinkage,
     Status,
     StepwiseClosure,
     SweptCurve,
@@ -81,18 +83,20 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
     if is_spatial(content):
-        from linkage_ros.cli.check_space import check_space
+        from linkage_ros.cli.check_space import check_space  # local import: few ask for it
 
         return check_space(content, file.stem, arguments)
     closure = read_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
-    with show_progress('parts examined') as advance:
-        account = {'file': arguments.file, **linkage_json(closure, advance)}
-        if arguments.branches:
-            account['branches'] = list(_list_branches(closure))
     units = arguments.angles.of_file(content.units)
-    show_result(Result(account, [*_linkage_tables(account, units)]), arguments, units)
+    with show_progress('parts examined') as advance:
+        described, tables = describe_linkage(closure, advance)
+        if arguments.branches:
+            tables.append(_branches_table(closure))
+            described |= tables_json(tables[-1:])
+    account = {'file': arguments.file, **described}
+    show_result(Result(account, [*_linkage_tables(account, tables, units)]), arguments, units)
     return 0
 
 
@@ -100,30 +104,42 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 # the 'unit' beside them.
 
 
-def linkage_json(
-    closure: Closure, advance: ProgressCallback = lambda _done, _of: None
-) -> dict[str, Any]:
-    """Return the description of a linkage, as JSON holds it."""
+def describe_linkage(
+    closure: Closure, advance: ProgressCallback
+) -> tuple[dict[str, Any], list[Table]]:
+    """Return the description of a linkage as JSON holds it, and tables of it in their order."""
+    sweep = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
+    sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
+    groups = [
+        describe_group(closure, number, sides) for number in range(len(closure.structure.groups))
+    ]
+    numbered = [(number, *one) for number, one in enumerate(groups, 1)]
+    tables = [
+        Table('Solved in this order', ORDER, numbered, 'groups'),
+        _four_bars_table(closure),
+    ]
+    account = _structure_json(closure) | {'groups': [one._asdict() for one in groups]}
+    account |= tables_json(tables[1:])
+    # Most of the time goes by here.
+    parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
+        *(examine_reach, examine_residual, _other_assemblies),
+        *(transmission_table, _conditioning_table),
+    )
+    for index, part in enumerate(parts):
+        advance(index, len(parts))
+        found = part(closure, sweep)
+        if isinstance(found, Table):
+            tables.append(found)
+            found = tables_json([found])
+        account |= found
+    return account, tables
+
+
+def _structure_json(closure: Closure) -> dict[str, Any]:
     linkage, structure = closure.linkage, closure.structure
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
     named = [point for points in linkage.links.values() for point in points]
-    units = dict(zip(linkage.joints, map(joint_unit, closure.turning), strict=True))
-    units |= {given.joint: joint_unit(not given.slider) for given in linkage.inputs}
-    sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
-    # Most of the time goes by here.
-    parts = (
-        examine_reach,
-        examine_residual,
-        _other_assemblies,
-        _examine_transmission,
-        _examine_conditioning,
-    )
-    sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
-    examined: dict[str, Any] = {}
-    for index, part in enumerate(parts):
-        advance(index, len(parts))
-        examined |= part(closure, sweep)
     return {
         'moving_links': len(linkage.links) - 1,
         'slot_blocks': moving + 1 - len(linkage.links),
@@ -133,47 +149,27 @@ def linkage_json(
         'loops': len(structure.joints) - moving,
         'degrees_of_freedom': structure.mobility,
         'inputs': [
-            {
-                'joint': given.joint,
-                'unit': units[given.joint],
-                'slider': given.slider or None,
-                'parent': given.parent or None,
-                'child': given.child or None,
-            }
+            {'joint': given.joint, 'unit': given.unit}
+            | {key: getattr(given, key) or None for key in ('slider', 'parent', 'child')}
             for given in linkage.inputs
         ],
-        'limits': list(list_limits(linkage, units)),
+        'limits': limits_json(linkage),
         'unwrapped': _counts_turns(closure),
-        'groups': [_group_json(closure, index, sides) for index in range(len(structure.groups))],
-        'four_bars': [
-            {
-                'group': bar.group + 1,
-                'links': list(bar.links),
-                'lengths_m': list(bar.lengths),
-                'grashof_margin_m': bar.kind.margin,
-                'barker': bar.kind.code,
-                'name': bar.kind.name,
-            }
-            for bar in four_bars(structure)
-        ],
-        **examined,
     }
 
 
-def list_limits(linkage: Any, units: Mapping[str, str]) -> Iterator[dict[str, Any]]:
-    """Yield the limits of the joints, which have units."""
-    for name, limits in linkage.limits.items():
-        yield {
-            'joint': name,
-            'unit': units[name],
-            'low': finite_or_none(limits.low),
-            'high': finite_or_none(limits.high),
-            'velocity': finite_or_none(limits.velocity),
-            'effort': finite_or_none(limits.effort),
-        }
+def limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
+    """Return the limits of the joints that have any, in SI units."""
+    units = {name: joint.unit for name, joint in linkage.joints.items()}
+    units |= {given.joint: given.unit for given in linkage.inputs}
+    return [
+        {'joint': name, 'unit': units[name]}
+        | {key: finite_or_none(value) for key, value in asdict(limits).items()}
+        for name, limits in linkage.limits.items()
+    ]
 
 
-def _list_branches(closure: Closure) -> Iterator[dict[str, Any]]:
+def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
     linkage = closure.linkage
     if len(linkage.inputs) > 1:
@@ -183,18 +179,12 @@ def _list_branches(closure: Closure) -> Iterator[dict[str, Any]]:
     for name in names:
         with suppress(DefinitionError):  # It does not move.
             for branch in closure.branches(name):
-                yield {
-                    'joint': name,
-                    'branch': branch.number,
-                    'input_low': branch.least,
-                    'input_high': branch.most,
-                    'unit': joint_unit(branch.turning),
-                    'low': branch.low,
-                    'high': branch.high,
-                    'turns_back': list(branch.turns_back),
-                    'limited_by': [by or None for by in branch.by],
-                    'rises': branch.rises,
-                }
+                unit = 'rad' if branch.turning else 'm'
+                yield (
+                    *(name, branch.number, branch.least, branch.most, unit),
+                    *(Quantity(end, unit) for end in (branch.low, branch.high)),
+                    *(list(branch.turns_back), branch.rises, [by or None for by in branch.by]),
+                )
 
 
 def _counts_turns(closure: Closure) -> bool:
@@ -204,16 +194,6 @@ def _counts_turns(closure: Closure) -> bool:
     parts = (getattr(step, 'diagonal', getattr(step, 'rail', None)) for step in closure.steps)
     crossed = (sum(getattr(part, 'crosses', ())) for part in parts)
     return is_iterated(closure) or any(number == 1 for number in crossed)
-
-
-def _group_json(closure: Closure, number: int, sides: Mapping[str, str]) -> dict[str, Any]:
-    kind, links, method, assembly = describe_group(closure, number, sides)
-    return {'kind': kind, 'links': links.split(', '), 'method': method, 'assembly': assembly}
-
-
-def joint_unit(turning: bool) -> str:
-    """Return the unit of a joint that turns, or slides."""
-    return 'rad' if turning else 'm'
 
 
 def examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
@@ -268,63 +248,32 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
         # local import: it loads numpy
         from linkage_ros.kinematics import other_assemblies, STARTS
 
-        groups.append(
+        assemblies = [
             {
-                'group': index + 1,
-                'starts': STARTS,
-                'inputs': list(pose.inputs),
-                'assemblies': [
-                    {
-                        'points_m': {
-                            name: [place.real + 0.0, place.imag + 0.0]
-                            for name, place in one.points.items()
-                        },
-                        'turns': one.turns,
-                    }
-                    for one in other_assemblies(closure, index)
-                ],
+                'points_m': {
+                    name: [place.real + 0.0, place.imag + 0.0]
+                    for name, place in one.points.items()
+                },
+                'turns': one.turns,
             }
-        )
+            for one in other_assemblies(closure, index)
+        ]
+        head = {'group': index + 1, 'starts': STARTS, 'inputs': list(pose.inputs)}
+        groups.append(head | {'assemblies': assemblies})
     return {'other_assemblies': groups}
 
 
-def _examine_transmission(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
-    found = transmission_angles(sweep) if sweep is not None else {}
-    return {'transmission_angles': curve_extremes(_links_of_group(closure), found, 'angle_rad')}
+class GroupDescription(NamedTuple):
+    """A group in words."""
+
+    kind: str
+    links: list[str]
+    method: str  # Of its solution
+    assembly: str
 
 
-def _examine_conditioning(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
-    found = conditioning_curves(sweep) if sweep is not None else {}
-    return {'conditioning': curve_extremes(_links_of_group(closure), found, 'conditioning')}
-
-
-def _links_of_group(closure: Closure) -> Callable[[int], Sequence[str]]:
-    return lambda number: links_of(closure.structure.groups[number])
-
-
-def curve_extremes(
-    links: Callable[[int], Sequence[str]], found: Mapping[int, SweptCurve], key: str
-) -> list[dict[str, Any]]:
-    """Return the extreme values by group, and the inputs where they occur; none if constant."""
-
-    def extreme_json(one: Extreme) -> dict[str, Any]:
-        return {key: finite_or_none(one.value), 'inputs': list(one.at)}
-
-    return [
-        {
-            'group': number + 1,
-            'links': list(links(number)),
-            'least': extreme_json(curve.lowest),
-            'greatest': extreme_json(curve.highest),
-        }
-        for number, curve in found.items()
-    ]
-
-
-def describe_group(
-    closure: Closure, number: int, sides: Mapping[str, str]
-) -> tuple[str, str, str, str]:
-    """Return kind, links, solution method and assembly of a group; sides as `sides_at`."""
+def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> GroupDescription:
+    """Return a group in words; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
         given = closure.linkage.driven_joints[group.index]
@@ -332,28 +281,26 @@ def describe_group(
         ratio = closure.linkage.ratios.get(given.joint)
         follows = f' follows {ratio.of} by {ratio.ratio:g}' if ratio else ''
         kind = 'ratio' if ratio else 'input'
-        return kind, group.joint.link, f'{given.joint}{follows}, {place} on {group.joint.to}', ''
+        method = f'{given.joint}{follows}, {place} on {group.joint.to}'
+        return GroupDescription(kind, [group.joint.link], method, '')
     steps = [
         step
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
         if owner == number
     ]
     if isinstance(group, Dyad):
-        links = ', '.join(' + '.join(body) for body in group.bodies)
+        links = [' + '.join(body) for body in group.bodies]
         assembly = 'the only one'
         if closes_in_two_ways(group):
             assembly = _assembly_text(group, sides.get(closing_name(group), 'in line with'))
             parts = (getattr(one, 'diagonal', getattr(one, 'rail', None)) for one in steps)
             if any(any(getattr(part, 'crosses', ())) for part in parts):
                 assembly += ' as drawn, changing at change points'
-        return f'{group.kind} dyad', links, 'closed form', assembly
+        return GroupDescription(f'{group.kind} dyad', links, 'closed form', assembly)
     (equations,) = (step.equation_count for step in steps if hasattr(step, 'equation_count'))
-    return (
-        f'{len(group.links)} links',
-        ', '.join(group.links),
-        f"iterated: Newton's method, {equations} equations",
-        'as the pose of the file',
-    )
+    method = f"iterated: Newton's method, {equations} equations"
+    links = list(group.links)
+    return GroupDescription(f'{len(links)} links', links, method, 'as the pose of the file')
 
 
 def _assembly_text(dyad: Dyad, side: str) -> str:
@@ -387,93 +334,110 @@ ORDER = (
     Column('how', 'method'),
     Column('assembly', 'assembly'),
 )
+_FOUR_BAR = (
+    _GROUP,
+    _LINKS,
+    Column('lengths []', 'lengths_m', 'm', _lengths_text),
+    Column('>Grashof margin []', 'grashof_margin_m', 'm', _margin_text),
+    Column('Barker', 'barker'),
+    Column('name', 'name'),
+)
 
 
-def _linkage_tables(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[Table]:
+def _linkage_tables(
+    account: Mapping[str, Any], tables: Sequence[Table], units: DisplayUnits
+) -> Iterator[Table]:
     """Yield the tables that describe a linkage."""
     yield facts_table(account['file'], _linkage_facts(account, units))
-    groups = [{'number': number, **one} for number, one in enumerate(account['groups'], 1)]
-    yield table_of_rows('Solved in this order', 'groups', ORDER, groups)
+    yield tables[0]
     input_units = [given['unit'] for given in account['inputs']]
-    yield from (
-        _assemblies_table(group, input_units, units) for group in account['other_assemblies']
-    )
-    found = [_four_bars_table(account, units), *extremes_tables(account)]
-    if 'branches' in account:
-        found.append(_branches_table(account))
-    yield from (table for table in found if table.rows or table.key == 'branches')
+    for group in account['other_assemblies']:
+        yield _assemblies_table(group, input_units, units)
+    yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 
 
-def _four_bars_table(account: Mapping[str, Any], units: DisplayUnits) -> Table:
-    columns = (
-        _GROUP,
-        _LINKS,
-        Column(f'lengths [{units.length}]', 'lengths_m', form=_lengths_text),
-        Column(f'>Grashof margin [{units.length}]', 'grashof_margin_m', 'm', _margin_text),
-        Column('Barker', 'barker'),
-        Column('name', 'name'),
-    )
+def _four_bars_table(closure: Closure) -> Table:
+    rows = [
+        (
+            *(bar.group + 1, list(bar.links), list(bar.lengths)),
+            *(bar.kind.margin, bar.kind.code, bar.kind.name),
+        )
+        for bar in four_bars(closure.structure)
+    ]
     title = 'Four-bars: input, coupler, output and the frame that they are seen from'
-    return table_of_rows(title, 'four_bars', columns, account['four_bars'])
+    return Table(title, _FOUR_BAR, rows, 'four_bars')
 
 
-def extremes_tables(account: Mapping[str, Any]) -> Iterator[Table]:
-    """Yield the tables of transmission angles and conditioning over the range."""
-    turning = account['inputs'][0]['unit'] == 'rad'
-
-    def places(inputs: Sequence[float], units: DisplayUnits) -> str:
-        return _inputs_text(inputs, turning, units)
-
+def transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
+    """Return the extreme transmission angles over the range, by group."""
     def angle(value: float | None, units: DisplayUnits) -> str:
         return '' if value is None else units.format_angle(value, 2)
 
-    found = (
-        ('Transmission angles over the range, acute', 'transmission_angles', 'angle_rad',
-         ('least', 'greatest'), 'rad', angle),
-        ('Conditioning over the range, of iterated links', 'conditioning', 'conditioning',
-         ('least',), '', '.4f'),
-    )  # fmt: skip
-    for title, key, value, ends, unit, form in found:
-        columns = [_GROUP, _LINKS]
-        for end in ends:
-            columns += [
-                Column(f'>{end}', end, unit, form),
-                Column('at', f'{end}_at', form=places),
-            ]
-        rows = [
-            {**one} | {end: one[end][value] for end in ends}
-            | {f'{end}_at': one[end]['inputs'] for end in ends}
-            for one in account[key]
-        ]  # fmt: skip
-        yield table_of_rows(title, key, columns, rows)
+    ends = [Column(f'>{end}', f'{end}.angle_rad', 'rad', angle) for end in ('least', 'greatest')]
+    found = {} if sweep is None else transmission_angles(sweep)
+    title = 'Transmission angles over the range, acute'
+    return _extremes_table(title, 'transmission_angles', closure, found, ends)
 
 
-def _branches_table(account: Mapping[str, Any]) -> Table:
-    given = account['inputs'][0]
+def _conditioning_table(closure: Closure, sweep: InputSweep | None) -> Table:
+    least = Column('>least', 'least.conditioning', form='.4f')
+    ends = [least, Column(None, 'greatest.conditioning')]
+    found = {} if sweep is None else conditioning_curves(sweep)
+    title = 'Conditioning over the range, of iterated links'
+    return _extremes_table(title, 'conditioning', closure, found, ends)
+
+
+def _extremes_table(
+    title: str,
+    key: str,
+    closure: StepwiseClosure,
+    found: Mapping[int, SweptCurve],
+    ends: Sequence[Column],
+) -> Table:
+    """Return the extreme values by group, and the inputs where they occur; none if constant."""
+    unit = closure.linkage.inputs[0].unit
+
+    def places(inputs: Sequence[float], units: DisplayUnits) -> str:
+        return _inputs_text(inputs, unit == 'rad', units)
+
+    columns = [_GROUP, _LINKS]
+    for end in ends:
+        where = end.key.partition('.')[0]
+        columns += [end, Column(end.heading and 'at', f'{where}.inputs', unit, places)]
+    rows = [
+        (
+            *(number + 1, closure.links_of_group(number)),
+            *(finite_or_none(curve.lowest.value), list(curve.lowest.at)),
+            *(finite_or_none(curve.highest.value), list(curve.highest.at)),
+        )
+        for number, curve in found.items()
+    ]
+    return Table(title, columns, rows, key)
+
+
+def _branches_table(closure: Closure) -> Table:
+    given = closure.linkage.inputs[0]
 
     def input_text(value: float, units: DisplayUnits) -> str:
-        return units.value_text(value, given['unit'] == 'rad')
+        return units.value_text(value, given.unit == 'rad')
 
-    def joint_text(value: tuple[float, str], units: DisplayUnits) -> str:
-        return units.value_text(value[0], value[1] == 'rad')
+    def limits_text(by: Sequence[str | None], _units: DisplayUnits) -> str:
+        return ', '.join(sorted({name for name in by if name}))
 
     columns = (
         Column('joint', 'joint'),
         Column('>branch', 'branch'),
-        Column(f'>{given["joint"]} from', 'input_low', given['unit'], input_text),
-        Column('>to', 'input_high', given['unit'], input_text),
-        Column('>joint from', 'low', form=joint_text),
-        Column('>to', 'high', form=joint_text),
+        Column(f'>{given.joint} from', 'input_low', given.unit, input_text),
+        Column('>to', 'input_high', given.unit, input_text),
+        Column(None, UNIT),
+        Column('>joint from', 'low'),
+        Column('>to', 'high'),
+        Column(None, 'turns_back'),
         Column('', 'rises', form=lambda rises, _: 'rises' if rises else 'falls'),
-        Column('limits of', 'limited_by', form=_join),
+        Column('limits of', 'limited_by', form=limits_text),
     )
-    rows = [
-        {**one} | {end: (one[end], one['unit']) for end in ('low', 'high')}
-        | {'limited_by': sorted({name for name in one['limited_by'] if name})}
-        for one in account['branches']
-    ]  # fmt: skip
     title = 'Branches: between their ends a joint moves one way'
-    return table_of_rows(title, 'branches', columns, rows)
+    return Table(title, columns, [*_list_branches(closure)], 'branches')
 
 
 def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
@@ -491,30 +455,30 @@ def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
             else f'angle of {given["child"]} to {given["parent"]}'
         )
         yield 'input', f'{given["joint"]}: {driven}'
-    for limits in account['limits']:
-        yield 'limits', f'{limits["joint"]}: {limits_text(limits, units)}'
     yield from reach_facts(account, units)
-    yield residual_fact(account, units)
 
 
-def residual_fact(account: Mapping[str, Any], units: DisplayUnits) -> tuple[str, str]:
-    """Return the worst residual, where it was met, and among how many positions."""
-    worst, inputs = account['worst_residual'], account['inputs']
+def reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
+    """Yield the limits, the range, its singular places and the worst residual."""
+    for limits in account['limits']:
+        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
+    yield from _range_facts(account, units)
+    worst = account['worst_residual']
     if worst is None:
-        return 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
+        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
+        return
     place = ', '.join(
         units.value_text(value, given['unit'] == 'rad')
-        for value, given in zip(worst['inputs'], inputs, strict=True)
+        for value, given in zip(worst['inputs'], account['inputs'], strict=True)
     )
     residual = units.format_length(worst['residual_m'], '.1e')
-    return (
+    yield (
         'worst residual',
         f'{residual}, of {worst["positions"]} positions, at {place}',
     )
 
 
-def reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
-    """Yield the ranges of the input, and its singular places."""
+def _range_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     if account['ranges'] is None:
         yield 'range', 'not a single one: it depends on every input'
         if account['unwrapped']:
@@ -556,8 +520,7 @@ def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: 
     return 0.0 if abs(value) < _SAME else value
 
 
-def limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
-    """Return the limits of a joint as text."""
+def _limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
     turning = limits['unit'] == 'rad'
     texts = []
     low, high = (

@@ -16,22 +16,18 @@ from typing import Any
 
 from linkage_ros.cli.arguments import DisplayUnits
 from linkage_ros.cli.check import (
-    curve_extremes,
     examine_reach,
     examine_residual,
-    extremes_tables,
-    joint_unit,
-    limits_text,
-    list_limits,
+    limits_json,
     ORDER,
     reach_facts,
-    residual_fact,
+    transmission_table,
 )
-from linkage_ros.cli.result import Result, show_result
-from linkage_ros.cli.table import facts_table, Table, table_of_rows
+from linkage_ros.cli.result import Result, show_result, tables_json
+from linkage_ros.cli.table import facts_table, Table
 from linkage_ros.description import read_space_closure, Section
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import InputSweep, SpaceClosure, transmission_angles
+from linkage_ros.kinematics import InputSweep, SpaceClosure
 
 
 def check_space(content: Section, name: str, arguments: argparse.Namespace) -> int:
@@ -39,19 +35,24 @@ def check_space(content: Section, name: str, arguments: argparse.Namespace) -> i
     if arguments.branches:
         raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
     closure = read_space_closure(content, name)
-    account = {'file': arguments.file, **space_json(closure)}
     units = arguments.angles.of_file(content.units)
-    show_result(Result(account, [*_tables(account, units)]), arguments, units)
+    described, tables = describe_space(closure)
+    account = {'file': arguments.file, **described}
+    facts = facts_table(arguments.file, _facts(account, units))
+    parts = [facts, *(table for table in tables if table.rows)]
+    show_result(Result(account, parts), arguments, units)
     return 0
 
 
-def space_json(closure: SpaceClosure) -> dict[str, Any]:
-    """Return the description of a spatial linkage, as JSON holds it; in SI units."""
+def describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]:
+    """Return the description of a spatial linkage as JSON holds it, and its tables."""
     linkage, freedom = closure.linkage, closure.freedom
-    units = dict(zip(linkage.joints, map(joint_unit, closure.turning), strict=True))
-    units |= {given.joint: given.unit for given in linkage.inputs}
     sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
-    angles = transmission_angles(sweep) if sweep is not None else {}
+    rows = [(number, *group) for number, group in enumerate(closure.groups, 1)]
+    tables = [
+        Table('Solved in this order', ORDER, rows, 'groups'),
+        transmission_table(closure, sweep),
+    ]
     return {
         'moving_links': len(linkage.link_names) - 1,
         'hinges': len(linkage.hinges),
@@ -63,20 +64,11 @@ def space_json(closure: SpaceClosure) -> dict[str, Any]:
         'spinning_rods': list(closure.idle),
         'unwrapped': False,
         'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
-        'limits': list(list_limits(linkage, units)),
-        'groups': [group._asdict() for group in closure.groups],
+        'limits': limits_json(linkage),
         **examine_reach(closure, sweep),
         **examine_residual(closure, sweep),
-        'transmission_angles': curve_extremes(closure.links_of_group, angles, 'angle_rad'),
-        'conditioning': [],
-    }
-
-
-def _tables(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[Table]:
-    yield facts_table(account['file'], _facts(account, units))
-    groups = [{'number': number, **one} for number, one in enumerate(account['groups'], 1)]
-    yield table_of_rows('Solved in this order', 'groups', ORDER, groups)
-    yield from (table for table in extremes_tables(account) if table.rows)
+        **tables_json(tables),
+    }, tables
 
 
 def _facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
@@ -90,12 +82,7 @@ def _facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[st
         turns = given['unit'] == 'rad'
         unit = 'angle' if turns else f'length [{units.length}]'
         yield 'input', f'{given["joint"]}: {unit}'
-    for limits in account['limits']:
-        yield 'limits', f'{limits["joint"]}: {limits_text(limits, units)}'
-    yield from reach_facts(account, units)
     if account['redundant_equations']:
-        yield (
-            'redundant',
-            f'{account["redundant_equations"]} equations, met within the worst residual',
-        )
-    yield residual_fact(account, units)
+        met = 'equations, met within the worst residual'
+        yield 'redundant', f'{account["redundant_equations"]} {met}'
+    yield from reach_facts(account, units)

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from importlib import import_module
 import os
 from threading import Event
 from typing import Any
 
 from linkage_ros.cli.arguments import LINKAGES
-from linkage_ros.cli.main import COMMANDS, module_of, Parser, parser_of
+from linkage_ros.cli.main import COMMANDS, find_command, Parser, parser_of
 from linkage_ros.errors import check_installed
 from linkage_ros.resources import linkage_names, scene_names
 
@@ -63,7 +62,7 @@ def complete() -> None:
     named = [word for word in os.environ.get('COMP_LINE', '').split()[1:2] if word in COMMANDS]
     for name in named:
         try:
-            typed = parser_of(name, import_module(module_of(name)))
+            typed = parser_of(name, find_command(name))
         except ImportError:  # the command itself says what to install
             return
         commands.choices[name] = typed

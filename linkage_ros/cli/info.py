@@ -28,7 +28,6 @@ from linkage_ros.cli.bag_reading import (
     add_trust,
     bag_json,
     open_bag,
-    replay_account,
     scene_json,
     scene_of,
     worst_account,
@@ -99,7 +98,7 @@ def describe_bag(
     except LinkageError as error:
         account['scene_missing'] = f'{error.where}: {error.reason}'
         return account, scene
-    account['replay'] = replay_account(examined)
+    account['replay'] = {'joint_states': examined.joint_states, 'same_bytes': examined.same}
     account['stopped'] |= examined.stopped
     for linkage, worst in zip(account['scene']['linkages'], examined.linkages, strict=True):
         linkage.update(worst_account(worst))

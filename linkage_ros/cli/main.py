@@ -83,9 +83,9 @@ EXIT_CODES = {
 _INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
 
 
-def module_of(command: str) -> str:
-    """Return the module name of a subcommand: a tool's, or one in this folder."""
-    return TOOLS.get(command, f'linkage_ros.cli.{command}')
+def find_command(name: str) -> ModuleType:
+    """Return the module of a subcommand: a tool's, or one in this folder."""
+    return find_tool(name) if name in TOOLS else import_module(f'linkage_ros.cli.{name}')
 
 
 def _in_plain_words(found: re.Match[str]) -> str:
@@ -151,7 +151,7 @@ def top_parser() -> Parser:
 def main(arguments: list[str] | None = None) -> int:
     """Run ``linkage`` and return one of `EXIT_CODES`."""
     if '_ARGCOMPLETE' in os.environ:  # a shell asks how to complete a line
-        import_module(module_of('completion')).complete()  # ends the process, if it can
+        find_command('completion').complete()  # ends the process, if it can
         return 1
     # First of all: from here on a signal ends a command in order, and a run closes its bag.
     stop = stop_on_signals()
@@ -196,7 +196,7 @@ def _run_command(arguments: Sequence[str], stop: Event) -> int:
     name = top_parser().parse_args(arguments[:1]).command
     try:
         with missing_packages_reported():
-            module = find_tool(name) if name in TOOLS else import_module(module_of(name))
+            module = find_command(name)
             parser = parser_of(name, module)
             typed = parser.parse_args(arguments[1:])
             # A local import: signals are to be handled before anything large is imported.

@@ -20,7 +20,7 @@ from typing import Any
 from linkage_ros.bag import recover_bag, recovered_name, Recovery
 from linkage_ros.cli.arguments import add_bag, add_force, output_or
 from linkage_ros.cli.result import add_result, Result, show_result
-from linkage_ros.cli.table import Column, Table, table_of_rows
+from linkage_ros.cli.table import attributes_json, Column, Table, table_of_rows
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import remove_bag
 from linkage_ros.errors import escape_unprintable
@@ -75,10 +75,7 @@ def _show_recovery(recovery: Recovery, arguments: argparse.Namespace) -> None:
     account = {
         'bag': str(recovery.folder),
         'whole': recovery.is_whole,
-        'topics': [
-            {'name': topic.name, 'saved': topic.saved, 'expected': topic.expected}
-            for topic in recovery.topics
-        ],
+        'topics': [attributes_json(topic, _TOPIC) for topic in recovery.topics],
         'attachments': list(recovery.attachments),
         'notes': list(recovery.remarks),
         'repaired': list(recovery.repaired),

@@ -51,7 +51,7 @@ from linkage_ros.cli.bag_reading import (
 )
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource
 from linkage_ros.cli.result import add_result, Result, show_result
-from linkage_ros.cli.table import Column, Table, table_of_rows
+from linkage_ros.cli.table import attributes_json, Column, Table, table_of_rows
 from linkage_ros.description import load_scene, remove_bag, Scene
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, UNITS
@@ -71,7 +71,6 @@ from linkage_ros.replay import (
     ReplayedTick,
     ReplayVerification,
     TickPlace,
-    TopicComparison,
     turning_joints,
     ulp_distance,
     user_effects_here,
@@ -121,24 +120,11 @@ def _proof_account(
         'withheld_ticks': comparison.suppressed,
         'untold_ticks': proof.undecided,
         'beginning_missing': beginning_text(proof) if proof.missing_start else None,
-        'topics': [topic_account(topic) for topic in comparison.topics],
+        'topics': [attributes_json(topic, _TOPIC) for topic in comparison.topics],
         'first_difference': first_account(comparison.first or proof.first_undecided, turning),
         'last_different_tick': tick_json(comparison.last) if comparison.last else None,
         'greatest': greatest_differences(comparison, turning),
         'versions': {name: dict(of) for name, of in versions.items()},
-    }
-
-
-def topic_account(topic: TopicComparison) -> dict[str, Any]:
-    """Return the comparison of one topic."""
-    return {
-        'name': topic.name,
-        'recorded': topic.recorded,
-        'same': topic.same,
-        'same_but_for_turns': topic.but_turns,
-        'different': topic.different,
-        'not_made_now': topic.not_reproduced,
-        'not_recorded': topic.not_recorded,
     }
 
 
@@ -368,7 +354,7 @@ def _replayed_with(
     return bag_account(bag, scene, reading, begin) | {
         'crank_topic': topic,
         'joint_states': published,
-        'topics': [topic_account(each) for each in comparison.topics],
+        'topics': [attributes_json(each, _TOPIC) for each in comparison.topics],
         'joints': joints_account(comparison, turning),
         'joints_only_recorded': [
             name for name in recorded_joints if name not in scene.joint_names

@@ -11,14 +11,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
 from pathlib import Path
 import sys
 from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import add_output, DEGREES, DisplayUnits, RESULTS
-from linkage_ros.cli.table import Table
+from linkage_ros.cli.table import Quantity, Table
 from linkage_ros.cli.terminal import print_tables, table_text
 from linkage_ros.description import (
     atomic_write,
@@ -69,13 +69,19 @@ def show_result(
 
 def tables_json(tables: Iterable[Table]) -> dict[str, Any]:
     """Return the rows of tables as JSON holds them, by the keys of tables and columns."""
-    return {
-        table.key: [
-            {column.key: value for column, value in zip(table.typed_columns, row, strict=True)}
-            for row in table.rows
-        ]
-        for table in tables
-    }
+    return {table.key: [*_rows_json(table)] for table in tables}
+
+
+def _rows_json(table: Table) -> Iterator[dict[str, Any]]:
+    for row in table.rows:
+        account: dict[str, Any] = {}
+        for column, value in zip(table.typed_columns, row, strict=True):
+            *objects, name = column.key.split('.')
+            place = account
+            for each in objects:
+                place = place.setdefault(each, {})
+            place[name] = value.value if isinstance(value, Quantity) else value
+        yield account
 
 
 def as_json(result: Result) -> str:
@@ -109,17 +115,22 @@ def _file_tables(result: Result, units: DisplayUnits) -> list[FileTable]:
     """Return the tables for a file; tables of facts come last."""
     tables = [part for part in result.parts if isinstance(part, Table)]
     tables.sort(key=lambda table: not table.key)
-    return [
-        FileTable(
-            table.key or 'facts',
-            [column.file_head(units) for column in table.typed_columns],
-            [
-                [
-                    column.cell(value, units)
-                    for column, value in zip(table.typed_columns, row, strict=True)
-                ]
-                for row in table.rows
-            ],
-        )
-        for table in tables
-    ]
+    return [_file_table(table, units) for table in tables]
+
+
+def _file_table(table: Table, units: DisplayUnits) -> FileTable:
+    """Return a table for a file; several numbers in a cell take a column each."""
+    heads: list[str] = []
+    columns: list[list[Any]] = []
+    for index, column in enumerate(table.typed_columns):
+        values = [row[index] for row in table.rows]
+        head = column.file_head(units)
+        if column.unit and any(isinstance(value, list) for value in values):
+            for place in range(max(map(len, values))):
+                heads.append(f'{head} {place + 1}' if place else head)
+                columns.append([column.cell(value[place], units) if len(value) > place else None
+                                for value in values])  # fmt: skip
+        else:
+            heads.append(head)
+            columns.append([column.cell(value, units) for value in values])
+    return FileTable(table.key or 'facts', heads, [*zip(*columns, strict=True)])

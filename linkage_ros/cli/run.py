@@ -222,7 +222,7 @@ def summary_table(node: LinkageNode, longest: float) -> Table:
         rows += [
             (
                 'memory',
-                f'{t.name}: {t.received} received, {t.kept} in memory, {t.discarded} discarded'
+                f'{t.name}: {t.received} received, {t.recorded} in memory, {t.discarded} discarded'
                 + (f', {t.dropped} dropped' if t.dropped else ''),
             )
             for t in memory.topics

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
-from importlib import import_module
+from dataclasses import replace
 from importlib.util import find_spec
 from os.path import isfile
 from pathlib import Path
 import sys
 from threading import Event
-from typing import Any, NamedTuple
+from typing import Any
 
 from linkage_ros.cli.arguments import add_set, check_no_settings, finite_or_none, SCENE_HELP
 from linkage_ros.cli.result import add_result, Result, show_result, tables_json
@@ -42,11 +42,12 @@ from linkage_ros.description import (
     scene_notes,
     scene_schema,
     Section,
+    Units,
 )
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.resources import linkage_of_scene, named_file
-from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.drives import drive_class, DRIVES
 from linkage_ros.stages.effects import effect_class, EFFECTS, effects_requiring
 from linkage_ros.stages.faults import FAULTS
 from linkage_ros.tick import LinkagePipeline, Pipeline
@@ -69,7 +70,14 @@ _STAGE = (
     Column('in this scene', 'parameters'),
     Column('', 'needed_by'),
 )
-_FAULT = ('name', 'kind', Column('in this scene', 'parameters'), 'injected')
+_FAULT = (
+    'name',
+    'kind',
+    Column('in this scene', 'parameters'),
+    'injected',
+    Column(None, 'at', 's'),
+    Column(None, 'seconds', 's'),
+)
 _TOPIC = (
     Column('', 'what'),
     Column('topic', 'name'),
@@ -124,42 +132,33 @@ def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]
     return list(groups.values())
 
 
-class Stage(NamedTuple):
-    """A stage of a tick: its place, its parameters, and the effects of the file that need it."""
-
-    name: str
-    where: str
-    parameters: Any
-    needed_by: tuple[str, ...]
-
-
-def _list_stages(linkage: LinkagePipeline) -> Iterator[Stage]:
-    """Yield the drive of a linkage and its effects, in the order of a tick."""
+def _list_stages(linkage: LinkagePipeline) -> Iterator[tuple[str, str, Any, tuple[str, ...]]]:
+    """Yield the stages of a tick in order: name, place, parameters, the effects that need it."""
     name, parameters = linkage.scene_linkage.drive
-    yield Stage(name, 'drive', parameters, ())
+    yield name, 'drive', parameters, ()
     given = linkage.scene_linkage.effects
     for name, effect in linkage.wanted.effects.items():
-        needed_by = () if name in given else effects_requiring(name, given)
-        yield Stage(name, effect.place, effect, needed_by)
+        yield name, effect.place, effect, () if name in given else effects_requiring(name, given)
 
 
 def _stage_rows(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
-    for index, stage in enumerate(_list_stages(line)):
+    units, linkage = line.scene_linkage.content.units, line.scene_linkage.linkage
+    slides = {name: joint.unit == 'm' for name, joint in linkage.joints.items()}
+    slides |= {given.joint: given.unit == 'm' for given in linkage.inputs}
+    for index, (name, where, parameters, needed_by) in enumerate(_list_stages(line)):
         yield (
-            str(index),
-            stage.name,
-            stage.where,
-            first_docstring_line(type(stage.parameters)),
-            _parameters_text(stage.parameters),
-            f'needed by {", ".join(stage.needed_by)}' if stage.needed_by else '',
+            *(str(index), name, where, first_docstring_line(type(parameters))),
+            _parameters_text(parameters, units, slides),
+            f'needed by {", ".join(needed_by)}' if needed_by else '',
         )
 
 
-def _fault_rows(scene: Scene) -> Iterator[tuple[str, ...]]:
+def _fault_rows(scene: Scene) -> Iterator[tuple[Any, ...]]:
     for name, fault in scene.faults.items():
         times = ', '.join(f'{time:g}' for time in fault.at)
         when = f'at {times} s, for {fault.seconds:g} s' if fault.at else 'on demand only'
-        yield name, fault.kind, _parameters_text(fault.parameters), when
+        parameters = _parameters_text(fault.parameters, Units(), {})
+        yield name, fault.kind, parameters, when, list(fault.at), fault.seconds
 
 
 def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
@@ -176,27 +175,35 @@ def _topic_rows(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
         yield 'serves', _shorten_list(services), 'std_srvs/srv/SetBool', ''
 
 
-def _parameters_text(parameters: Any) -> str:
-    """Return the parameters that differ from their defaults."""
-    texts = [
-        f'{entry.name} {_value_text(getattr(parameters, entry.name))}'
-        + (f' {kind.unit}' if kind.unit else '')
-        for entry, kind in declared_fields(type(parameters))
-        if is_required(entry)
-        or _value_text(getattr(parameters, entry.name)) != _value_text(default_of(entry))
-    ]
+def _parameters_text(parameters: Any, units: Units, slides: Mapping[str, bool]) -> str:
+    """
+    Return the parameters that differ from their defaults, in the units of a file.
+
+    ``slides`` says of each joint whether it slides.
+    """
+
+    def value_text(value: Any, unit: str, units: Units) -> str:
+        if isinstance(value, tuple | list):
+            return f'[{", ".join(value_text(one, unit, units) for one in value)}]'
+        if isinstance(value, dict):
+            texts = (
+                f'{key}: {value_text(one, unit, replace(units, slides=slides.get(key)))}'
+                for key, one in value.items()
+            )
+            return f'{{{", ".join(texts)}}}'
+        if hasattr(value, '__dataclass_fields__'):
+            return f'{{{_parameters_text(value, units, slides)}}}'
+        return f'{units.to_file_unit(value, unit):g}' if isinstance(value, float) else str(value)
+
+    texts = []
+    for entry, kind in declared_fields(type(parameters)):
+        unit = kind.unit or getattr(getattr(kind, 'of', kind), 'unit', '')  # of each, if of many
+        text = value_text(getattr(parameters, entry.name), unit, units)
+        if is_required(entry) or text != value_text(default_of(entry), unit, units):
+            suffix = f' {units.file_unit(kind.unit)}' if kind.unit else ''
+            texts.append(f'{entry.name} {text}{suffix}')
     text = ', '.join(texts)
     return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'
-
-
-def _value_text(value: Any) -> str:
-    if isinstance(value, tuple | list):
-        return f'[{", ".join(map(_value_text, value))}]'
-    if isinstance(value, dict):
-        return f'{{{", ".join(f"{key}: {_value_text(one)}" for key, one in value.items())}}}'
-    if hasattr(value, '__dataclass_fields__'):
-        return f'{{{_parameters_text(value)}}}'
-    return f'{value:g}' if isinstance(value, float) else str(value)
 
 
 def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
@@ -207,12 +214,8 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
     account = scene_json(scene)
     for linkage, line in zip(account['linkages'], pipeline.linkages, strict=True):
         linkage['stages'] = [
-            {
-                **_named_parameters(stage.name, stage.parameters),
-                'where': stage.where,
-                'needed_by': list(stage.needed_by),
-            }
-            for stage in _list_stages(line)
+            {'name': name, 'parameters': _as_json(own), 'where': where, 'needed_by': [*needed_by]}
+            for name, where, own, needed_by in _list_stages(line)
         ]
     record = scene.record
     return account | {
@@ -221,7 +224,8 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         'record': record and {'directory': record.directory, 'name': record.name or None},
         'fault_parameters': [
             {
-                **_named_parameters(name, fault.parameters),
+                'name': name,
+                'parameters': _as_json(fault.parameters),
                 'kind': fault.kind,
                 'at_s': list(fault.at),
                 'seconds': fault.seconds,
@@ -235,10 +239,6 @@ def built_scene_json(scene: Scene, pipeline: Pipeline) -> dict[str, Any]:
         ],
         'services': [f'~/inject/{name}' for name in scene.faults],
     }
-
-
-def _named_parameters(name: str, parameters: Any) -> dict[str, Any]:
-    return {'name': name, 'parameters': _as_json(parameters)}
 
 
 def _as_json(value: Any) -> Any:
@@ -270,9 +270,7 @@ def parameters_of(what: str, name: str) -> Any:
     """Return the parameter type of a drive, effect or fault."""
     if what == 'fault':
         return FAULTS[name]
-    if what == 'effect':
-        return effect_class(name)
-    return import_module(REGISTRIES[what][name]).PARAMETERS
+    return effect_class(name) if what == 'effect' else drive_class(name)
 
 
 def table_of(what: str, name: str) -> Table:

@@ -16,6 +16,7 @@ A column names its key in JSON and in files, its heading, its unit in SI and its
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
 from typing import Any, NamedTuple
 
 from linkage_ros.cli.arguments import DEGREES, DisplayUnits, fixed_text
@@ -23,27 +24,51 @@ from linkage_ros.cli.arguments import DEGREES, DisplayUnits, fixed_text
 Form = str | Callable[[Any, DisplayUnits], str]
 """Format of a number; or a function that returns a value, in SI, as text with its unit."""
 
+UNIT = 'unit'
+"""Key of the column that names the unit of a row."""
+
+_UNIT_SUFFIX = re.compile('_(?:m|rad)$')
+
+
+class Quantity(NamedTuple):
+    """A number in SI with a unit of its own, or with the text that a person reads."""
+
+    value: float | None
+    unit: str = ''
+    shown: str = ''
+
+    def text(self, units: DisplayUnits) -> str:
+        """Return the quantity for a person."""
+        return self.shown or units.value_text(self.value or 0.0, self.unit == 'rad')
+
 
 class Column(NamedTuple):
     """A column of a table."""
 
-    heading: str  # On a terminal and on pages; a leading ``>`` aligns to the right
-    key: str = ''  # In JSON and in files; the heading if it is ''
+    # On a terminal and on pages; a leading ``>`` aligns to the right; None: only in files
+    heading: str | None
+    key: str = ''  # In JSON and in files, where a dot leads into an object; '' for not in JSON
     unit: str = ''  # In SI
     form: Form = ''
 
     def head(self, units: DisplayUnits) -> str:
         """Return the heading, with the unit if the cells are without."""
-        unit = self.unit and not callable(self.form) and f' [{units.name_unit(self.unit)}]'
-        return f'{self.heading}{unit or ""}'
+        heading = self.heading or ''
+        if not self.unit or (callable(self.form) and not heading.endswith(' []')):
+            return heading
+        return f'{heading.removesuffix(" []")} [{units.name_unit(self.unit)}]'
 
     def file_head(self, units: DisplayUnits) -> str:
         """Return the heading in a file."""
-        name = self.key or self.heading.removeprefix('>')
-        return f'{name} [{units.file.file_unit(self.unit)}]' if self.unit else name
+        name = self.key or (self.heading or '').removeprefix('>')
+        if not self.unit:
+            return name
+        return f'{_UNIT_SUFFIX.sub("", name)} [{units.file.file_unit(self.unit)}]'
 
     def text(self, value: Any, units: DisplayUnits) -> str:
         """Return a cell for a person."""
+        if isinstance(value, Quantity):
+            return value.text(units)
         if callable(self.form):
             return self.form(value, units)
         if value is None:
@@ -57,8 +82,12 @@ class Column(NamedTuple):
 
     def cell(self, value: Any, units: DisplayUnits) -> Any:
         """Return a cell for a file: a number in the units of the file, a text, or None."""
+        if isinstance(value, Quantity):
+            return self._replace(unit=value.unit or self.unit).cell(value.value, units)
         if isinstance(value, bool):
             return str(value).lower()
+        if self.key == UNIT:
+            return units.file.file_unit(value)
         if value is None or isinstance(value, str | int):
             return value
         if isinstance(value, float):
@@ -78,7 +107,7 @@ class Table(NamedTuple):
     @property
     def heads(self) -> list[str]:
         """Return the headings, without units."""
-        return [one if isinstance(one, str) else one.heading for one in self.columns]
+        return [one.heading for one in self.typed_columns if one.heading is not None]
 
     @property
     def typed_columns(self) -> list[Column]:
@@ -87,17 +116,19 @@ class Table(NamedTuple):
 
     def as_texts(self, units: DisplayUnits = DEGREES) -> Table:
         """Return the table as text."""
-        columns = self.typed_columns
+        shown = [each for each in enumerate(self.typed_columns) if each[1].heading is not None]
         return Table(
             self.title,
-            [column.head(units) for column in columns],
-            [
-                [column.text(value, units) for column, value in zip(columns, row, strict=True)]
-                for row in self.rows
-            ],
+            [column.head(units) for _, column in shown],
+            [[column.text(row[place], units) for place, column in shown] for row in self.rows],
             self.key,
             self.folded,
         )
+
+
+def attributes_json(of: object, columns: Iterable[Column]) -> dict[str, Any]:
+    """Return the attributes of an object that columns name, as JSON holds them."""
+    return {column.key: getattr(of, column.key) for column in columns}
 
 
 def table_of_rows(

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from importlib import import_module
 import json
 from pathlib import Path
 from re import fullmatch
@@ -59,7 +58,7 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES
 from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
-from linkage_ros.stages.drives import DRIVES
+from linkage_ros.stages.drives import drive_class, DRIVES
 from linkage_ros.stages.effects import effect_class, EFFECTS, in_order
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
@@ -96,7 +95,7 @@ class _DriveChoice(Kind):
         drives = content.section(key, required=False)
         name = drive_name(drives)
         driven = drives.section(name, required=False)
-        return name, read_parameters(driven, parameter_type(DRIVES[name]), parts, folder)
+        return name, read_parameters(driven, drive_class(name), parts, folder)
 
     def json_schema(self) -> Schema:
         drives = {name: parameters_schema(of) for name, of in parameter_types(DRIVES).items()}
@@ -473,16 +472,10 @@ def drive_name(drives: Section) -> str:
     return named[0]
 
 
-def parameter_type(module: str) -> Any:
-    """Return the parameter type of a drive or an effect in a module."""
-    return import_module(module).PARAMETERS
-
-
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
     """Return the parameter types of all drives or effects in a registry."""
-    if registry is EFFECTS:
-        return {name: effect_class(name) for name in registry}
-    return {name: parameter_type(module) for name, module in registry.items()}
+    class_of = effect_class if registry is EFFECTS else drive_class
+    return {name: class_of(name) for name in registry}
 
 
 def _refused_pairs() -> Schema:

@@ -27,13 +27,11 @@ the same bits on every machine.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
-from itertools import chain
-from math import isfinite, sin
+from functools import cached_property
 from typing import Any
 
+from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split
 from linkage_ros.kinematics import Elimination, make_vector, where
-from linkage_ros.kinematics.compiling import compile_line
 
 _ROUNDS = 12
 _STEPS = 4
@@ -44,57 +42,36 @@ _STAYS = 4e-15
 Unknown = tuple[int, bool, float]
 """Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
 
-Rows = Callable[[Sequence[Any]], list[list[Any]]]
-"""Returns the rows of the linear system by its numbers that vary."""
-
 
 class FrictionSolver:
     """
     Finds the friction in joints by their forces.
 
-    ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ. The linear system has ``size``
-    rows, and ``varying`` numbers that vary, from which ``rows_of`` makes the rows.
+    ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ.
     """
 
-    def __init__(
-        self, unknowns: Sequence[Unknown], rows_of: Rows, size: int, varying: int
-    ) -> None:
+    def __init__(self, unknowns: Sequence[Unknown], matrix: JointMatrix) -> None:
         self._unknowns = unknowns
-        self._rows_of = rows_of
-        self._size = size
-        self._varying = varying
+        self._matrix = matrix
         self._count = len(unknowns)
-        self._solve_sides = cache(self._compile_system)
         # Of each joint x and y of F₀, F₁ and each P_k; |ψ'| of each; the pull and the mobility.
         count = self._count
-        self._begin = _compile(self._begin_forces, 2 * count * (count + 2) + count + 2)
-        self._improve = _compile(self._improve_frictions, count * (3 + 2 * count))
+        self._begin = compile_function(self._begin_forces, 2 * count * (count + 2) + count + 2)
+        self._improve = compile_function(self._improve_frictions, count * (3 + 2 * count))
 
-    def _compile_system(self, number: int, forces_only: bool) -> Callable[..., Any]:
-        """Compile the solutions for a number of right sides, or the forces in the joints alone."""
-
-        def solve(*numbers: Any) -> list[Any]:
-            varying = self._varying
-            elimination = Elimination(self._rows_of(numbers[:varying]), ())
-            if any(divisor == 0.0 for divisor in elimination.divisors):
-                return []
-            found = [elimination.solve(side) for side in _pieces(numbers[varying:], self._size)]
-            return self._joint_forces(found) if forces_only else [*chain(*found)]
-
-        return _compile(solve, self._varying + number * self._size)
-
-    def _solve(self, numbers: Sequence[float], forces_only: bool) -> Sequence[float] | None:
-        number = (len(numbers) - self._varying) // self._size
-        found = self._solve_sides(number, forces_only)(*numbers)
-        return found[0] if found and all(map(isfinite, found[0])) else None
-
-    def forces_in(self, *numbers: float) -> Sequence[float] | None:
+    @cached_property
+    def forces_in(self) -> Callable[..., Sequence[float] | None]:
         """
-        Return the force in each joint, x and y, for right sides one after the other.
+        Return a function that returns the force in each joint, x and y, for each right side.
 
-        ``numbers`` are those of the system that vary, and then the right sides.
+        These follow the numbers of the matrix that vary: without this friction, by the input's
+        acceleration, and by a unit of each friction.
         """
-        return self._solve(numbers, forces_only=True)
+        return self._matrix.compile_solver(2 + self._count, select=self._joint_forces)
+
+    @cached_property
+    def _solve_sides(self) -> Callable[..., Sequence[float] | None]:
+        return self._matrix.compile_solver(1 + self._count)
 
     def _joint_forces(self, solutions: Sequence[Sequence[Any]]) -> list[Any]:
         forces: list[Any] = []
@@ -109,10 +86,10 @@ class FrictionSolver:
 
         The right sides in ``numbers`` are first without this friction, then of a unit of each.
         """
-        flat = self._solve(numbers, forces_only=False)
+        flat = self._solve_sides(*numbers)
         if flat is None:
             return None
-        free, *units = _pieces(flat, self._size)
+        free, *units = split(flat, self._matrix.size)
         nothing = [0.0] * len(free)
         forces = self._joint_forces([free, nothing, *units])
         found = self.solve_frictions(forces, [0.0] * self._count, 0.0)
@@ -174,7 +151,7 @@ class FrictionSolver:
         *levers, pull, mobility = numbers[begin:]
         sizes: list[Any] = []
         forces: list[Any] = []
-        pieces = _pieces(numbers[:begin], 2 * (count + 2))
+        pieces = split(numbers[:begin], 2 * (count + 2))
         for (_, _, factor), piece in zip(self._unknowns, pieces, strict=True):
             x, y, by_x, by_y, *units = piece
             size = abs(make_vector(x, y)) + abs(make_vector(pull * by_x, pull * by_y))
@@ -205,7 +182,7 @@ class FrictionSolver:
         """Return what is missing of each friction, and how it falls with each of them."""
         count = self._count
         missing, slopes = [], []
-        for i, piece in enumerate(_pieces(forces, 2 * (count + 1))):
+        for i, piece in enumerate(split(forces, 2 * (count + 1))):
             _, _, factor = self._unknowns[i]
             x, y, *units = piece
             for k, friction in enumerate(found):
@@ -216,14 +193,3 @@ class FrictionSolver:
             falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
             slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
         return missing, slopes
-
-
-def _pieces(numbers: Sequence[Any], size: int) -> list[list[Any]]:
-    """Return numbers in pieces of one size."""
-    return [list(piece) for piece in zip(*[iter(numbers)] * size, strict=True)]
-
-
-def _compile(function: Callable[..., Sequence[Any]], count: int) -> Callable[..., Any]:
-    """Return a function of some numbers as straight-line code."""
-    # Numbers without a pattern, so that no decision is made by chance.
-    return compile_line(function, [0.1 * sin(1.0 + 1.7 * i * i) for i in range(count)])

@@ -29,11 +29,11 @@ stretch of a link moves the linkage, to first order.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property, partial
-from math import isfinite
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.dynamics.joint_matrix import JointMatrix
 from linkage_ros.dynamics.mechanics import (
     FrictionJoint,
     joint_friction,
@@ -45,7 +45,6 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics import (
     Acceleration,
     call,
-    Closure,
     GROUND,
     has_result,
     Joint,
@@ -53,175 +52,15 @@ from linkage_ros.kinematics import (
     Position,
     RevoluteJoint,
     Status,
-    unit_vector,
     Velocity,
 )
 from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledMotion
-import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import JointCoordinate, LoadedPoint
     from linkage_ros.dynamics.load_dependent_friction import FrictionSolver
 
-Array = NDArray[np.float64]
-
 _SOLVED = (Status.CLOSED, Status.LIMITED)
-
-
-class PinSide(NamedTuple):
-    """A link of a joint: its first row, the index of its centre among the places, its sign."""
-
-    row: int
-    center: int
-    sign: float
-
-
-class ForceLine(NamedTuple):
-    """
-    The line of a slider.
-
-    ``unit``, turned by a coordinate of the closure, is its direction in the frame of the ground.
-    """
-
-    coordinate: int
-    unit: complex
-
-    def direction(self, coordinates: Sequence[float]) -> complex:
-        """Return the direction in the frame of the ground, a unit vector."""
-        return unit_vector(coordinates[self.coordinate]) * self.unit
-
-
-class JointMatrix:
-    """
-    The square matrix of what a unit of each joint's force and drive's effort does to each link.
-
-    Three rows for each link that moves: both components of force and the moment about its centre.
-    Two columns for each joint: the components of force of a pin, or the force of a slider across
-    its line and its moment. One column for each drive. A force f at p is (f, (p − c) × f) on one
-    link and the opposite on the other. Moments are divided by the closure's scale, so that all
-    entries are of one size.
-
-    The transposed matrix gives what small displacements of the links open in each joint, since a
-    joint's force does no work: a row is the displacement between the points of the two links.
-
-    ``centers`` has, for each link that moves, the index of the reference point of its moments
-    among the places given to `matrix_at`; ``places`` has the index of the place of each joint of
-    the structure; of a slider, of its point.
-    """
-
-    def __init__(
-        self, closure: Closure, centers: Mapping[str, int], places: Sequence[int]
-    ) -> None:
-        linkage, joints = closure.linkage, closure.structure.joints
-        # For each link that moves its first row.
-        self.rows = {link: 3 * i for i, link in enumerate(centers)}
-        self.size = 3 * len(centers)
-        self._scale = closure.scale
-        self._centers = centers
-        # For each joint its links that move, ``joint.link`` with the sign +1 first.
-        self.sides = tuple(self._joint_sides(joint.link, joint.to) for joint in joints)
-        self.lines: dict[int, ForceLine] = {}  # For each slider, by the number of its joint
-        self._matrix = np.zeros((self.size, self.size))
-        where: list[int] = []
-        self._pins = self._plan_pins(joints, places, where)
-        for number, joint in enumerate(joints):
-            if joint.kind == 'P':
-                along = closure.angles[joint.to]
-                direction = complex(*linkage.sliders[joint.name].direction)
-                unit = along.unit * direction / abs(direction)
-                self.lines[number] = ForceLine(along.coordinate, unit)
-        sliders = {joint.name: n for n, joint in enumerate(joints) if joint.kind == 'P'}
-        self._thrusts = [
-            self._plan_thrust(number, 1j, 2 * number, places[number], where)
-            for number in sliders.values()
-        ]
-        for column, given in enumerate(linkage.inputs, 2 * len(joints)):
-            if given.slider:
-                number = sliders[given.slider]
-                self._thrusts.append(
-                    self._plan_thrust(number, 1 + 0j, column, places[number], where)
-                )
-            else:
-                self._fill_moment(self._joint_sides(given.child, given.parent), column)
-        self._where, self.varying_count = where, len(where)
-        self._fill = partial(_fill_matrix, self._matrix, np.array(where, dtype=np.intp))
-
-    def matrix_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
-        """Return the matrix at coordinates and places, in the ground frame in [m]."""
-        matrix: Array = call(self._fill, *self.varying_at(coordinates, places))
-        return matrix
-
-    def rows_of(self, varying: Sequence[float]) -> list[list[float]]:
-        """Return the rows of the matrix by its numbers that vary."""
-        rows: list[list[float]] = self._matrix.tolist()
-        for place, value in zip(self._where, varying, strict=True):
-            row, column = divmod(place, self.size)
-            rows[row][column] = value
-        return rows
-
-    def varying_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> list[float]:
-        """Return the numbers of the matrix that vary, at coordinates and places as above."""
-        values: list[float] = []
-        for place, center, factor in self._pins:
-            lever = places[place] - places[center]
-            values += (-factor * lever.imag, factor * lever.real)
-        for line, turn, place, sides in self._thrusts:
-            force = turn * line.direction(coordinates)
-            for _, center, sign in sides:
-                lever = (places[place] - places[center]) / self._scale
-                moment = lever.real * force.imag - lever.imag * force.real
-                values += (sign * force.real, sign * force.imag, sign * moment)
-        return values
-
-    def _plan_pins(
-        self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
-    ) -> list[tuple[int, int, float]]:
-        """Fill in the constant entries of the pins; return places, centres and factors."""
-        pins = []
-        for index, (joint, sides) in enumerate(zip(joints, self.sides, strict=True)):
-            column = 2 * index
-            if joint.kind == 'P':
-                self._fill_moment(sides, column + 1)
-                continue
-            for row, center, sign in sides:
-                self._matrix[row, column] = self._matrix[row + 1, column + 1] = sign
-                where += (
-                    self._entry_index(row + 2, column),
-                    self._entry_index(row + 2, column + 1),
-                )
-                pins.append((places[index], center, sign / self._scale))
-        return pins
-
-    def _plan_thrust(
-        self, number: int, turn: complex, column: int, place: int, where: list[int]
-    ) -> tuple[ForceLine, complex, int, tuple[PinSide, ...]]:
-        """Plan a force on a slider: along its line, turned by a constant factor."""
-        sides = self.sides[number]
-        for row, _, _ in sides:
-            where += (self._entry_index(row + i, column) for i in range(3))
-        return self.lines[number], turn, place, sides
-
-    def _fill_moment(self, sides: tuple[PinSide, ...], column: int) -> None:
-        for row, _, sign in sides:
-            self._matrix[row + 2, column] = sign
-
-    def _joint_sides(self, link: str, to: str) -> tuple[PinSide, ...]:
-        return tuple(
-            PinSide(self.rows[name], self._centers[name], sign)
-            for name, sign in ((link, 1.0), (to, -1.0))
-            if name != GROUND
-        )
-
-    def _entry_index(self, row: int, column: int) -> int:
-        return row * self.size + column
-
-
-def _fill_matrix(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
-    """Return the matrix with values at the given entries, counted along its rows."""
-    matrix = constant.copy()  # ticks and diagnostics ask for forces from different threads
-    matrix.reshape(-1)[where] = values
-    return matrix
 
 
 class Reaction(NamedTuple):
@@ -266,13 +105,9 @@ class Reactions:
         self.names = _joint_names(self.joints)
 
         moving = [link for link in structure.links if link != GROUND]
-        points, weights = [], []
-        for link in moving:
-            # The block of a pin in a slot has no mass, and one point.
-            mass = linkage.masses.get(link)
-            center = mass.center if mass else next(iter(structure.links[link].values()))
-            weights.append((mass.mass, mass.inertia) if mass else (0.0, 0.0))
-            points.append((link, complex(*center)))
+        # The block of a pin in a slot has no mass.
+        heavy = {link: linkage.masses[link] for link in moving if link in linkage.masses}
+        points = [(link, complex(*body.center)) for link, body in heavy.items()]
         for joint in self.joints:
             name = linkage.sliders[joint.name].point if joint.kind == 'P' else joint.name
             points.append((joint.link, complex(*structure.links[joint.link][name])))
@@ -284,14 +119,19 @@ class Reactions:
 
         self._follower = closure.point_tracker(points)
         at = iter(self._follower.indices)
-        centers = {link: next(at) for link in moving}
+        centers = [next(at) for _ in heavy]
         self._places = tuple(next(at) for _ in self.joints)
-        self._bodies = tuple(
-            (mass, inertia, centers[link], closure.angles[link].coordinate)
-            for link, (mass, inertia) in zip(moving, weights, strict=True)
-        )
-        self._matrix = JointMatrix(closure, centers, self._places)
+        # For each link its first joint: about a far centre of mass, moments lose digits.
+        pivots: dict[str, int] = {}
+        for joint, place in zip(self.joints, self._places, strict=True):
+            pivots = {joint.link: place, joint.to: place} | pivots
+        self._pivots = tuple(pivots[link] for link in moving)
+        self._matrix = JointMatrix(closure, {link: pivots[link] for link in moving}, self._places)
         rows = self._matrix.rows
+        self._bodies = tuple(
+            (body.mass, body.inertia, rows[link], center, closure.angles[link].coordinate)
+            for center, (link, body) in zip(centers, heavy.items(), strict=True)
+        )
         self._springs = tuple(
             (spring, (next(at), next(at)), tuple(rows.get(link, -1) for link, _ in spring.ends))
             for spring in mechanics.loads.springs
@@ -397,8 +237,15 @@ class Reactions:
         )
 
         unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
-        matrix = self._matrix
-        return FrictionSolver(unknowns, matrix.rows_of, matrix.size, matrix.varying_count)
+        return FrictionSolver(unknowns, self._matrix)
+
+    @cached_property
+    def _solve_forces(self) -> Callable[..., Sequence[float] | None]:
+        return self._matrix.compile_solver()
+
+    @cached_property
+    def _solve_displacements(self) -> Callable[..., Sequence[float] | None]:
+        return self._matrix.compile_solver(transposed=True)
 
     @cached_property
     def _compiled_motion(self) -> Compiled:
@@ -454,7 +301,7 @@ class Reactions:
         if position.status not in _SOLVED:
             return None
         places, x = self._follower.places(position), position.state.coordinates
-        matrix, lines = self._matrix.matrix_at(x, places), self._matrix.lines
+        lines = self._matrix.lines
         gaps = [0.0] * self._matrix.size
         for index, offset in enumerate(offsets):
             if index in lines:
@@ -462,7 +309,7 @@ class Reactions:
                 gaps[2 * index] = offset.real * across.real + offset.imag * across.imag
             else:
                 gaps[2 * index], gaps[2 * index + 1] = offset.real, offset.imag
-        moved = call(_solve_transposed, matrix, *gaps)
+        moved = call(self._solve_displacements, *self._matrix.varying_at(x, places), *gaps)
         if not has_result(moved):
             return None
         shifts: tuple[float, ...] = ()
@@ -480,8 +327,8 @@ class Reactions:
         """Return how far displacements of the links move a point along its slider."""
         along = self._matrix.lines[number].direction(x)
         place, slid = places[self._places[number]], 0.0
-        for row, center, sign in self._matrix.sides[number]:
-            lever = (place - places[center]) / self._scale
+        for row, pivot, sign in self._matrix.sides[number]:
+            lever = (place - places[pivot]) / self._scale
             way = make_vector(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
             slid += sign * (way.real * along.real + way.imag * along.imag)
         return slid
@@ -498,12 +345,8 @@ class Reactions:
             return None
         x, places = position.state.coordinates, self._follower.places(position)
         sides, resistances = self._right_sides(position, velocity, acceleration, places, given)
-        if self._load_dependent:
-            forces = call(
-                self._frictions.solve_pressed, *self._matrix.varying_at(x, places), *sides
-            )
-        else:
-            forces = call(_solve_linear, self._matrix.matrix_at(x, places), *sides)
+        solve = self._frictions.solve_pressed if self._load_dependent else self._solve_forces
+        forces = call(solve, *self._matrix.varying_at(x, places), *sides)
         if not has_result(forces):
             return None
         v = velocity.state.coordinates
@@ -530,10 +373,10 @@ class Reactions:
         gravity = complex(*loads.gravity)
         pulls = self._follower.accelerations(position, velocity, acceleration, places)
         x, v, a = (part.state.coordinates for part in (position, velocity, acceleration))
-        sides: list[float] = []
-        for mass, inertia, center, turn in self._bodies:
-            pull = mass * (pulls[center] - gravity)
-            sides += (pull.real, pull.imag, inertia * a[turn] / scale)
+        sides = [0.0] * self._matrix.size
+        for mass, inertia, row, center, turn in self._bodies:
+            self._apply_force(sides, row, center, mass * (gravity - pulls[center]), places)
+            sides[row + 2] += inertia * a[turn] / scale
         if self._springs:
             velocities = self._follower.velocities(position, velocity, places)
             for spring, (start, end), rows in self._springs:
@@ -543,8 +386,7 @@ class Reactions:
                 force = spring.tension(length, growth) / length * (places[end] - places[start])
                 for row, point, pulled in zip(rows, (start, end), (force, -force), strict=True):
                     if row >= 0:
-                        lever = places[point] - places[self._bodies[row // 3][2]]
-                        self._apply_force(sides, row, lever, pulled)
+                        self._apply_force(sides, row, point, pulled, places)
         if self._mechanics.applied is not None:
             for at, load in self._mechanics.applied.acting_loads(position, velocity, given):
                 self._apply_load(sides, at, load, position, places)
@@ -578,8 +420,8 @@ class Reactions:
         rows = self._matrix.rows
         if isinstance(at, LoadedPoint):
             row = rows[at.link]
-            lever = places[self._loaded[at.number]] - places[self._bodies[row // 3][2]]
-            self._apply_force(sides, row, lever, load * at.direction(position))
+            force = load * at.direction(position)
+            self._apply_force(sides, row, self._loaded[at.number], force, places)
         elif at.slider:
             number = self._sliders[at.slider]
             self._add_friction(sides, number, -load, position.state.coordinates, places)
@@ -598,32 +440,21 @@ class Reactions:
     ) -> None:
         """Add the friction in a joint to the right sides of its links."""
         line = self._matrix.lines.get(number)
-        for row, center, sign in self._matrix.sides[number]:
+        for row, _, sign in self._matrix.sides[number]:
             if line is None:
                 sides[row + 2] += sign * friction / self._scale
             else:
-                lever = places[self._places[number]] - places[center]
-                self._apply_force(sides, row, lever, -sign * friction * line.direction(x))
+                force = -sign * friction * line.direction(x)
+                self._apply_force(sides, row, self._places[number], force, places)
 
-    def _apply_force(self, sides: list[float], row: int, lever: complex, force: complex) -> None:
-        """Add a known force on a link to its right sides."""
+    def _apply_force(
+        self, sides: list[float], row: int, point: int, force: complex, places: Sequence[complex]
+    ) -> None:
+        """Add a known force at a point of a link to its right sides."""
+        lever = places[point] - places[self._pivots[row // 3]]
         sides[row] -= force.real
         sides[row + 1] -= force.imag
         sides[row + 2] -= (lever.real * force.imag - lever.imag * force.real) / self._scale
-
-
-def _solve_linear(matrix: Array, *sides: float) -> list[float] | None:
-    """Return the solution of a linear system, or None if it is singular."""
-    try:
-        solution: list[float] = np.linalg.solve(matrix, sides).tolist()
-    except np.linalg.LinAlgError:
-        return None
-    return solution if all(map(isfinite, solution)) else None
-
-
-def _solve_transposed(matrix: Array, *sides: float) -> list[float] | None:
-    """Return the solution of the system with the transposed matrix."""
-    return _solve_linear(matrix.T, *sides)
 
 
 def _joint_names(joints: Sequence[Joint]) -> tuple[str, ...]:

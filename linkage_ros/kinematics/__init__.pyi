@@ -164,7 +164,6 @@ from linkage_ros.kinematics.sweep_analysis import (
     check_limits as check_limits,
     check_turns as check_turns,
     conditioning_curves as conditioning_curves,
-    Extreme as Extreme,
     find_extremes as find_extremes,
     grid_positions as grid_positions,
     InputSweep as InputSweep,

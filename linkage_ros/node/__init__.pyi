@@ -6,13 +6,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.node.demo_nodes import CrankSource as CrankSource, PDController as PDController
-from linkage_ros.node.diagnostics import (
-    chatter_count as chatter_count,
-    CountsSnapshot as CountsSnapshot,
-    DiagnosticsSummary as DiagnosticsSummary,
+from linkage_ros.node.conditions import (
+    RunState as RunState,
     Warnings as Warnings,
 )
+from linkage_ros.node.demo_nodes import CrankSource as CrankSource, PDController as PDController
+from linkage_ros.node.diagnostics import make_statuses as make_statuses
 from linkage_ros.node.node import LinkageNode as LinkageNode
 from linkage_ros.node.parameters import LINKAGE_NODE as LINKAGE_NODE
 from linkage_ros.node.qos import recorded_qos as recorded_qos

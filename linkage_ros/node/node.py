@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial, wraps
 from math import inf
 from sys import maxsize
@@ -29,15 +30,8 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.node import pacing
-from linkage_ros.node.diagnostics import (
-    chatter_count,
-    CLOCK_PATIENCE,
-    CountsSnapshot,
-    DiagnosticsSummary,
-    is_interleaved,
-    no_clock,
-    Warnings,
-)
+from linkage_ros.node.conditions import RunState, Warnings
+from linkage_ros.node.diagnostics import make_statuses
 from linkage_ros.node.pacing import ClockGuard
 from linkage_ros.node.parameters import (
     declare_parameters,
@@ -49,7 +43,7 @@ from linkage_ros.node.real_time import RealTime, STANDSTILL, standstill_reason
 from linkage_ros.node.run_recording import RunRecording
 from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.replay import own_joint_states
-from linkage_ros.tick import Pace, Pipeline, TickLoop
+from linkage_ros.tick import Counts, Pace, Pipeline, TickLoop
 from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.clock import Clock, ClockType
@@ -58,6 +52,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import serialize_message
+from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
@@ -160,7 +155,6 @@ class LinkageNode(LifecycleNode):
         self._activation_time = 0
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
-        self._last_counts = self._previous_counts = CountsSnapshot()
         self._twin_since = inf
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
@@ -210,15 +204,14 @@ class LinkageNode(LifecycleNode):
         """Start ticking, and recording if the scene says so."""
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
-        self._warnings = Warnings(self.get_logger())  # starts with the counts that it compares
         take_crank = self._scene_topics.take_sample
         for take in (*([take_crank] if take_crank else []), *self._scene_topics.take_wrenches):
             while take() is not None:
                 pass  # discard messages from before this run
         self._activation_time = time.monotonic_ns()
-        self._last_counts = self._previous_counts = CountsSnapshot.take(
-            self.loop.counts, self._activation_time
-        )
+        counts = self.loop.read_counts(self._activation_time)
+        self._last_counts = self._previous_counts = counts
+        self._warnings = Warnings(self.get_logger(), counts)
         if self.scene.record is not None:
             self._start_recording()
         self._real_time.lock_memory()
@@ -303,8 +296,7 @@ class LinkageNode(LifecycleNode):
         """Stop ticking and close the bag; do nothing if nothing runs."""
         if self.loop is not None and self.loop.is_running:
             self.loop.stop()
-            self._watch_failure(self.loop)
-            self._publish_diagnostics()
+            self._publish_diagnostics(self.loop)
             if self.crank_topic:
                 self.get_logger().info(f'{self.crank_topic}: {self.loop.sample_counts_text}')
             self.recording.stop(self.loop)
@@ -413,107 +405,70 @@ class LinkageNode(LifecycleNode):
         if loop is None or not loop.is_running:
             return
         period = self.get_parameter('warning_period').value
-        self._warnings.check_events(loop.counts, loop.pipeline.closures, self.crank_topic, period)
-        self._warnings.check_age(loop.counts, self.crank_topic, loop.pipeline.max_age, period)
-        self._warnings.check_jumps(loop.pipeline.linkages, self.crank_topic)
-        wrenches = [each.topic_name for each in self._scene_topics.wrenches]
-        self._warnings.check_chatter(loop.pipeline.linkages, period)
-        self._warnings.check_wrenches([*zip(wrenches, loop.counts.wrenches, strict=True)], period)
-        silence = self._clock_silence()
-        if (
-            min(silence, (time.monotonic_ns() - self._activation_time) / NANOSECONDS)
-            > CLOCK_PATIENCE
-        ):
-            remedy = 'start the simulation, or set use_sim_time: false'
-            self._warnings.warn('clock', f'{no_clock(silence)}: {remedy}', period)
+        run = self._observe_run(loop)
+        self._warnings.warn_of_conditions(run, period)
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop(0))
-        listening = [linkage.scene_linkage for linkage in loop.pipeline.linkages if linkage.topic]
         # Without /clock messages no tick has taken crank messages yet.
-        assert self.scene is not None
-        if listening and (loop.counts.ticks or not self.scene.rate):
-            inputs = [name for scene_linkage in listening for name in scene_linkage.sampled_joints]
-            simulated = self.scene.rate and self.get_parameter('use_sim_time').value
-            self._warnings.check_silence(
-                loop.counts,
-                self.crank_topic,
-                inputs,
-                period,
-                inf if simulated else 1.0 / self.scene.rate if self.scene.rate else 0.0,
-                loop.pipeline.max_age,
-                self._crank_publishers,
-            )
-        self._watch_failure(loop)
+        if run.inputs and (loop.counts.ticks or not run.scene.rate):
+            self._warnings.warn_of_silence(run, self._crank_publishers, period)
         news = self.recording.check_failure(loop)
         due = self._last_counts.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
         if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
-            self._publish_diagnostics()
+            self._publish_diagnostics(loop)
 
-    def _watch_failure(self, loop: TickLoop) -> None:
-        if loop.failure:
-            period = self.get_parameter('warning_period').value
-            self._warnings.warn('tick', f'the tick has stopped: {loop.failure}', period)
-
-    def _publish_diagnostics(self) -> None:
+    def _observe_run(self, loop: TickLoop) -> RunState:
         assert self.scene is not None
-        assert self.loop is not None
-        publishers = self._crank_publishers()
-        self.loop.had_several_publishers |= len(publishers) > 1
-        now = CountsSnapshot.take(
-            self.loop.counts, time.monotonic_ns(), chatter_count(self.loop.pipeline.linkages)
-        )
-        cranks_doubled = self._doubled_cranks(publishers, now)
-        node_doubled = self._doubled_node(now)
-        self._previous_counts = self._last_counts
-        period = self.get_parameter('warning_period').value
-        for kind, line in (('publishers', cranks_doubled), ('twin', node_doubled)):
-            if line:
-                self._warnings.warn(kind, line, period)
-        simulated = self.get_parameter('use_sim_time').value
-        clock = self.get_clock().now()
-        health = DiagnosticsSummary(
+        return RunState(
             node=self.get_fully_qualified_name(),
-            scene=self.scene.name,
-            rate=0.0 if simulated else self.scene.rate,
-            clock=clock.nanoseconds,
+            scene=self.scene,
+            loop=loop,
+            counts=loop.read_counts(time.monotonic_ns()),
+            clock=self.get_clock().now().nanoseconds,
+            recording=self.recording,
+            limits=nearness_limits(self),
+            is_simulated=self.get_parameter('use_sim_time').value,
+            start=self._activation_time,
+            crank_topic=self.crank_topic,
+            wrench_topics=[each.topic_name for each in self._scene_topics.wrenches],
             clock_silence=self._clock_silence(),
             clock_refused=self._clock_guard.refused_count,
-            crank_topic=self.crank_topic,
-            publishers=publishers,
-            cranks_doubled=cranks_doubled,
-            node_doubled=node_doubled,
-            loop=self.loop,
-            window_start=self._last_counts,
-            window_end=now,
-            recording_failure=self.recording.failure,
-            recorder=self.recording.recorder,
-            snapshots=self.recording.snapshots,
-            limits=nearness_limits(self),
             system=self._real_time.in_force | self._middleware,
         )
-        self._last_counts = now
-        message = DiagnosticArray(status=health.make_statuses())
-        message.header.stamp = clock.to_msg()
+
+    def _publish_diagnostics(self, loop: TickLoop) -> None:
+        publishers = self._crank_publishers()
+        loop.had_several_publishers |= len(publishers) > 1
+        run = self._observe_run(loop)
+        run = replace(
+            run,
+            publishers=publishers,
+            cranks_doubled=self._doubled_cranks(publishers, run.counts),
+            node_doubled=self._doubled_node(run.counts),
+        )
+        self._warnings.warn_of_conditions(run, self.get_parameter('warning_period').value)
+        message = DiagnosticArray(status=make_statuses(run, self._last_counts))
+        self._previous_counts, self._last_counts = self._last_counts, run.counts
+        message.header.stamp = Time(nanoseconds=run.clock).to_msg()
         data = serialize_message(message)
         self._diagnostics.publish(data)
-        if self.loop.recorder is not None:
-            self.loop.recorder.offer(
-                self.loop.topics.diagnostics, clock.nanoseconds, clock.nanoseconds, data
-            )
+        if loop.recorder is not None:
+            loop.recorder.offer(loop.topics.diagnostics, run.clock, run.clock, data)
 
-    def _doubled_cranks(self, publishers: Sequence[str], now: CountsSnapshot) -> str:
+    def _doubled_cranks(self, publishers: Sequence[str], counts: Counts) -> str:
         """Return that several publishers send the same crank, and the remedy; '' if none do."""
         assert self.loop is not None
-        topic, shared = self.crank_topic, self._shares_topic or self.loop.counts.ignored
+        topic, shared = self.crank_topic, self._shares_topic or counts.ignored
         among = ' and '.join(publishers) or 'nodes without a name yet'
-        # Where others share the topic, or each linkage has a publisher, only the numbers tell.
-        if is_interleaved(self._previous_counts.interleaved, now.interleaved):
+        # Where others share the topic, or each linkage has a publisher, only the numbers tell: a
+        # publisher that starts again begins its numbers again, once.
+        if counts.interleaved - self._previous_counts.interleaved > 1:
             return f'{topic}: several publishers send the crank, among {among}; stop all but one'
         if len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1:
             return f'{topic}: several publishers, {among}; stop all but one'
         return ''
 
-    def _doubled_node(self, now: CountsSnapshot) -> str:
+    def _doubled_node(self, now: Counts) -> str:
         """Return that there is another node of this name, or of these joints; '' if not."""
         name = self.get_fully_qualified_name()
         nodes = self.get_node_names_and_namespaces()
@@ -524,7 +479,8 @@ class LinkageNode(LifecycleNode):
                 f'another node is named {name}: services and diagnostics of both mix; rename one, '
                 'as by -r __ns:=/left'
             )
-        if is_interleaved(self._previous_counts.own_interleaved, now.own_interleaved):
+        before = self._previous_counts.own_interleaved
+        if now.own_interleaved - before > 1:
             topic = self._joint_states.topic_name
             return f'{topic}: another publisher sends the same joints as {name}; stop one of them'
         return ''

@@ -20,7 +20,6 @@ from pathlib import Path
 from linkage_ros.bag import (
     BagWriter,
     compression_type,
-    KeptCounts,
     MID_RUN,
     Recorder,
     RecordingSummary,
@@ -245,13 +244,13 @@ class MemorySummary:
     """Summary of a run whose last seconds were kept in memory."""
 
     # Counts for each topic; messages that were kept to the end are gone now.
-    topics: tuple[KeptCounts, ...]
+    topics: tuple[TopicCounts, ...]
     snapshots: str  # Number of snapshots, as text
     failure: str  # Reason why the memory has ended early, or lacks messages; '' if it is complete
 
     def __str__(self) -> str:
         counts = '; '.join(
-            f'{t.name} {t.received} received, {t.kept} in memory, {t.discarded} discarded'
+            f'{t.name} {t.received} received, {t.recorded} in memory, {t.discarded} discarded'
             + (f', {t.dropped} dropped' if t.dropped else '')
             for t in self.topics
         )
@@ -355,7 +354,7 @@ def counts_text(summary: RecordingSummary) -> str:
     )
 
 
-def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCounts]) -> str:
+def losses_text(where: object, topics: Sequence[TopicCounts]) -> str:
     """Return the number of dropped messages as one line; '' for none."""
     dropped = sum(topic.dropped for topic in topics)
     if not dropped:

@@ -80,9 +80,9 @@ class TopicComparison:
 
     def __init__(self, name: str, message_type: str) -> None:
         self.name = name
-        self.recorded = self.same = self.but_turns = self.different = 0
+        self.recorded = self.same = self.same_but_for_turns = self.different = 0
         """Messages in the bag: the same, the same up to whole turns, and different."""
-        self.not_reproduced = self.not_recorded = 0
+        self.not_made_now = self.not_recorded = 0
         """Messages in the bag that were not reproduced, and the reverse."""
         self.deviations: dict[Key, Deviation] = {}
         self.only_recorded: dict[str, None] = {}
@@ -131,7 +131,7 @@ class TopicComparison:
             if key in numbers and not _is_identical(number, numbers[key])
         ]
         if not apart and turning and (then.stamp, then.keys) == (again.stamp, again.keys):
-            self.but_turns += 1
+            self.same_but_for_turns += 1
             return None
         self.different += 1
         for key in then.keys:
@@ -189,7 +189,7 @@ class Comparison:
                 elif again:
                     difference = topic.add_different(then, again, at, self._turning)
                 else:
-                    topic.not_reproduced += 1
+                    topic.not_made_now += 1
                     difference = FirstDifference(at, topic.name, 'published then, nothing now')
             first_difference = first_difference or difference
         if first_difference:

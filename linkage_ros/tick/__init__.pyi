@@ -35,5 +35,4 @@ from linkage_ros.tick.tick_loop import (
     Stall as Stall,
     TakeMessage as TakeMessage,
     TickLoop as TickLoop,
-    WrenchCounts as WrenchCounts,
 )

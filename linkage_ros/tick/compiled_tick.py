@@ -214,7 +214,7 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
         return None
     # The state of a drive that exerts an effort holds more than its fields.
-    exerts = getattr(linkage.drive, 'exerts_effort', False)
+    exerts = linkage.drive.exerts_effort
     lines, bound = compile_drive(
         linkage.drive, compiled.driven, 'return interpret(now)', 'return interpret_from(now, None)'
     )

@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -25,7 +24,7 @@ from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Position, Status
 from linkage_ros.messages import Rejection
-from linkage_ros.stages.drives import Context, CrankState, Drive, DRIVES
+from linkage_ros.stages.drives import Context, Crank, CrankState, Drive
 from linkage_ros.stages.effects import (
     Continuous,
     DriveEffect,
@@ -119,18 +118,18 @@ class LinkagePipeline:
 
     def _build_drive(self, wanted: WantedEffects, injection: Injection | None) -> None:
         """Build what gives the crank state: the drive, its messages and the effects on it."""
-        drive, parameters = self.scene_linkage.drive
-        module = import_module(DRIVES[drive])
-        self.topic: str = getattr(module, 'TOPIC', '')
+        drive: Drive
+        name, drive = self.scene_linkage.drive
+        self.topic = drive.listens_to
         """Topic of the drive; '' for none."""
-        self.drive: Drive = module.build(parameters, self.context)
-        self._parse_sample = module.reader(parameters, self.context) if self.topic else None
+        self.drive: Crank = drive.build(self.context)
+        self._parse_sample = drive.reader(self.context) if self.topic else None
         self._message_faults = (
             injection.build_functions('message') if injection is not None else []
         )
         if self._message_faults and not self.topic:
             raise DefinitionError(
-                'faults', f'not_a_number corrupts messages, and {drive} has none', 'leave it out'
+                'faults', f'not_a_number corrupts messages, and {name} has none', 'leave it out'
             )
         self.drive_stages = [
             effect.drive_stage(self.context) for effect in wanted.of_kind(DriveEffect).values()
@@ -199,17 +198,18 @@ class LinkagePipeline:
             if name in wanted.named
         ]
         """The topics beside the joint states."""
-        drive, parameters = scene_linkage.drive
-        module = import_module(DRIVES[drive])
-        if (of_drive := getattr(module, 'writer', None)) is not None:
-            written = of_drive(parameters, self.context, self.drive)
-            if written is not None:
-                topic, message = module.EXTRA_TOPIC, module.EXTRA_MESSAGE
-                self.extras.append(
-                    _make_output(
-                        drive, topic, message, written, scene_linkage.name, of_reading=True
-                    )
+        name, drive = scene_linkage.drive
+        if (written := drive.writer(self.context, self.drive)) is not None:
+            self.extras.append(
+                _make_output(
+                    name,
+                    drive.publishes,
+                    drive.message,
+                    written,
+                    scene_linkage.name,
+                    of_reading=True,
                 )
+            )
 
     @property
     def writes_forces(self) -> bool:

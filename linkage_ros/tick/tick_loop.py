@@ -17,7 +17,7 @@ never logs and never waits for another thread; it leaves its counts for others t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Event, Thread
 from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -103,6 +103,8 @@ class WrenchCounts:
 class Counts:
     """Counts of the tick since its start; only its thread writes them."""
 
+    time: int = 0
+    """When they were read, in [ns] of the steady clock."""
     ticks: int = 0
     published: int = 0
     without_crank: int = 0
@@ -141,6 +143,8 @@ class Counts:
     """Index and position of the linkage that had each status last."""
     wrenches: tuple[WrenchCounts, ...] = ()
     """Of each topic with a wrench."""
+    chatter: Sequence[int] = ()
+    """Steps in which motor and crank of each linkage met and parted too often, when read."""
 
 
 Pace = Callable[['TickLoop', Event], None]
@@ -189,6 +193,7 @@ class TickLoop:
         self._rejected_old = 0
         """Samples that the last tick rejected as older than the last one."""
         self._pipeline = build()
+        self._earlier_chatter: Sequence[int] = [0] * len(self._pipeline.linkages)
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
         self.topics = find_handles(list_run_topics(self._pipeline))
@@ -253,6 +258,19 @@ class TickLoop:
     def newest_stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
         return self._pipeline.newest_stamp
+
+    def read_counts(self, time: int) -> Counts:
+        """Return the counts as they are at a time of the steady clock, in [ns]."""
+        chatter = zip(self._earlier_chatter, self._pipeline.linkages, strict=True)
+        counts = self.counts
+        return replace(
+            counts,
+            time=time,
+            rejected=counts.rejected.copy(),
+            unclosed=counts.unclosed.copy(),
+            wrenches=tuple(replace(w, rejected=w.rejected.copy()) for w in counts.wrenches),
+            chatter=[earlier + linkage.drive.chatter_count for earlier, linkage in chatter],
+        )
 
     @property
     def pipeline(self) -> Pipeline:
@@ -396,7 +414,8 @@ class TickLoop:
             # Recorded, since the bag itself shows no jump back of the clock after ticks that
             # recorded nothing.
             recorder.offer(self.topics.resets, now, now, time_message(now))
-        self._pipeline = self._build()
+        chatter, self._pipeline = self.read_counts(now).chatter, self._build()
+        self._earlier_chatter = chatter
 
     def _advance_faults(self, injection: Injection, now: int) -> int:
         """Let faults begin and end; return the time of the tick, in [ns]."""

@@ -15,12 +15,11 @@ import shutil
 
 from linkage_ros.bag import (
     Bag,
-    BagSummary,
     BagWriter,
     read_bag,
-    RecordingStats,
     recover_bag,
     Storage,
+    TopicCounts,
 )
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
@@ -168,14 +167,12 @@ class Recording:
     def __init__(self, folder: Path, topics: object, keep_files: int = 0) -> None:
         storage = Storage(split_seconds=1.0, keep_files=keep_files)
         self.writer = BagWriter(folder / 'run', topics, {'run.json': ('', b'{}')}, storage)
-        self.writer.make_statistics = self._account
+        self.writer.make_statistics = lambda bag: [
+            TopicCounts(topic.name, count, count, 0)
+            for topic, count in zip(bag.topics, bag.counts, strict=True)
+        ]
         self._kept = folder
         self._number = 0
-
-    @staticmethod
-    def _account(summary: BagSummary) -> RecordingStats:
-        none = (0,) * len(summary.counts)
-        return RecordingStats(summary.counts, summary.counts, none, none)
 
     def write(self, messages: int) -> None:
         for _ in range(messages):

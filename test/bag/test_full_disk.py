@@ -203,18 +203,6 @@ def test_a_recording_ends_where_less_stays_free_than_it_should(
     assert custom['linkage_ros.failure'] == summary.failure
 
 
-@pytest.mark.parametrize('when', ['by size', 'by time'])
-def test_the_floor_counts_at_each_new_file_too(small_disk, topics, messages, when):
-    split = {'by size': {'split_bytes': 200_000}, 'by time': {'split_seconds': 0.5}}[when]
-    storage = Storage(min_free_bytes=600_000, **split)
-    writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
-    taken, error = _write_until_it_fails(writer, messages)
-    assert 'fewer than min_free_bytes: 600,000' in str(error)
-    assert sum(writer.close().counts) == taken
-    found = [message.data for message in read_bag(small_disk / 'run').messages()]
-    assert found == [message.data for message in messages[:taken]]
-
-
 def test_no_file_is_begun_where_another_process_has_taken_the_room(small_disk, topics, messages):
     storage = Storage(min_free_bytes=600_000, split_seconds=0.5)
     writer = BagWriter(small_disk / 'run', topics, storage=storage)

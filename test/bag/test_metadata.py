@@ -42,7 +42,7 @@ QOS = {
 @pytest.fixture
 def summary(tmp_path, topics):
     return BagSummary(
-        folder=tmp_path, file='run_0.mcap', topics=topics, counts=(3, 4), refused=(0, 1),
+        folder=tmp_path, file='run_0.mcap', topics=topics, counts=(3, 4),
         start=1_700_000_000_000_000_000, duration=2_000_000, size=1234
     )  # fmt: skip
 
@@ -109,7 +109,7 @@ def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
 @pytest.mark.parametrize('with_topics', [True, False])
 def test_its_text_is_that_of_a_yaml_library(summary, root, custom, files, with_topics):
     if not with_topics:
-        summary = replace(summary, topics=(), counts=(), refused=())
+        summary = replace(summary, topics=(), counts=())
     parts = [replace(summary, file=f'run: {index}.mcap') for index in range(files)]
     text = metadata_text(replace(summary, parts=tuple(parts)), custom, root=root)
     content = yaml.safe_load(text)
@@ -127,16 +127,14 @@ def test_files_together_are_a_bag(summary):
     early = replace(
         summary, file='run_2.mcap', counts=(1, 0), start=summary.start - 10, duration=11, size=6
     )
-    whole = merge_summaries([summary, empty, early], (1, 2), (3, 4))
-    assert (whole.counts, whole.refused, whole.discarded) == ((4, 4), (1, 2), (3, 4))
+    whole = merge_summaries([summary, empty, early], (3, 4))
+    assert (whole.counts, whole.discarded) == ((4, 4), (3, 4))
     assert (whole.start, whole.duration) == (summary.start - 10, summary.duration + 10)
     assert (whole.size, whole.file) == (1234 + 5 + 6, 'run_2.mcap')
     information = yaml.safe_load(metadata_text(whole, {}, root=False))
     assert information['relative_file_paths'] == ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
     assert [each['message_count'] for each in information['files']] == [7, 0, 1]
-    assert merge_summaries([empty], (0, 0), (0, 0)) == replace(
-        empty, refused=(0, 0), discarded=(0, 0)
-    )
+    assert merge_summaries([empty], (0, 0)) == replace(empty, discarded=(0, 0))
 
 
 def test_the_record_in_the_file_has_no_root_key(summary):

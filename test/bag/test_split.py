@@ -259,8 +259,7 @@ def test_packed_chunks_are_smaller_and_checked(tmp_path, topics, messages, compr
 # A process that is killed at its n-th system call that changes something on the disk.
 KILLED = """
 import os, pathlib, pickle, signal, sys
-from linkage_ros.bag.storage import Storage
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter, Storage
 folder, pickled = sys.argv[1:]
 topics, messages, storage = pickle.load(open(pickled, 'rb'))
 

@@ -19,7 +19,7 @@ import sys
 from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
 from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
-from linkage_ros.bag import BagWriter, RecordingStats, Topic
+from linkage_ros.bag import BagWriter, Topic, TopicCounts
 import pytest
 
 MINUTES = 15.0 / 60.0  # h
@@ -122,10 +122,10 @@ def test_usage_counts_memory_files_and_threads() -> None:
     assert after.threads == before.threads == 1
 
 
-def write_bag(folder: Path, stats: RecordingStats | None) -> Path:
+def write_bag(folder: Path, stats: TopicCounts | None) -> Path:
     """Write three messages of one topic, with counts of messages."""
     writer = BagWriter(folder, [Topic('/a', 'std_msgs/msg/Empty', '', '')])
-    writer.make_statistics = lambda summary: stats
+    writer.make_statistics = lambda summary: stats and [stats]
     for time in range(3):
         writer.write(0, time, time, b'\0\1\0\0')
     writer.close()
@@ -133,13 +133,13 @@ def write_bag(folder: Path, stats: RecordingStats | None) -> Path:
 
 
 COUNTS = {
-    'right': (RecordingStats([3], [3], [0], [0]), []),
-    'let go': (RecordingStats([9], [3], [0], [6]), []),
+    'right': (TopicCounts('/a', 3, 3, 0, 0), []),
+    'let go': (TopicCounts('/a', 9, 3, 0, 6), []),
     'none': (None, ['the bag has no counts']),
-    'wrong sum': (RecordingStats([4], [3], [0], [0]), ['/a: the counts do not add up']),
-    'dropped': (RecordingStats([5], [3], [2], [0]), ['/a: 2 dropped']),
+    'wrong sum': (TopicCounts('/a', 4, 3, 0, 0), ['/a: the counts do not add up']),
+    'dropped': (TopicCounts('/a', 5, 3, 2, 0), ['/a: 2 dropped']),
     'more than in the bag': (
-        RecordingStats([4], [4], [0], [0]),
+        TopicCounts('/a', 4, 4, 0, 0),
         ['/a: 4 counted, 3 in the bag'],
     ),
 }

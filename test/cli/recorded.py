@@ -11,14 +11,23 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import chain
 import json
 from pathlib import Path
 from threading import Event
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag import BagWriter, QosProfile, RUN_FILE, Topic
+from linkage_ros.bag import (
+    BagMessage,
+    BagWriter,
+    QosProfile,
+    read_bag,
+    RUN_FILE,
+    Storage,
+    Topic,
+)
 from linkage_ros.description import load_scene
 from linkage_ros.messages import JointStateWriter, time_message
 from linkage_ros.tick import Pipeline
@@ -159,6 +168,45 @@ def scene_file(folder: Path, text: str, linkage: str = FOUR_BAR) -> Path:
     scene = folder / 'scene of mine.yaml'
     scene.write_text(text if 'linkage' in text else f'linkage: l.yaml\n{text}')
     return scene
+
+
+Edit = Callable[[int, BagMessage], BagMessage | None]
+"""Makes of a message, by its number, what is written; nothing for none."""
+
+
+def rewritten(
+    bag_path: Path,
+    name: str | Path,
+    edit: Edit = lambda _, message: message,
+    *,
+    attachments: Mapping[str, bytes] | None = None,
+    topics: Sequence[Topic] = (),
+    more: Sequence[BagMessage] = (),
+    storage: Storage | None = None,
+    custom: Mapping[str, str] | None = None,
+    **said: object,
+) -> Path:
+    """
+    Write a bag once more beside it, so that its checksums fit.
+
+    ``attachments`` and ``topics`` stand for its own, ``more`` messages come last, and
+    its run account says also what is ``said``.
+    """
+    bag = read_bag(bag_path)
+    files = dict(bag.attachments if attachments is None else attachments)
+    if said:
+        files[RUN_FILE] = json.dumps(json.loads(files[RUN_FILE]) | said).encode()
+    topics = topics or bag.topics
+    numbers = {each.name: index for each_of in (topics, bag.topics)
+               for index, each in enumerate(each_of)}  # fmt: skip
+    attached = {key: ('', data) for key, data in files.items()}
+    writer = BagWriter(bag_path.parent / name, topics, attached, storage)
+    for index, message in enumerate(chain(bag.messages(), more)):
+        edited = edit(index, message)
+        if edited:
+            writer.write(numbers[edited.topic], *edited[1:])
+    writer.close(custom)
+    return writer.folder
 
 
 def told(folder: Path) -> Iterator[tuple[str, int, Any]]:

@@ -25,6 +25,7 @@ from shlex import split
 
 import pytest
 
+from .conftest import json_keys
 from ..support import commands
 
 ROOT = Path(__file__).parents[2]
@@ -93,3 +94,20 @@ def test_a_session_goes_as_approved(session: Path, tmp_path: Path) -> None:
         return
     for said, approved_block in zip(_blocks(now), _blocks(approved), strict=True):
         assert said == approved_block
+
+
+def test_json_has_the_documented_keys() -> None:
+    """What the sessions print as JSON has the keys that the reference lists."""
+    seen = set()
+    for session in SESSIONS:
+        for typed, printed in _blocks(session.read_text('utf-8')):
+            if '--json' not in typed or not printed.startswith('{') or '--list' in typed:
+                continue
+            _, command, *words = split(typed)
+            if command == 'replay' and {'--scene', '--set'}.intersection(words):
+                command = 'replay --scene'
+            keys = re.findall(r'^ "(\w+)"', printed, re.MULTILINE)
+            assert {*keys} - {'branches'} == json_keys(command), typed
+            seen.add(command)
+    assert {'check', 'compare', 'gallery', 'info', 'replay', 'replay --scene', 'scene'} <= seen
+    assert {'solve', 'synthesize'} <= seen

@@ -39,33 +39,6 @@ def refused(linkage: Run, *typed: str) -> str:
     return line.removeprefix('linkage compile: ')
 
 
-@pytest.mark.parametrize(
-    ('typed', 'said'),
-    [
-        (['-o', 'a.cc'], "a.cc: ends in '.cc'; name a file that ends in .c or .h or .js or .py"),
-        (['-o', 'a'], 'a: has no ending; name a file that ends in .c or .h or .js or .py'),
-        (
-            ['-o', 'a.c', '--joints', 'rocker_joint,coupler'],
-            "--joints: 'coupler' is not a published joint; did you mean 'coupler_joint'?",
-        ),
-        (
-            ['-o', 'a.c', '--joints', ''],
-            "--joints: '' is not a published joint; name some of coupler_joint, rocker_joint",
-        ),
-        (
-            ['-o', 'a.c', '--name', 'four-bar'],
-            "--name: 'four-bar' cannot be a name in C; write one, as --name four_bar",
-        ),
-        (
-            ['-o', 'no/a.c'],
-            'no/a.c: there is no folder no; make it: mkdir -p no',
-        ),
-    ],
-)
-def test_what_is_typed_wrong_is_said_in_a_line(linkage: Run, typed, said) -> None:
-    assert refused(linkage, FOUR_BAR, *typed) == said
-
-
 def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: Path) -> None:
     shutil.copy(FOUR_BAR, tmp_path / '4.yaml')
     said = "4.yaml: '4' cannot be a name in C; write one, as --name four_bar"

@@ -160,14 +160,6 @@ def test_a_drill_names_its_faults_and_runs_until_they_have_ended(linkage: Run) -
     )
 
 
-def test_a_scene_that_does_not_exist(linkage: Run) -> None:
-    answer = linkage('demo', 'worn_pres')
-    assert answer.returncode == 2
-    assert answer.stderr == (
-        "linkage demo: worn_pres: there is no such scene; did you mean 'worn_press'?\n"
-    )
-
-
 @pytest.mark.parametrize(
     ('name', 'after'),
     [

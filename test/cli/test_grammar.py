@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from importlib import import_module
 from math import tau
 from pathlib import Path
 import re
@@ -21,7 +20,7 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros.cli import COMMANDS, EXIT_CODES, module_of, Parser, parser_of, SHELLS
+from linkage_ros.cli import COMMANDS, EXIT_CODES, find_command, Parser, parser_of, SHELLS
 from linkage_ros.description import load_scene, SCENE_FILE
 from linkage_ros.errors import LinkageError
 from linkage_ros.resources import linkage_names, named_file, scene_names
@@ -34,11 +33,11 @@ CONFIG = Path(__file__).parents[2] / 'config'
 
 
 def parser(command: str) -> Parser:
-    return parser_of(command, import_module(module_of(command)))
+    return parser_of(command, find_command(command))
 
 
 def example(command: str) -> str:
-    found = import_module(module_of(command)).EXAMPLE
+    found = find_command(command).EXAMPLE
     return found if isinstance(found, str) else found[command]
 
 

@@ -19,12 +19,12 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Topic
+from linkage_ros.bag import BagMessage, read_bag, RUN_FILE, Topic
 from linkage_ros.cli import (
     COMMANDS as ALL_COMMANDS,
     export,
+    find_command,
     info,
-    module_of,
     parser_of,
     PrintableStream,
     replay,
@@ -38,7 +38,7 @@ from linkage_ros.tools.drawing import plot_command as plot
 from linkage_ros.tools.view import report_command as report
 import pytest
 
-from .recorded import answer, BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file
+from .recorded import answer, BEGIN, FOUR_BAR, JOINT_STATE, MS, rewritten, scene_file
 from .test_replay import recorded
 from ..support.commands import environment, linkage
 
@@ -82,18 +82,10 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp('bag'), 'effects: {velocity: {}}\n', 60)
 
 
-def rewritten(
-    bag_path: Path, folder: Path, account: bytes, more: tuple[BagMessage, ...] = ()
-) -> Path:
-    """Write a bag once more with another account of its run, and more messages at its end."""
-    bag = read_bag(bag_path)
-    files = {name: ('', data) for name, data in bag.attachments.items()}
-    numbers = {each.name: index for index, each in enumerate(bag.topics)}
-    writer = BagWriter(folder / 'odd', bag.topics, files | {RUN_FILE: ('', account)})
-    for message in (*bag.messages(), *more):
-        writer.write(numbers[message.topic], *message[1:])
-    writer.close()
-    return writer.folder
+def with_account(bag: Path, folder: Path, account: bytes) -> Path:
+    """Write a bag once more with another account of its run."""
+    files = {**read_bag(bag).attachments, RUN_FILE: account}
+    return rewritten(bag, folder / 'odd', attachments=files)
 
 
 def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[str]:
@@ -120,7 +112,7 @@ def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterat
 
 @pytest.mark.parametrize('name', ACCOUNTS)
 def test_a_damaged_account_is_told_in_a_line(tmp_path, capsys, bag, name) -> None:
-    odd = rewritten(bag, tmp_path, ACCOUNTS[name])
+    odd = with_account(bag, tmp_path, ACCOUNTS[name])
     lines = list(tried(odd, tmp_path, capsys))
     assert lines[0].startswith(f'{odd}: its run.json is damaged; ')
 
@@ -129,7 +121,7 @@ def test_a_damaged_account_is_told_in_a_line(tmp_path, capsys, bag, name) -> Non
 @pytest.mark.parametrize('key', KEYS)
 def test_an_account_of_wrong_values_is_told_in_a_line(tmp_path, capsys, bag, key, value) -> None:
     said = json.loads(read_bag(bag).attachments[RUN_FILE]) | {key: '@'}
-    odd = rewritten(bag, tmp_path, json.dumps(said).replace('"@"', VALUES[value]).encode())
+    odd = with_account(bag, tmp_path, json.dumps(said).replace('"@"', VALUES[value]).encode())
     lines = list(tried(odd, tmp_path, capsys))
     damaged = lines[0].startswith(f'{odd}: its run.json is damaged; ')
     assert damaged == ((key, value) not in GOOD)
@@ -157,11 +149,10 @@ def test_a_change_that_is_none_is_a_value_error(name: str) -> None:
 @pytest.mark.parametrize('name', CHANGES)
 def test_a_change_that_is_none_is_told_in_a_line(tmp_path, capsys, name) -> None:
     bag = recorded(tmp_path, 'faults: {quiet: {silence: {}}}\n', 60)
-    account = json.loads(read_bag(bag).attachments[RUN_FILE])
-    account |= {'faults_topic': '/linkage/withheld', 'withheld_topic': ''}
+    account = {'faults_topic': '/linkage/withheld', 'withheld_topic': ''}
     time = BEGIN + 60 * MS
     more = (BagMessage('/linkage/withheld', time, time, CHANGES[name]),)
-    odd = rewritten(bag, tmp_path, json.dumps(account).encode(), more)
+    odd = rewritten(bag, 'odd', more=more, **account)
     lines = list(tried(odd, tmp_path, capsys))
     assert lines[0].startswith(f'{odd}: a message on its faults topic names no fault')
 
@@ -171,7 +162,7 @@ def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> N
     bag = recorded(tmp_path, 'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n', 60)
     *_, last = read_bag(bag).messages()
     more = (last._replace(log_time=time, publish_time=time),)
-    odd = rewritten(bag, tmp_path, read_bag(bag).attachments[RUN_FILE], more)
+    odd = rewritten(bag, 'odd', more=more)
     lines = list(tried(odd, tmp_path, capsys))
     assert lines[0].startswith(f'{odd}: has a tick at {time} ns, beyond ')
     with pytest.raises(BagError, match='beyond'):
@@ -205,25 +196,28 @@ COMMANDS = {
 
 def odd_bag(folder: Path, odd: str) -> Path:
     """Write a bag whose names are all odd; its scene is whole."""
-    whole = read_bag(recorded(folder, 'effects: {velocity: {}}\n', 60))
-    account = json.loads(whole.attachments[RUN_FILE])
-    account |= {'scene': odd, 'linkage_ros': odd, 'python': odd, 'effects': {odd: odd}}
-    files = {name: ('', data) for name, data in whole.attachments.items()}
-    files[RUN_FILE] = ('', json.dumps(account).encode())
-    files[f'{odd}.txt'] = ('', b'')
+    bag = recorded(folder, 'effects: {velocity: {}}\n', 60)
+    whole = read_bag(bag)
     strange = [Topic(f'/{odd}', odd, odd, odd), Topic(f'/{odd}/joints', JOINT_STATE, '', '')]
-    topics = [*whole.topics, *strange]
-    numbers = {each.name: index for index, each in enumerate(topics)}
-    writer = BagWriter(folder / 'odd', topics, files)
-    for message in whole.messages():
-        writer.write(numbers[message.topic], *message[1:])
-    for index in range(3):
-        time = BEGIN + index * MS
-        writer.write(len(topics) - 2, time, time, text_message(odd))
+    more = []
+    for time in range(BEGIN, BEGIN + 3 * MS, MS):
         states = JointStateWriter([odd, 'rocker_joint']).write(time, (0.1, 0.2), ())
-        writer.write(len(topics) - 1, time, time, states)
-    writer.close({'linkage_ros.failure': odd, 'linkage_ros.recovered': odd, odd: odd})
-    return writer.folder
+        data = text_message(odd), states
+        more += [
+            BagMessage(each.name, time, time, d) for each, d in zip(strange, data, strict=True)
+        ]
+    return rewritten(
+        bag,
+        'odd',
+        attachments={**whole.attachments, f'{odd}.txt': b''},
+        topics=[*whole.topics, *strange],
+        more=more,
+        custom={'linkage_ros.failure': odd, 'linkage_ros.recovered': odd, odd: odd},
+        scene=odd,
+        linkage_ros=odd,
+        python=odd,
+        effects={odd: odd},
+    )
 
 
 @pytest.mark.parametrize('name', ODD)
@@ -327,7 +321,7 @@ WITH_A_SCENE = (
 
 
 def takes_a_bag(command: str) -> bool:
-    parser = parser_of(command, import_module(module_of(command)))
+    parser = parser_of(command, find_command(command))
     return any(action.dest == 'bag' for action in parser._actions)
 
 
@@ -335,16 +329,11 @@ def takes_a_bag(command: str) -> bool:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a bag and the package that the bag's scene names."""
     folder = tmp_path_factory.mktemp('strange')
-    whole = read_bag(recorded(folder, 'effects: {velocity: {}}\n', 60))
-    files = {name: ('', data) for name, data in whole.attachments.items()}
-    text = whole.attachments[SCENE_FILE].decode().replace('{velocity: {}}', f'{{{EFFECT}: {{}}}}')
+    bag = recorded(folder, 'effects: {velocity: {}}\n', 60)
+    files = read_bag(bag).attachments
+    text = files[SCENE_FILE].decode().replace('{velocity: {}}', f'{{{EFFECT}: {{}}}}')
     assert EFFECT in text
-    files[SCENE_FILE] = ('', text.encode())
-    writer = BagWriter(folder / 'strange', whole.topics, files)
-    numbers = {each.name: index for index, each in enumerate(whole.topics)}
-    for message in whole.messages():
-        writer.write(numbers[message.topic], *message[1:])
-    writer.close()
+    rewritten(bag, 'strange', attachments={**files, SCENE_FILE: text.encode()})
     (folder / 'canary').mkdir()
     (folder / 'canary' / '__init__.py').write_text(CANARY)
     (folder / 'canary' / 'effect.py').write_text(DOES_NOTHING)

@@ -8,12 +8,11 @@
 
 """One rule for all commands: what exists is not overwritten without ``--force``."""
 
-from importlib import import_module
 from pathlib import Path
 import stat
 from subprocess import CompletedProcess
 
-from linkage_ros.cli import COMMANDS, module_of, parser_of
+from linkage_ros.cli import COMMANDS, find_command, parser_of
 import pytest
 
 from .recorded import Recorded, scene_file
@@ -66,7 +65,7 @@ def folder(tmp_path: Path) -> Path:
 def test_all_commands_that_write_are_tried() -> None:
     writing = set()
     for command in COMMANDS:
-        parser = parser_of(command, import_module(module_of(command)))
+        parser = parser_of(command, find_command(command))
         options = {option for action in parser._actions for option in action.option_strings}
         if '-o' in options:
             writing.add(command)

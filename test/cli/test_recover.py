@@ -69,26 +69,3 @@ def test_a_whole_bag_loses_nothing_and_no_folder_is_used_twice(linkage: Run, bag
     assert answer.stderr == (
         'linkage recover: whole: exists already; name another, or add --force to overwrite it\n'
     )
-
-
-@pytest.mark.parametrize(
-    ('name', 'said'),
-    [
-        ('nothing', 'nothing: does not exist'),
-        ('.', '.: holds no .mcap file'),
-        ('empty.mcap', 'nothing that can be saved: empty.mcap is empty'),
-        ('text.mcap', "text.mcap starts with b'no bag a', unlike an MCAP file"),
-    ],
-)
-def test_what_is_no_bag_is_answered_in_a_line(
-    linkage: Run, tmp_path: Path, name: str, said: str
-) -> None:
-    folder = tmp_path / 'bags'
-    folder.mkdir()
-    (tmp_path / 'empty.mcap').touch()
-    (tmp_path / 'text.mcap').write_text('no bag at all')
-    answer = linkage('recover', name if name != '.' else 'bags')
-    assert answer.returncode == 2
-    assert said.removeprefix('.') in answer.stderr
-    assert answer.stderr.count('\n') == 1
-    assert answer.stdout == ''

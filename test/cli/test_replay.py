@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from hypothesis import assume, example, given, strategies as st
-from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE, Storage
+from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE
 from linkage_ros.cli import replay
 from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
@@ -36,13 +36,15 @@ from linkage_ros.replay import (
 )
 import pytest
 
-from .conftest import json_keys, json_keys_of, Run
+from .conftest import json_keys, json_keys_of
 from .recorded import (
     answer,
     BEGIN,
+    Edit,
     JOINT_STATE,
     MS,
     Recorded,
+    rewritten,
     scene_file,
     topic,
 )
@@ -87,33 +89,6 @@ def recorded(folder: Path, text: str, ticks: int = TICKS, **options: Any) -> Pat
     scene = scene_file(folder, text, LINKAGE)
     crank = None if 'drive: {sine' in text else turning
     return Recorded(folder / 'bag', scene, crank, **options).run(ticks)
-
-
-Edit = Callable[[int, BagMessage], BagMessage | None]
-
-"""Makes of a message, by its number, what is written; nothing for none."""
-
-
-def rewritten(
-    bag_path: Path,
-    name: str,
-    edit: Edit,
-    storage: Storage | None = None,
-    custom: Mapping[str, str] | None = None,
-    **said: object,
-) -> Path:
-    """Write a bag once more with other messages, so that its checksums fit, and another run."""
-    bag = read_bag(bag_path)
-    files = {key: ('', data) for key, data in bag.attachments.items()}
-    account = json.loads(bag.attachments[RUN_FILE]) | said
-    files[RUN_FILE] = ('', json.dumps(account).encode())
-    numbers = {each.name: index for index, each in enumerate(bag.topics)}
-    writer = BagWriter(bag_path.with_name(name), bag.topics, files, storage)
-    for index, message in enumerate(bag.messages()):
-        if edited := edit(index, message):
-            writer.write(numbers[edited.topic], *edited[1:])
-    writer.close(custom)
-    return writer.folder
 
 
 def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[str, Any]]:
@@ -272,22 +247,12 @@ def test_what_the_recorder_dropped_is_no_difference(tmp_path, capsys):
 
 def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {dropout: {probability: 0.3}}\n')
-    scene = read_bag(bag).attachments['scene.yaml']
+    files = read_bag(bag).attachments
 
-    def without(name: str, data: bytes) -> Path:
-        found = read_bag(bag)
-        files = {key: ('', value) for key, value in found.attachments.items()}
-        files['scene.yaml'] = ('', data)
-        numbers = {each.name: index for index, each in enumerate(found.topics)}
-        writer = BagWriter(tmp_path / name, found.topics, files)
-        for message in found.messages():
-            writer.write(numbers[message.topic], *message[1:])
-        writer.close()
-        return writer.folder
-
-    other = scene.replace(b'0.3', b'0.0')
-    assert other != scene
-    code, account = told(capsys, without('never', other))
+    other = files['scene.yaml'].replace(b'0.3', b'0.0')
+    assert other != files['scene.yaml']
+    never = rewritten(bag, 'never', attachments={**files, 'scene.yaml': other})
+    code, account = told(capsys, never)
     assert code == 3
     assert account['first_difference']['what'] == 'withheld then, published now'
     withheld = [m for m in read_bag(bag).messages() if m.topic == '/linkage/withheld']
@@ -442,17 +407,6 @@ def test_a_wish_to_stop_is_heard(tmp_path, capsys):
     assert err == 'linkage replay: stopped; the rest of the bag was not replayed\n'
 
 
-def test_what_is_typed_is_answered_with_an_exit_code(linkage: Run, tmp_path: Path) -> None:
-    bag = recorded(tmp_path, '')
-    rewritten(bag, 'part', from_tick(31))
-    codes = {'bag': 0, 'part': 3, 'missing': 2}
-    for name, code in codes.items():
-        answered = linkage('replay', name)
-        assert answered.returncode == code
-        assert answered.stderr.count('\n') == (code == 2)
-    assert 'linkage replay: missing: does not exist' in answered.stderr
-
-
 def test_a_bag_that_does_not_say_what_ran_is_answered_with_what_is_missing(tmp_path):
     with BagWriterOf(tmp_path / 'foreign') as write:
         write(0)
@@ -469,13 +423,6 @@ def test_a_bag_of_no_joint_states_is_refused(tmp_path):
     )
     with pytest.raises(LinkageError, match='holds no joint states'):
         answer(replay, bag)
-
-
-@pytest.mark.parametrize('typed', [['-o', 'new'], ['--crank-topic', '/c']])
-def test_options_of_another_scene_need_one(tmp_path, typed):
-    bag = recorded(tmp_path, '')
-    with pytest.raises(LinkageError, match='name it with --scene'):
-        answer(replay, bag, *typed)
 
 
 class BagWriterOf:

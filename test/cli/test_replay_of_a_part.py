@@ -18,14 +18,10 @@ from linkage_ros.bag import BagMessage, read_bag, recover_bag, Storage
 from linkage_ros.cli import info, replay
 import pytest
 
-from .recorded import answer, BEGIN, MS
-from .test_replay import from_tick, NOISE, recorded, rewritten, told
+from .recorded import answer, BEGIN, MS, rewritten
+from .test_replay import from_tick, NOISE, recorded, told
 
 RING = Storage(split_seconds=0.1, keep_files=2)  # of 300 ticks at 1 kHz the last 100 to 200 stay
-
-
-def as_it_is(_number: int, message: BagMessage) -> BagMessage:
-    return message
 
 
 # Effects, exit code, verdict, and the part that cannot be reproduced.
@@ -59,7 +55,7 @@ RINGS = {
 def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
     effects, code, verdict, lost = RINGS[name]
     bag = recorded(tmp_path, f'effects: {{{effects}}}\n')
-    ring = rewritten(bag, 'ring', as_it_is, storage=RING)
+    ring = rewritten(bag, 'ring', storage=RING)
     gone = len(list(read_bag(bag).messages())) - len(list(read_bag(ring).messages()))
     assert gone > 100
     found, account = told(capsys, ring)
@@ -85,7 +81,7 @@ def test_a_difference_in_a_ring_is_found(tmp_path, capsys) -> None:
 
 def test_a_file_alone_that_is_not_the_first_says_so(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n')
-    split = rewritten(bag, 'split', as_it_is, storage=Storage(split_seconds=0.1))
+    split = rewritten(bag, 'split', storage=Storage(split_seconds=0.1))
     code, account = told(capsys, split)
     assert (code, account['beginning_missing']) == (0, None)
     code, account = told(capsys, split / 'split_1.mcap')
@@ -152,7 +148,7 @@ def facts(capsys: pytest.CaptureFixture[str], bag: Path) -> tuple[str, dict[str,
 
 def test_info_tells_what_was_let_go(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, '')
-    ring = rewritten(bag, 'ring', as_it_is, storage=RING)
+    ring = rewritten(bag, 'ring', storage=RING)
     text, account = facts(capsys, ring)
     gone = len(list(read_bag(bag).messages())) - account['messages']
     assert sum(topic['let_go'] for topic in account['topics']) == gone > 100
@@ -171,7 +167,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
         'linkage_ros.received': json.dumps(dict(zip(names, (305, 0, 300), strict=True))),
         'linkage_ros.dropped': json.dumps(dict(zip(names, (5, 0, 0), strict=True))),
     }
-    whole = rewritten(bag, 'whole', as_it_is, custom=custom)
+    whole = rewritten(bag, 'whole', custom=custom)
     text, account = facts(capsys, whole)
     counts = {each['name']: (each['received'], each['dropped']) for each in account['topics']}
     assert counts == {names[0]: (305, 5), names[1]: (0, 0), names[2]: (300, 0)}
@@ -188,7 +184,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
 )  # fmt: skip
 def test_counts_that_are_none_are_not_told(tmp_path, capsys, counts) -> None:
     custom = {f'linkage_ros.{word}': counts for word in ('received', 'dropped', 'let_go')}
-    bag = rewritten(recorded(tmp_path, ''), 'odd', as_it_is, custom=custom)
+    bag = rewritten(recorded(tmp_path, ''), 'odd', custom=custom)
     _, account = facts(capsys, bag)
     states = account['topics'][0]
     assert (states['received'], states['dropped'], states['let_go']) == (None, None, None)
@@ -204,7 +200,7 @@ def test_info_tells_that_a_bag_is_unfinished(tmp_path, capsys) -> None:
         ['unfinished', 'no']
     ]
     custom = {'linkage_ros.unfinished': 'being recorded, or killed'}
-    text, account = facts(capsys, rewritten(bag, 'killed', as_it_is, custom=custom))
+    text, account = facts(capsys, rewritten(bag, 'killed', custom=custom))
     assert account['truncated']
     assert account['unfinished'] == 'its recording was killed, or still runs'
     assert 'unfinished   its recording was killed, or still runs\n' in text

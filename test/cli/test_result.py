@@ -11,6 +11,8 @@
 from __future__ import annotations
 
 import csv
+import json
+from math import degrees, pi
 from pathlib import Path
 import xml.etree.ElementTree as ET
 from zipfile import ZipFile
@@ -107,3 +109,34 @@ def test_all_tables_of_a_command_are_sheets(
     assert sheets <= set(found) | {name.split(' ')[0] for name in found}
     for rows in found.values():
         assert all(len(row) == len(rows[0]) for row in rows)
+
+
+def test_values_in_sheets_are_numbers_in_the_units_of_the_file(
+    linkage: Run, tmp_path: Path
+) -> None:
+    """As the JSON of the same file has them, in SI."""
+    (tmp_path / 'l.yaml').write_text(
+        'units: mm\nangles: degrees\nlinks: {ground: {O2: [0, 0], O4: [100, 0]},\n'
+        ' crank: {O2: [0, 0], A: [40, 0]}, rocker: {O4: [0, 0], B: [80, 0]},\n'
+        ' coupler: {A: [0, 0], B: [120, 0], P: [60, 30]}}\nassembly: {B: left}\n'
+        'input: {joint: crank_joint, parent: ground, child: crank}\ntraced: [P]\n'
+        'joints: {rocker_joint: {parent: ground, child: rocker}}\n'
+    )
+    account = json.loads(linkage('check', 'l.yaml', '--branches', '--json').stdout)
+    answer = linkage('check', 'l.yaml', '--branches', '-o', 'x.xlsx')
+    assert answer.returncode == 0, answer.stderr
+    sheets = sheets_of(tmp_path / 'x.xlsx')
+    in_file = {'rad': ('deg', 180.0 / pi), 'm': ('mm', 1e3)}
+    heads, *rows = sheets['branches']
+    for row, branch in zip(rows, account['branches'], strict=True):
+        found = dict(zip(heads, row, strict=True))
+        unit, factor = in_file[branch['unit']]
+        assert found['unit'] == unit
+        for end in ('low', 'high'):
+            assert float(found[end]) == pytest.approx(branch[end] * factor, rel=1e-14)
+    assert {row['unit'] for row in account['branches']} == {'rad', 'm'}
+    heads, (*_, least, at, _, _) = sheets['transmission_angles']
+    assert heads[2:4] == ['least.angle [deg]', 'least.inputs [deg]']
+    (told,) = account['transmission_angles']
+    assert float(least) == pytest.approx(degrees(told['least']['angle_rad']), rel=1e-14)
+    assert float(at) == pytest.approx(degrees(told['least']['inputs'][0]), abs=1e-12)

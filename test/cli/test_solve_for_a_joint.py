@@ -13,7 +13,6 @@ from __future__ import annotations
 from cmath import phase, rect
 import csv
 import io
-import json
 from math import acos, radians, remainder, tau
 from pathlib import Path
 
@@ -110,68 +109,3 @@ def test_links_that_are_then_iterated_are_named(linkage: Run, tmp_path: Path) ->
     for k in range(2):
         off = float(row[f'motor{k} [rad]']) - pose.inputs[k]
         assert remainder(off, tau) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_table_and_json_hold_the_same(linkage: Run) -> None:
-    asked = ('four_bar', '--joint', 'rocker_joint=1.2', '--radians')
-    table = linkage('solve', *asked).stdout.splitlines()
-    assert table[0].split() == [
-        'branch', 'crank_joint', '[rad]', 'status',
-        'rocker_joint', '[rad]', 'coupler_joint', '[rad]',
-    ]  # fmt: skip
-    states = json.loads(linkage('solve', *asked, '--json').stdout)['states']
-    assert [state['branch'] for state in states] == [1, 2]
-    for line, state in zip(table[1:], states, strict=True):
-        assert float(line.split()[1]) == pytest.approx(state['crank_joint'], abs=1e-6)
-
-
-def limited(tmp_path: Path) -> str:
-    text = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text('utf-8')
-    free = 'child: crank}'
-    assert text.count(free) == 1
-    text = text.replace(free, 'child: crank, limits: [0.5, 3.0]}')
-    (tmp_path / 'limited.yaml').write_text(text, 'utf-8')
-    return 'limited.yaml'
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'line'),
-    [
-        ('four_bar --joint rocker_joint=200', 'rocker_joint goes from 54.900° to 128.682°'),
-        ('four_bar --joint rockr_joint=3', "did you mean 'rocker_joint'?"),
-        ('four_bar --joint crank_joint=30', 'is an input; write --at 30'),
-        ('four_bar --joint rocker_joint', 'write NAME=40'),
-        ('four_bar --joint rocker_joint=nan', 'write NAME=40'),
-        ('four_bar --joint =3', 'write NAME=40'),
-        ('four_bar --joint rocker_joint=90 --at 3', '--at is given too'),
-        ('four_bar --joint rocker_joint=90 --sweep', '--sweep is given too'),
-        ('four_bar --joint rocker_joint=90 --from 3', '--sweep is given too'),
-        ('four_bar --joint rocker_joint=90 --joint P.x=3', 'one joint at a time'),
-        ('four_bar --joint rocker_joint=90 --rate 1,2', '2 value(s) for 1 input(s)'),
-        ('five_bar --joint left_elbow=3', 'left_elbow: 1 for 2 inputs; name 2 different joints'),
-        ('five_bar --joint left_elbow=3 --joint elbow=3', 'elbow: is neither a published joint'),
-        ('five_bar --joint left_elbow=3 --joint right_elbow=3 --at 3,3', '--at is given too'),
-        ('peaucellier --joint P.x=3', 'does not move with the input'),
-        ('limited.yaml --joint rocker_joint=55', 'is reached only beyond limits: crank_joint at'),
-    ],
-)
-def test_what_cannot_be_answered_is_one_line(
-    linkage: Run, tmp_path: Path, arguments: str, line: str
-) -> None:
-    limited(tmp_path)
-    answer = linkage('solve', *arguments.split())
-    assert answer.returncode != 0
-    assert line in answer.stderr
-    assert len(answer.stderr.splitlines()) == 1
-
-
-def test_branches_are_listed_with_their_ends(linkage: Run, tmp_path: Path) -> None:
-    shown = linkage('check', 'four_bar', '--branches').stdout
-    assert 'rocker_joint        1           24.147°  231.318°' in shown
-    account = json.loads(linkage('check', limited(tmp_path), '--branches', '--json').stdout)
-    (rocker,) = (one for one in account['branches'] if one['joint'] == 'rocker_joint')
-    assert (rocker['input_low'], rocker['input_high']) == (0.5, 3.0)
-    assert rocker['limited_by'] == ['crank_joint', 'crank_joint']
-    assert rocker['rises']
-    refused = linkage('check', 'five_bar', '--branches')
-    assert refused.stderr == 'linkage check: --branches: there are 2 inputs; leave it out\n'

@@ -44,7 +44,7 @@ DRIVER = """
 import json, os, random, signal, sys, time
 from mcap.data_stream import RecordBuilder
 from linkage_ros.cli import main, simulate, replay, recover
-import linkage_ros.stages.drives.constant_rate, linkage_ros.stages.effects.derivatives
+import linkage_ros.stages.drives.steady_motion, linkage_ros.stages.effects.derivatives
 command, cases = json.loads(sys.argv[1])
 write = RecordBuilder.write
 for target, name, number, delay in cases:

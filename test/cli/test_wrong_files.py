@@ -10,12 +10,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 import shutil
 from threading import Event
 
-from linkage_ros.cli import module_of, parser_of
+from linkage_ros.cli import find_command, parser_of
 from linkage_ros.errors import LinkageError
 import pytest
 
@@ -67,7 +66,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def answer(command: str, *typed: str) -> str:
     """Return the one line for which a command refuses its file."""
-    module = import_module(module_of(command))
+    module = find_command(command)
     parser = parser_of(command, module)
     with pytest.raises(LinkageError) as refused:
         module.run(parser.parse_args(typed), Event())
@@ -156,6 +155,6 @@ def test_a_folder_that_is_not_there_is_named_before_the_work(
 
 @pytest.mark.parametrize('at', ['1e300', '-1e17', '1e15'])
 def test_a_large_number_is_written_short(capsys: pytest.CaptureFixture[str], at: str) -> None:
-    module = import_module(module_of('solve'))
+    module = find_command('solve')
     module.run(parser_of('solve', module).parse_args(['four_bar', f'--at={at}']), Event())
     assert max(map(len, capsys.readouterr().out.split())) < 30

@@ -39,14 +39,10 @@ def test_a_chapter_is_as_it_is_worked_out_now(name):
 @pytest.mark.parametrize(
     'value',
     [
-        '5.5965383934988620854',
-        '0.16985782027961906789',
-        '4.8786334643580194266',
-        '0.17868187970650492505',
-        '−0.20497543160512679448',
-        '1.0272224808848817759',
+        '5.5965383934988620854', '0.16985782027961906789', '4.8786334643580194266',
+        '0.17868187970650492505', '−0.20497543160512679448', '1.0272224808848817759',
     ],
-)
+)  # fmt: skip
 def test_the_example_is_that_of_the_sources(value):
     # 50 digits, rounded; worked out for sources/README.md by somebody else.
     assert f'| {value} |' in PAGE

@@ -17,8 +17,7 @@ from linkage_ros.bag import BagWriter, Topic
 from linkage_ros.description import load_scene
 from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.messages import CrankSample, JointStateWriter, Rejection
-from linkage_ros.stages.drives import BagParameters, CrankState, TopicDrive, TopicParameters
-from linkage_ros.stages.drives.bag import build
+from linkage_ros.stages.drives import BagDrive, CrankState, SampledCrank, TopicDrive
 from linkage_ros.tick import Pipeline
 from mcap.writer import IndexType, Writer
 import pytest
@@ -65,12 +64,8 @@ TIMELINES = {
         {},
         THREE,
         [
-            (0, (0.5, 2.0, 0)),
-            (50, (0.6, 2.0, 50)),
-            (99, (0.698, 2.0, 99)),
-            (100, (1.0, 4.0, 0)),
-            (125, (1.1, 4.0, 25)),
-            (150, (3.0, -1.0, 0)),
+            (0, (0.5, 2.0, 0)), (50, (0.6, 2.0, 50)), (99, (0.698, 2.0, 99)), (100, (1.0, 4.0, 0)),
+            (125, (1.1, 4.0, 25)), (150, (3.0, -1.0, 0)),
         ],
     ),
     'held as measured': (
@@ -82,14 +77,8 @@ TIMELINES = {
         {'max_age': 0.04},
         THREE,
         [
-            (40, (0.58, 2.0, 40)),
-            (41, SILENT),
-            (99, SILENT),
-            (140, (1.16, 4.0, 40)),
-            (141, SILENT),
-            (150, (3.0, -1.0, 0)),
-            (190, (2.96, -1.0, 40)),
-            (191, SILENT),
+            (40, (0.58, 2.0, 40)), (41, SILENT), (99, SILENT), (140, (1.16, 4.0, 40)),
+            (141, SILENT), (150, (3.0, -1.0, 0)), (190, (2.96, -1.0, 40)), (191, SILENT),
             (10_000, SILENT),
         ],
     ),
@@ -103,10 +92,7 @@ TIMELINES = {
         {'repeat': True, 'carry_forward': False},
         THREE,  # 150 ms, and 75 more
         [
-            (0, (0.5, 2.0, 0)),
-            (224, (3.0, -1.0, 74)),
-            (225, (0.5, 2.0, 0)),
-            (325, (1.0, 4.0, 0)),
+            (0, (0.5, 2.0, 0)), (224, (3.0, -1.0, 74)), (225, (0.5, 2.0, 0)), (325, (1.0, 4.0, 0)),
             (2_250_000_101, (1.0, 4.0, 1)),
         ],
     ),
@@ -114,10 +100,7 @@ TIMELINES = {
         {'pace': 'fast'},
         THREE,
         [
-            (0, (0.5, 2.0, 0)),
-            (1, (1.0, 4.0, 0)),
-            (9999, (3.0, -1.0, 0)),
-            (10_000, SILENT),
+            (0, (0.5, 2.0, 0)), (1, (1.0, 4.0, 0)), (9999, (3.0, -1.0, 0)), (10_000, SILENT),
             (10_001, SILENT),
         ],
     ),
@@ -126,14 +109,14 @@ TIMELINES = {
         TWO,
         [(0, (0.5, 2.0, 0)), (1, (1.0, 4.0, 0)), (2, (0.5, 2.0, 0)), (3, (1.0, 4.0, 0))],
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('begin', [BEGIN, 0, 1])
 @pytest.mark.parametrize('name', TIMELINES)
 def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, begin):
     parameters, messages, steps = TIMELINES[name]
-    drive = build(BagParameters(write(tmp_path / 'bag', messages), **parameters), one_input())
+    drive = BagDrive(write(tmp_path / 'bag', messages), **parameters).build(one_input())
     if steps[0][0]:
         drive.state(begin)
     for time, expected in steps:
@@ -148,14 +131,14 @@ def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, 
 
 def test_it_says_when_the_newest_sample_was_taken_and_for_how_long_it_is_good(tmp_path):
     file = write(tmp_path / 'bag', THREE)
-    drive = build(BagParameters(file, max_age=0.3), one_input())
+    drive = BagDrive(file, max_age=0.3).build(one_input())
     assert drive.max_age == 300 * MS
     stamps = [drive.stamp]
     for time in (0, 120, 160, 1000):
         drive.state(BEGIN + time * MS)
         stamps.append(drive.stamp)
     assert stamps == [0, BEGIN, BEGIN + 100 * MS, BEGIN + 150 * MS, BEGIN + 150 * MS]
-    fast = build(BagParameters(file, pace='fast'), one_input())
+    fast = BagDrive(file, pace='fast').build(one_input())
     fast.state(BEGIN)
     assert (fast.stamp, fast.max_age) == (0, 0)
 
@@ -168,11 +151,9 @@ def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, c
     values = [(0.1 * index, 3.0 - index) for index in range(len(taken))]
     folder = tmp_path_factory.mktemp('bag') / 'bag'
     samples = [sample(t, *v) for t, v in zip(taken, values, strict=True)]
-    drive = build(
-        BagParameters(write(folder, crank(*samples)), carry_forward=carry_forward, max_age=0.05),
-        one_input(),
-    )
-    topic = TopicDrive(TopicParameters(carry_forward, max_age=0.05), needs_rate=True)
+    bag = write(folder, crank(*samples))
+    drive = BagDrive(bag, carry_forward=carry_forward, max_age=0.05).build(one_input())
+    topic = SampledCrank(TopicDrive(carry_forward, max_age=0.05), needs_rate=True)
     offers = [(BEGIN + (t - taken[0]) * MS, *v) for t, v in zip(taken, values, strict=True)]
     for tick in [0, *ticks]:
         now = BEGIN + tick * MS
@@ -187,8 +168,8 @@ def test_by_arrival_samples_are_as_far_apart_as_they_were_recorded(tmp_path):
     samples = [CRANK.write(0, (7.0, angle), (9.0, 0.0)) for angle in angles]
     file = write(tmp_path / 'bag', crank(*samples))
     with pytest.raises(BagError, match='stamp zero'):
-        build(BagParameters(file), one_input())
-    drive = build(BagParameters(file, stamp='arrival'), one_input())
+        BagDrive(file).build(one_input())
+    drive = BagDrive(file, stamp='arrival').build(one_input())
     assert [drive.state(BEGIN + n * MS).angles[0] for n in range(3)] == [*angles]
 
 
@@ -199,9 +180,9 @@ def test_several_inputs_are_read_from_one_message(tmp_path):
         both.write(RECORDED + 10 * MS, (4.0, 5.0, 6.0), (40.0, 50.0, 60.0)),
     )
     file = write(tmp_path / 'bag', messages)
-    drive = build(BagParameters(file), two_inputs())
+    drive = BagDrive(file).build(two_inputs())
     assert drive.state(BEGIN) == CrankState((3.0, 1.0), (30.0, 10.0), (0.0, 0.0), 0)
-    fast = build(BagParameters(file, pace='fast'), two_inputs())
+    fast = BagDrive(file, pace='fast').build(two_inputs())
     states = [fast.state(0), fast.state(0), fast.state(0)]
     assert states[1:] == [CrankState((6.0, 4.0), (60.0, 40.0), (0.0, 0.0), 0), None]
 
@@ -218,7 +199,7 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         (sample(-1, 0.5), Rejection.STAMP_OLD),
     ]
     messages = [bad[3][0], sample(0, 0.1), *(message for message, _ in bad), sample(50, 0.2)]
-    drive = build(BagParameters(write(tmp_path / 'bag', crank(*messages))), one_input())
+    drive = BagDrive(write(tmp_path / 'bag', crank(*messages))).build(one_input())
     reasons = [reason for _, reason in bad]
     assert drive.samples.rejected == {
         reason: reasons.count(reason) + (reason is Rejection.MISSING) for reason in reasons
@@ -246,8 +227,8 @@ def test_absent_rates_are_those_that_the_topic_would_have(
 ):
     samples = [sample(0, 0.5, rate), sample(10, 0.6, rate), sample(20, 0.65, rate)]
     file = write(tmp_path / 'bag', crank(*samples))
-    parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
-    drive = build(parameters, one_input(needs_rate=needs_rate))
+    parameters = BagDrive(file, pace=pace, carry_forward=carry_forward)
+    drive = parameters.build(one_input(needs_rate=needs_rate))
     expected = [(0.6, 10.0), (0.65, 5.0)] if differenced else [(0.5, 0.0), (0.6, 0.0), (0.65, 0.0)]
     for index, (angle, speed) in enumerate(expected):
         state = drive.state(BEGIN + 10 * index * MS)
@@ -285,7 +266,7 @@ RUN = json.dumps({'scene': 's', 'crank_topic': '/b/crank'}).encode()
 )
 def test_the_topic_that_is_taken(tmp_path, messages, run, topic, angle):
     file = write(tmp_path / 'bag', messages, run=run)
-    drive = build(BagParameters(file, topic=topic), one_input())
+    drive = BagDrive(file, topic=topic).build(one_input())
     assert drive.state(BEGIN).angles == (angle,)
 
 
@@ -304,7 +285,7 @@ STRING = {'/text': 'std_msgs/msg/String'}
 def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
     file = write(tmp_path / 'bag', messages, STRING)
     with pytest.raises(BagError) as caught:
-        build(BagParameters(file, **parameters), one_input())
+        BagDrive(file, **parameters).build(one_input())
     assert str(caught.value).startswith(f'{file}: ')
     assert said in str(caught.value)
     assert '\n' not in str(caught.value)
@@ -315,7 +296,7 @@ def test_what_is_no_bag_says_so(tmp_path):
     file.write_text('time, angle\n')
     for path, said in ((file, 'not an MCAP file'), (tmp_path / 'none', 'does not exist')):
         with pytest.raises(BagError, match=said):
-            build(BagParameters(str(path)), one_input())
+            BagDrive(str(path)).build(one_input())
 
 
 def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path):
@@ -325,8 +306,8 @@ def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path)
     file = folder / 'bag_0.mcap'
     file.write_bytes(file.read_bytes()[:1_500_000])
     with pytest.raises(BagError, match='its recording was killed'):
-        build(BagParameters(str(folder)), one_input())
-    drive = build(BagParameters(str(folder), allow_truncated=True), one_input())
+        BagDrive(str(folder)).build(one_input())
+    drive = BagDrive(str(folder), allow_truncated=True).build(one_input())
     drive.state(BEGIN)
     assert drive.state(BEGIN + 5000 * MS).angles == (5.0,)
     assert 5000 < len(drive.samples) < 20_000
@@ -335,9 +316,9 @@ def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path)
 def test_one_instant_cannot_repeat(tmp_path):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5), sample(0, 0.6)))
     with pytest.raises(DefinitionError, match='have the same time; leave repeat out') as caught:
-        build(BagParameters(file, repeat=True), one_input())
+        BagDrive(file, repeat=True).build(one_input())
     assert caught.value.where == 'drive.bag.repeat'
-    fast = build(BagParameters(file, repeat=True, pace='fast'), one_input())
+    fast = BagDrive(file, repeat=True, pace='fast').build(one_input())
     assert [fast.state(0).angles for _ in range(3)] == [(0.5,), (0.6,), (0.5,)]
 
 
@@ -358,14 +339,10 @@ LAYOUTS = {
     'with an index': {'chunk_size': 256},
     'of one chunk': {},
     'without chunks': {'use_chunking': False},
-    'without an index': {
-        'index_types': IndexType.NONE,
-        'repeat_channels': False,
-        'repeat_schemas': False,
-        'use_statistics': False,
-        'use_summary_offsets': False,
-    },
-}
+    'without an index': {'index_types': IndexType.NONE, 'repeat_channels': False,
+                         'repeat_schemas': False, 'use_statistics': False,
+                         'use_summary_offsets': False},
+}  # fmt: skip
 
 TIMES = [*range(0, 8000, 200)]
 """When messages were taken, in [ms]: they span more than any window of seconds."""
@@ -391,6 +368,6 @@ def test_the_order_is_that_of_log_times_whatever_that_of_the_file(tmp_path, orde
             at = RECORDED + time * MS
             writer.add_message(channel, at, sample(time, time * 1e-3), at)
         writer.finish()
-    drive = build(BagParameters(str(file)), one_input())
+    drive = BagDrive(str(file)).build(one_input())
     states = [drive.state(BEGIN + time * MS) for time in TIMES]
     assert [state and state.angles for state in states] == [(time * 1e-3,) for time in TIMES]

@@ -15,8 +15,7 @@ The integral is mpmath's, by quadrature; so are the derivatives of the position.
 from dataclasses import replace
 from math import hypot, log2, tau
 
-from linkage_ros.stages.drives import Chirp, ChirpParameters, CrankState
-from linkage_ros.stages.drives.chirp import build, motion_curve
+from linkage_ros.stages.drives import Chirp, ChirpDrive, CrankState
 from mpmath import mp
 import pytest
 
@@ -85,7 +84,7 @@ def check(parameters, time):
         # A double's roundings of what the sine is taken of; the linear sweep's is below a period.
         rounding = 16e-16 * (1 if parameters.sweep == 'linear' else 1 + passed) * 2 * mp.pi
         w = 2 * mp.pi * max(parameters.start_frequency, parameters.end_frequency)
-        found = motion_curve(parameters)(time)
+        found = parameters.motion_curve()(time)
         assert abs(found[0] - position(t)) <= A * rounding + 1e-16
         if time:
             # One step of each is exact to 1e-12 and better, as mpmath chooses it.
@@ -109,7 +108,7 @@ def test_repeated_it_sweeps_back_and_there_again(name, part):
 
 @pytest.mark.parametrize('name', ALL)
 def test_at_the_end_it_rests_where_it_is(name):
-    chirp = motion_curve(ALL[name])
+    chirp = ALL[name].motion_curve()
     end = round(ALL[name].seconds * SECOND)
     before, rate, _ = chirp(end - 1)
     rest, *still = chirp(end)
@@ -122,7 +121,7 @@ def test_at_the_end_it_rests_where_it_is(name):
 @pytest.mark.parametrize('name', ALL)
 def test_where_it_turns_neither_position_nor_rate_jumps(name, turn):
     parameters = repeated(ALL[name])
-    chirp = motion_curve(parameters)
+    chirp = parameters.motion_curve()
     end = turn * round(parameters.seconds * SECOND)
     w = 6.3 * max(parameters.start_frequency, parameters.end_frequency)
     before, at, after = (chirp(end + step) for step in (-1, 0, 1))
@@ -139,13 +138,13 @@ def test_it_sweeps_from_the_first_frequency_to_the_last(name):
     parameters = repeated(ALL[name])
     end = round(parameters.seconds * SECOND)
     for time, f in ((0, parameters.start_frequency), (end, parameters.end_frequency)):
-        value, rate, _ = motion_curve(parameters)(time)
+        value, rate, _ = parameters.motion_curve()(time)
         swing = hypot(value - parameters.mean, rate / (tau * f))
         assert swing == pytest.approx(parameters.amplitude, rel=1e-12)
 
 
 def test_the_first_tick_is_time_zero_and_at_the_end_it_rests():
-    drive = build(ChirpParameters(0.5, 2.0, 2.0, seconds=1.0, mean=0.1), one_input())
+    drive = ChirpDrive(0.5, 2.0, 2.0, seconds=1.0, mean=0.1).build(one_input())
     assert (drive.stamp, drive.max_age) == (0, 0)
     begin = 1_700_000_000_000_000_000
     rate = pytest.approx(float(2 * mp.pi))

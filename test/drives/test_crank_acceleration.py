@@ -13,7 +13,7 @@ from math import cos, exp, pi, sin
 from hypothesis import given, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.messages import CrankSample, Rejection
-from linkage_ros.stages.drives import TopicDrive, TopicParameters
+from linkage_ros.stages.drives import SampledCrank, TopicDrive
 import pytest
 
 from ..support.messages import joint_state as serialized, read_joint_state
@@ -21,12 +21,12 @@ from ..support.scenes import PENDULUM, pipeline_of
 
 MS = 1_000_000
 NOW = 10_000 * MS
-DIFFERENCED = TopicParameters(acceleration='differenced')
+DIFFERENCED = TopicDrive(acceleration='differenced')
 
 
 def fed(parameters, samples):
     """Return a drive that has taken samples: pairs of a time in [ms] and a rate."""
-    drive = TopicDrive(parameters, needs_rate=False)
+    drive = SampledCrank(parameters, needs_rate=False)
     for time, rate in samples:
         stamp = round(time * MS)
         assert drive.offer(CrankSample(stamp, (0.0,), (rate,)), stamp) is None
@@ -40,7 +40,7 @@ def acceleration(drive, time):
 @given(st.lists(st.integers(1, 150), min_size=2, max_size=8), st.integers(0, 190))
 def test_a_crank_at_constant_acceleration_is_where_it_is_at_any_time(gaps, after):
     # q = 0.3 + 2·t − 3·t²/2, at irregular samples, and between two of them.
-    drive = TopicDrive(DIFFERENCED, needs_rate=False)
+    drive = SampledCrank(DIFFERENCED, needs_rate=False)
     time = 0
     for gap in gaps:
         time += gap
@@ -65,7 +65,7 @@ def test_a_difference_lags_by_half_an_interval():
 
 def test_the_low_pass_answers_a_step_by_an_exponential():
     # From 1 s on the crank accelerates by 4 rad/s²; samples come at irregular times.
-    filtered = TopicParameters(acceleration='differenced', cutoff=7.0)
+    filtered = TopicDrive(acceleration='differenced', cutoff=7.0)
     times = [800, 900, 1000, 1007, 1019, 1020, 1051, 1113]
     for count in range(3, len(times) + 1):
         samples = [(time, max(0.0, 4e-3 * (time - 1000))) for time in times[:count]]

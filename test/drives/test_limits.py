@@ -12,8 +12,7 @@ from hypothesis import given, settings, strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Status
 from linkage_ros.messages import EffortCommand
-from linkage_ros.stages.drives import ProfileParameters, value_range
-from linkage_ros.stages.drives.profile import motion_curve
+from linkage_ros.stages.drives import ProfileDrive
 import pytest
 
 from ..support.scenes import four_bar_text, pipeline_of, symmetric_five_bar
@@ -45,11 +44,8 @@ DRIVES = {
     ),
     'at rest beyond': ('constant_rate: {rate: 0, start: 2}', OWN, ' from 2 rad to 2 rad, beyond'),
     'a sine to the limits': ('sine: {amplitude: 0.5, mean: 1, frequency: 1}', OWN, ''),
-    'a sine to limits in tenths': (
-        'sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
-        ', input: {limits: [0.1, 0.8]}',
-        '',
-    ),
+    'a sine to limits in tenths': ('sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
+                                   ', input: {limits: [0.1, 0.8]}', ''),
     'a sine beyond': (
         'sine: {amplitude: 0.51, mean: 1, frequency: 1}',
         OWN,
@@ -60,27 +56,17 @@ DRIVES = {
         OWN,
         "takes 'crank_joint' from 0.4 rad to 1.6 rad",
     ),
-    'a chirp that ends on its way up': (
-        CHIRP,
-        OWN,
-        '',
-    ),
-    'the same, there and back': (
-        f'{CHIRP[:-1]}, repeat: true}}',
-        OWN,
-        "takes 'crank_joint' from 0.4 rad to 1.6 rad",
-    ),
+    'a chirp that ends on its way up': (CHIRP, OWN, ''),
+    'the same, there and back': (f'{CHIRP[:-1]}, repeat: true}}', OWN,
+                                 "takes 'crank_joint' from 0.4 rad to 1.6 rad"),
     'rows within': ('profile: {table: [[0, 1], [1, 1.5]], interpolation: linear}', OWN, ''),
     'a spline that swings beyond its rows': (
         'profile: {table: [[0, 1], [1, 1.5], [2, 1.49], [3, 1]]}',
         OWN,
         "drive.profile: takes 'crank_joint' from 1 rad to 1.61884 rad, beyond its limits",
     ),
-    'rows that gain': (
-        'profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
-        OWN,
-        "takes 'crank_joint' from 1 rad to inf rad",
-    ),
+    'rows that gain': ('profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
+                       OWN, "takes 'crank_joint' from 1 rad to inf rad"),
     'a joint that follows': (
         'constant_rate: {rate: 1, start: 2}',
         PUBLISHED,
@@ -119,10 +105,10 @@ def test_what_is_refused_when_the_scene_is_built(name):
 )
 def test_between_which_values_a_table_stays(values, interpolation, repeat):
     table = tuple((float(2 * i), value) for i, value in enumerate(values))
-    parameters = ProfileParameters(table, interpolation, repeat)
-    low, high = value_range(parameters)
+    parameters = ProfileDrive(table, interpolation, repeat)
+    low, high = parameters.value_range()
     seen = [
-        motion_curve(parameters)(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)
+        parameters.motion_curve()(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)
     ]
     if not repeat or values[0] == values[-1]:
         assert low == pytest.approx(min(seen), abs=1e-4)

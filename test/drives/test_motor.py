@@ -21,8 +21,7 @@ from linkage_ros.dynamics import AppliedLoads, JointLoad, Loads, Motor
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import EffortCommand
-from linkage_ros.stages.drives import Context, MotorParameters, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, MotorParameters, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -49,7 +48,7 @@ def drive(motor, closure=WHEEL, loads=None, **parameters):
     parameters = {'timeout': 3600.0, 'method': 'gauss_legendre', **parameters}
     loads = loads or Loads(drive_inertia=INERTIA)
     context = Context(closure, 1000.0, True, 'seed', loads, None)
-    return build(TorqueParameters(motor=motor, **parameters), context)
+    return TorqueDrive(motor=motor, **parameters).build(context)
 
 
 def under(built, command, milliseconds=2000, every=50):
@@ -86,27 +85,21 @@ RUN_UPS = {
     'a voltage against the motion': ({}, -3.0, 5.0, lambda t: run_up(t, -3.0, 5.0)),
     'no voltage: its winding is short-circuited': ({}, 0.0, 5.0, lambda t: run_up(t, 0.0, 5.0)),
     'a voltage above that of the supply': ({'voltage': 9.0}, 12.0, 0.0, lambda t: run_up(t, 9.0)),
-    'a voltage, while the current is limited': (
-        {'current': 4.0}, 12.0, 0.0, lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'a voltage, while the torque is limited': (
-        {'torque': 4.0 * CONSTANT}, 12.0, 0.0, lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'a current, until the supply gives no more': (
-        {'command': 'current', 'voltage': 12.0}, 4.0, 0.0,
-        lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
+    'a voltage, while the current is limited': ({'current': 4.0}, 12.0, 0.0,
+                                                lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'a voltage, while the torque is limited': ({'torque': 4.0 * CONSTANT}, 12.0, 0.0,
+                                               lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'a current, until the supply gives no more': ({'command': 'current', 'voltage': 12.0}, 4.0,
+                                                  0.0,
+                                                  lambda t: constant_then_run_up(t, 4.0, 12.0)),
     'a current above its limit, and the supply': (
         {'command': 'current', 'voltage': 12.0, 'current': 4.0}, 40.0, 0.0,
         lambda t: constant_then_run_up(t, 4.0, 12.0),
     ),
-    'an effort, until the supply gives no more': (
-        {'command': 'effort', 'voltage': 12.0}, 4.0, 0.0,
-        lambda t: constant_then_run_up(t, 4.0, 12.0),
-    ),
-    'an effort, with the losses of the gear': (
-        {'command': 'effort', **LOSSES}, 1.0, 0.0, lambda t: (t * t, 2.0 * t),
-    ),
+    'an effort, until the supply gives no more': ({'command': 'effort', 'voltage': 12.0}, 4.0, 0.0,
+                                                  lambda t: constant_then_run_up(t, 4.0, 12.0)),
+    'an effort, with the losses of the gear': ({'command': 'effort', **LOSSES}, 1.0, 0.0,
+                                               lambda t: (t * t, 2.0 * t)),
     'an effort that brakes, with more than the gear would drive': (
         {'command': 'effort', **LOSSES}, -1.0, 12.0,
         lambda t: (12.0 * t - 2.5 * t * t, 12.0 - 5.0 * t),

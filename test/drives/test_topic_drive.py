@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 from linkage_ros.description import parse_scene
 from linkage_ros.kinematics import Input
 from linkage_ros.messages import CrankSample, Rejection
-from linkage_ros.stages.drives import CrankState, TopicDrive, TopicParameters
+from linkage_ros.stages.drives import CrankState, SampledCrank, TopicDrive
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -33,8 +33,8 @@ from ..support.scenes import FOUR_BAR, pipeline_of
 MS = 1_000_000
 SECOND = 1000 * MS
 NOW = 10 * SECOND
-CARRIED = TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1)
-HELD = TopicParameters(carry_forward=False, max_age=0.2, max_lead=0.1)
+CARRIED = TopicDrive(carry_forward=True, max_age=0.2, max_lead=0.1)
+HELD = TopicDrive(carry_forward=False, max_age=0.2, max_lead=0.1)
 SILENT = None
 GOOD = None
 
@@ -96,7 +96,7 @@ TIMELINES = {
 @pytest.mark.parametrize('name', TIMELINES)
 def test_samples_turn_the_crank_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
-    drive = TopicDrive(parameters, needs_rate=False)
+    drive = SampledCrank(parameters, needs_rate=False)
     for time, offered, expected in steps:
         if offered is not None:
             assert drive.offer(offered, time * MS) is expected
@@ -125,7 +125,7 @@ def test_samples_turn_the_crank_as_the_timeline_says(name):
     ],
 )
 def test_a_bad_sample_changes_nothing(bad, reason):
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     assert drive.offer(CrankSample(NOW - 10 * MS, (0.5,), (2.0,)), NOW) is GOOD
     before = drive.state(NOW)
     assert drive.offer(bad, NOW) is reason
@@ -137,7 +137,7 @@ def test_a_bad_sample_changes_nothing(bad, reason):
 
 @pytest.mark.parametrize('angle', [1e10, -1e10])
 def test_the_largest_numbers_are_good(angle):
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     assert drive.offer(CrankSample(NOW, (angle,), (angle,)), NOW) is GOOD
     assert drive.state(NOW) == CrankState((angle,), (angle,), (0.0,), 0)
 
@@ -149,7 +149,7 @@ ABSENT = {'no velocities': None, 'a velocity that is NaN': (nan,)}
 @pytest.mark.parametrize('rates', ABSENT.values(), ids=ABSENT)
 @pytest.mark.parametrize('needs_rate', [True, False])
 def test_where_nobody_needs_a_rate_an_absent_one_is_0(rates, needs_rate):
-    drive = TopicDrive(CARRIED if needs_rate else HELD, needs_rate=False)
+    drive = SampledCrank(CARRIED if needs_rate else HELD, needs_rate=False)
     assert drive.offer(CrankSample(NOW, (0.5,), rates), NOW) is GOOD
     expected = None if needs_rate else CrankState((0.5,), (0.0,), (0.0,), 0)
     assert drive.state(NOW) == expected
@@ -176,7 +176,7 @@ ABSENT_RATES = {
 @pytest.mark.parametrize('name', ABSENT_RATES)
 def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(name, as_nan):
     steps, expected = ABSENT_RATES[name]
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     for time, angle, rate in steps:
         rates = ((nan,) if as_nan else None) if rate is None else (rate,)
         now = NOW + time * MS
@@ -191,7 +191,7 @@ def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(na
 
 def test_of_several_inputs_only_the_absent_rate_is_differenced_and_a_slide_has_no_turns():
     slide = (Input('crank', 'ground', 'crank'), Input('slide', slider='s'), Input('c', 'a', 'b'))
-    drive = TopicDrive(CARRIED, needs_rate=True, inputs=slide)
+    drive = SampledCrank(CARRIED, needs_rate=True, inputs=slide)
     assert drive.offer(CrankSample(NOW, (3.1, 0.0, 1.0), (nan, nan, 9.0)), NOW) is GOOD
     now = NOW + 10 * MS
     assert drive.offer(CrankSample(now, (-3.1, 5.0, 2.0), (nan, nan, 8.0)), now) is GOOD
@@ -232,7 +232,7 @@ samples = st.builds(
 
 @given(st.lists(samples, max_size=20))
 def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
-    drive = TopicDrive(HELD, needs_rate=True)
+    drive = SampledCrank(HELD, needs_rate=True)
     good = None
     for each in offered:
         if drive.offer(each, NOW) is GOOD:
@@ -246,7 +246,7 @@ def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
 
 
 def test_of_several_inputs_each_is_carried_by_its_own_rate():
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     assert drive.offer(CrankSample(NOW, (1.0, -2.0, 0.5), (10.0, 0.0, -3.0)), NOW) is GOOD
     angles, rates, accelerations, age = drive.state(NOW + 100 * MS)
     assert angles == pytest.approx((2.0, -2.0, 0.2))
@@ -263,7 +263,7 @@ def test_of_several_inputs_each_is_carried_by_its_own_rate():
 def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place):
     if isnan(bad) and place > 1:
         bad = inf  # a rate that is NaN is absent
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     values = [0.1, 0.2, 0.3, 0.4]
     values[place] = bad
     sample = CrankSample(NOW, tuple(values[:2]), tuple(values[2:]))
@@ -379,7 +379,7 @@ def test_all_that_the_scene_publishes_is_a_state(interface):
 )
 def test_the_greatest_jump_between_samples_is_kept(angles, jump):
     """A crank in degrees, when it is wrapped, jumps by 360 rad."""
-    drive = TopicDrive(CARRIED, needs_rate=True)
+    drive = SampledCrank(CARRIED, needs_rate=True)
     for index, angle in enumerate(angles):
         assert drive.offer(sample(1000 + index, angle), NOW) is GOOD
     assert drive.jump == pytest.approx(jump)

@@ -19,11 +19,10 @@ import random
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros.dynamics import Friction, JointFriction, Loads
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Mass, Status
 from linkage_ros.messages import EffortCommand, Rejection
-from linkage_ros.stages.drives import Context, reader, TOPIC, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 
 from .contexts import two_inputs
@@ -48,7 +47,7 @@ DOUBLE_ROCKER = four_bar(dict.fromkeys(('crank', 'coupler', 'rocker'), ROD), 0.0
 
 def drive(closure, loads=None, friction=None, **parameters):
     context = Context(closure, 1000.0, True, 'seed', loads, friction)
-    return build(TorqueParameters(**parameters), context)
+    return TorqueDrive(**parameters).build(context)
 
 
 def wheel(**parameters):
@@ -181,7 +180,7 @@ def test_it_tells_what_time_was_lost():
 
 def test_slow_ticks_lose_no_time():
     context = Context(WHEEL, 0.25, True, 'seed', MOTOR, None)
-    turned = build(TorqueParameters(rate=1.0, step=0.01), context)
+    turned = TorqueDrive(rate=1.0, step=0.01).build(context)
     for second in range(0, 13, 4):
         assert turned.state(BEGIN + second * SECOND).angles == pytest.approx((second,))
     assert turned.lost == 0
@@ -231,11 +230,6 @@ def test_the_motion_does_not_depend_on_when_it_is_looked_at(method):
     odd = driven([*range(BEGIN, BEGIN + SECOND, 777_777), *slow], method)
     assert all(fast[time] == odd[time] == state for time, state in slow.items())
     assert len(set(slow.values())) > 100
-
-
-def test_the_same_calls_give_the_same_bits():
-    when = range(BEGIN, BEGIN + SECOND, 1_234_567)
-    assert driven(when) == driven(when)
 
 
 def test_a_cylinder_gives_the_bucket_its_work():
@@ -348,7 +342,7 @@ def test_what_cannot_be_built_is_said_in_one_line(context, parameters, line):
     if isinstance(context, Closure):
         context = Context(context, 1000.0, True, 'seed', None, None)
     with pytest.raises(DefinitionError) as raised:
-        build(TorqueParameters(**parameters), context)
+        TorqueDrive(**parameters).build(context)
     assert str(raised.value).startswith(line)
 
 
@@ -367,7 +361,7 @@ def scene(drive_text, effects=''):
 
 def test_a_scene_is_driven_by_commands():
     pipeline = scene('{start: 0.5, rate: 0}')
-    assert pipeline.topic == TOPIC
+    assert pipeline.topic == TorqueDrive.listens_to
     first = pipeline.tick(BEGIN).states[0].reading
     assert first.joints[0] == 0.5, 'the input is published first'
     message = serialized(['other', 'crank_joint'], efforts=[9.0, 0.02])
@@ -380,32 +374,10 @@ def test_a_scene_is_driven_by_commands():
     assert pipeline.newest_stamp == BEGIN
 
 
-def test_two_runs_of_a_scene_give_the_same_bytes():
-    def messages():
-        pipeline = scene('{start: 0.5, method: gauss_legendre}')
-        for k in range(100):
-            now = BEGIN + k * MS
-            if k % 7 == 0:
-                pipeline.offer(serialized(['crank_joint'], efforts=[0.001 * k]), now)
-            yield pipeline.tick(now).message
-
-    first = list(messages())
-    assert first == list(messages())
-    assert len(set(first)) == 100
-
-
-def test_what_is_wrong_in_a_scene_has_its_line():
-    with pytest.raises(FileError, match=r'scene\.yaml:2: drive\.torque\.brake: the brake is 0'):
-        scene('{on_timeout: brake}')
-    with pytest.raises(FileError, match='gauss_legendre'):
-        scene('{method: gauss_legender}')
-
-
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
     assert (
-        reader(TorqueParameters(), context)(serialized(['left/left_crank'], efforts=[2.0])).effort
-        == 2.0
+        TorqueDrive().reader(context)(serialized(['left/left_crank'], efforts=[2.0])).effort == 2.0
     )
 
 

@@ -98,22 +98,13 @@ def test_without_a_command_there_is_no_current():
     assert pulls[150] == pulls[300] == 0.0
 
 
-@pytest.mark.parametrize(
-    ('motor', 'more', 'told'),
-    [
-        ({'command': 'current'}, {}, 'motor.inductance: the current is commanded, and without a'),
-        (
-            {'resistance': 0.01},
-            {},
-            r'motor: its current and its rate change too fast for a step of 0',
-        ),
-        (
-            {},
-            {'step': 0.01},
-            r'inductance: the current changes within 0\.00125 s, and a step is 0\.01 s',
-        ),
-    ],
-)
+@pytest.mark.parametrize(('motor', 'more', 'told'), [
+    ({'command': 'current'}, {}, 'motor.inductance: the current is commanded, and without a'),
+    ({'resistance': 0.01}, {},
+     r'motor: its current and its rate change too fast for a step of 0'),
+    ({}, {'step': 0.01},
+     r'inductance: the current changes within 0\.00125 s, and a step is 0\.01 s'),
+])  # fmt: skip
 def test_refused(motor, more, told):
     with pytest.raises(DefinitionError, match=told):
         drive({'inductance': 1e-3, **motor}, loads=Loads(drive_inertia=1e-4), **more)

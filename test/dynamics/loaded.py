@@ -16,8 +16,7 @@ import random
 from linkage_ros.description import parse_yaml, read_linkage, read_yaml
 from linkage_ros.dynamics import AppliedLoads, JointLoad, JointSpring, Loads, PointLoad, Spring
 from linkage_ros.kinematics import Closure, GROUND, Input, Linkage, Mass, SlideJoint, Slider
-from linkage_ros.stages.drives import Context, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, TorqueDrive
 
 from ..support.scenes import closure_of, PENDULUM
 
@@ -176,7 +175,7 @@ def swing(linkage=PENDULUM, friction=None, gravity=(0.0, 0.0), applied=None, **p
     """Return a function that gives value, rate and acceleration of a crank after some seconds."""
     loads = Loads(gravity, applied=AppliedLoads(**(applied or {})))
     context = Context(closure_of(linkage), 1000.0, True, 'seed', loads, friction)
-    drive = build(TorqueParameters(**parameters), context)
+    drive = TorqueDrive(**parameters).build(context)
     drive.state(BEGIN)
 
     def after(seconds):

@@ -46,10 +46,8 @@ WAVE = sqrt(4.0 / INERTIA)
 DECAY = 0.5 * 0.3 / INERTIA
 SLOWER = sqrt(4.0 / INERTIA - DECAY**2)
 CLOSED_FORMS = {
-    'a constant effort': (
-        {'efforts': {'crank_joint': JointLoad(0.5)}}, 0.2, 1.0,
-        lambda t: 0.2 + t + 0.25 / INERTIA * t * t,
-    ),
+    'a constant effort': ({'efforts': {'crank_joint': JointLoad(0.5)}}, 0.2, 1.0,
+                          lambda t: 0.2 + t + 0.25 / INERTIA * t * t),
     'an effort that grows with the time': (
         {'efforts': {'drive_joint': JointLoad(over_time=((0.0, 0.0), (2.0, 1.0)))}}, 0.0, 0.0,
         lambda t: t**3 / 12.0 / INERTIA,
@@ -64,10 +62,8 @@ CLOSED_FORMS = {
         {'efforts': {'drive_joint': JointLoad(over_rate=((0.0, 2.0), (10.0, 0.0)))}}, 0.0, 0.0,
         lambda t: 10.0 * (t - 5.0 * INERTIA * (1.0 - exp(-t / (5.0 * INERTIA)))),
     ),
-    'a spring': (
-        {'joint_springs': {'crank_joint': JointSpring(4.0, 0.3)}}, 0.5, 0.0,
-        lambda t: 0.3 + 0.2 * cos(WAVE * t),
-    ),
+    'a spring': ({'joint_springs': {'crank_joint': JointSpring(4.0, 0.3)}}, 0.5, 0.0,
+                 lambda t: 0.3 + 0.2 * cos(WAVE * t)),
     'a spring with a damper': (
         {'joint_springs': {'drive_joint': JointSpring(4.0, 0.3, 0.3)}}, 0.5, 0.0,
         lambda t: 0.3
@@ -77,10 +73,8 @@ CLOSED_FORMS = {
         {'forces': {'crank.end': PointLoad((0.0, 2.0), 'link', 0.6)}}, 0.0, 0.0,
         lambda t: 0.5 * 0.3 / INERTIA * t * t,
     ),
-    'a force along the link': (
-        {'forces': {'crank.end': PointLoad((1.0, 0.0), 'link', 9.0)}}, 0.0, 0.5,
-        lambda t: 0.5 * t,
-    ),
+    'a force along the link': ({'forces': {'crank.end': PointLoad((1.0, 0.0), 'link', 9.0)}}, 0.0,
+                               0.5, lambda t: 0.5 * t),
 }  # fmt: skip
 
 

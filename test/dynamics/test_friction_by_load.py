@@ -29,8 +29,7 @@ from linkage_ros.dynamics import (
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, cross_product, GROUND, Mass
 from linkage_ros.messages import EffortCommand, PlanarWrench
-from linkage_ros.stages.drives import Context, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -244,7 +243,7 @@ def test_a_linkage_that_jams_stands_under_any_command():
     for coefficient, stands in ((6.0, False), (7.0, True)):
         friction = Friction({'cylinder': JointFriction(coefficient=coefficient)})
         context = Context(closure, 1000.0, True, 'seed', loads, friction)
-        drive = build(TorqueParameters(start=0.9, rate=-0.1), context)
+        drive = TorqueDrive(start=0.9, rate=-0.1).build(context)
         drive.state(BEGIN)
         drive.offer(EffortCommand(0, -300.0), BEGIN)
         state = drive.state(BEGIN + 5_000_000)

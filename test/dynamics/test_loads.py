@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from linkage_ros.dynamics import (
     check_loads,
-    check_masses,
     Friction,
     JointFriction,
     Loads,
@@ -102,19 +101,6 @@ def test_a_name_that_means_two_joints():
 def test_friction_in_every_pin_and_slider(joint):
     # B is the pin between the rod and the block of the slot, which is no link of the file's.
     check_loads(shipped('slider_crank'), Loads(), Friction({joint: RUBBING}))
-
-
-def test_every_link_that_moves_has_a_mass():
-    linkage = shipped('four_bar')
-    check_masses(linkage, Loads())
-    masses = {link: mass for link, mass in linkage.masses.items() if link != 'rocker'}
-    with pytest.raises(DefinitionError) as caught:
-        check_masses(replace(linkage, masses=masses), Loads(drive_inertia=1.0))
-    assert str(caught.value) == (
-        "masses: link 'rocker' has no mass, and forces are asked for; add masses: {rocker: "
-        '{mass: 0.1, center: [0, 0], inertia: 1.0e-5}} in [kg], [m] and [kg·m²]; '
-        'mass: 0 for a massless link'
-    )
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,7 @@ from linkage_ros.dynamics import (
 )
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Input, Linkage, Mass, Ratio, RevoluteJoint
-from linkage_ros.stages.drives import Context, TorqueParameters
-from linkage_ros.stages.drives.torque import build
+from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -101,10 +100,7 @@ def test_torque_swings_geared_pendulums(method: str) -> None:
     applied = AppliedLoads(efforts={'second_joint': JointLoad(constant=0.05)})
     loads = Loads((0.0, -9.81), applied=applied)
     context = Context(geared_pendulums(), 1000.0, True, 'seed', loads, rubbing)
-    drive = build(
-        TorqueParameters(start=-1.0, method=method, step=1e-3),
-        context,  # type: ignore[arg-type]
-    )
+    drive = TorqueDrive(start=-1.0, method=method, step=1e-3).build(context)
     drive.state(BEGIN)
 
     def change(_: float, state: tuple[float, float]) -> tuple[float, float]:

@@ -66,32 +66,23 @@ def by_voltage(volt):
 
 STATES = {
     'friction holds': Rest(TOP, effects=RUBS, borne=(-1.5, 1.5), commands=(-0.4, 0.0, 0.05, 1.2)),
-    'friction holds, and effort has what is left': Rest(
-        TOP, effects=HOLDS, borne=(-1.5, 1.5), commands=(-0.4, 0.0, 0.05, 1.2)
-    ),
-    'friction of a curve holds': Rest(
-        TOP, effects=CURVED, borne=(-1.5, 1.5), commands=(-0.4, 0.0, 0.05, 1.2)
-    ),
-    'friction by the force in its pin holds': Rest(
-        TOP, effects=PRESSED, borne=(-1.4, 1.4), commands=(-0.4, 0.0, 0.05, 1.2)
-    ),
-    'the upper stop bears': Rest(
-        1.5, linkage=LIMITED, borne=(-inf, 0.0), commands=(0.5, 3.0, 100.0)
-    ),
-    'the lower stop bears': Rest(
-        0.5, linkage=LIMITED, borne=(0.0, inf), commands=(-100.0, -0.1, 0.0, 5.0)
-    ),
-    'a stop and friction bear': Rest(
-        1.5, effects=RUBS, linkage=LIMITED, borne=(-inf, 1.5), commands=(-0.5, 0.0, 0.5, 9.0)
-    ),
-    'the brake holds': Rest(
-        0.2, 'on_timeout: brake, brake: 20', borne=(0.0, 0.0), commands=(None,),
-        exerted=lambda _: (-20.0, 20.0),
-    ),
-    'the brake holds a part, friction the rest': Rest(
-        0.2, 'on_timeout: brake, brake: 5', RUBS, borne=(-1.5, 1.5), commands=(None,),
-        exerted=lambda _: (-5.0, 5.0),
-    ),
+    'friction holds, and effort has what is left': Rest(TOP, effects=HOLDS, borne=(-1.5, 1.5),
+                                                        commands=(-0.4, 0.0, 0.05, 1.2)),
+    'friction of a curve holds': Rest(TOP, effects=CURVED, borne=(-1.5, 1.5),
+                                      commands=(-0.4, 0.0, 0.05, 1.2)),
+    'friction by the force in its pin holds': Rest(TOP, effects=PRESSED, borne=(-1.4, 1.4),
+                                                   commands=(-0.4, 0.0, 0.05, 1.2)),
+    'the upper stop bears': Rest(1.5, linkage=LIMITED, borne=(-inf, 0.0),
+                                 commands=(0.5, 3.0, 100.0)),
+    'the lower stop bears': Rest(0.5, linkage=LIMITED, borne=(0.0, inf),
+                                 commands=(-100.0, -0.1, 0.0, 5.0)),
+    'a stop and friction bear': Rest(1.5, effects=RUBS, linkage=LIMITED, borne=(-inf, 1.5),
+                                     commands=(-0.5, 0.0, 0.5, 9.0)),
+    'the brake holds': Rest(0.2, 'on_timeout: brake, brake: 20', borne=(0.0, 0.0),
+                            commands=(None,), exerted=lambda _: (-20.0, 20.0)),
+    'the brake holds a part, friction the rest': Rest(0.2, 'on_timeout: brake, brake: 5', RUBS,
+                                                      borne=(-1.5, 1.5), commands=(None,),
+                                                      exerted=lambda _: (-5.0, 5.0)),
     'friction holds what it can, and the brake the rest': Rest(
         0.2, 'on_timeout: brake, brake: 5', HOLDS, borne=(-1.5, 1.5), commands=(None,),
         exerted=lambda _: (-5.0, 5.0),
@@ -110,10 +101,9 @@ STATES = {
         1.5, f'motor: {{{GEAR}, command: voltage, voltage: 12, current: 5}}', linkage=LIMITED,
         borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), exerted=by_voltage,
     ),
-    'its gear holds': Rest(
-        0.5, f'motor: {{{GEAR}, command: voltage, voltage: 12, current: 5}}', linkage=LIMITED,
-        borne=(0.0, 0.0), commands=(10.0, 12.0), exerted=by_voltage,
-    ),
+    'its gear holds': Rest(0.5, f'motor: {{{GEAR}, command: voltage, voltage: 12, current: 5}}',
+                           linkage=LIMITED, borne=(0.0, 0.0), commands=(10.0, 12.0),
+                           exerted=by_voltage),
     'a motor that gives an effort, at a stop': Rest(
         1.5, f'motor: {{{GEAR}, command: effort, current: 5}}', linkage=LIMITED,
         borne=(-inf, 0.0), commands=(0.8, 3.0, 9.0),
@@ -123,14 +113,10 @@ STATES = {
         1.5, f'motor: {{{GEAR}, inductance: 0.004, command: voltage, voltage: 12, current: 5}}',
         linkage=LIMITED, borne=(-inf, 0.0), commands=(6.0, 12.0, 24.0), exerted=by_voltage,
     ),
-    'behind play, at a stop': Rest(
-        1.5, 'play: {width: 1.0e-4, inertia: 1.0e-3}', linkage=LIMITED, borne=(-inf, 0.0),
-        commands=(3.0, 9.0),
-    ),
-    'behind play, held by friction': Rest(
-        TOP, 'play: {width: 1.0e-4, inertia: 1.0e-3}', RUBS, borne=(-1.5, 1.5),
-        commands=(0.3, 1.2),
-    ),
+    'behind play, at a stop': Rest(1.5, 'play: {width: 1.0e-4, inertia: 1.0e-3}', linkage=LIMITED,
+                                   borne=(-inf, 0.0), commands=(3.0, 9.0)),
+    'behind play, held by friction': Rest(TOP, 'play: {width: 1.0e-4, inertia: 1.0e-3}', RUBS,
+                                          borne=(-1.5, 1.5), commands=(0.3, 1.2)),
     'behind play, pulled off a crank that friction holds': Rest(
         TOP, 'play: {width: 1.0e-4, inertia: 1.0e-3}', RUBS, borne=(-1.5, 1.5), commands=(-0.3,),
     ),

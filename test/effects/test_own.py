@@ -254,23 +254,17 @@ REFUSED = {
         ADD.replace("number('how much', 1.0, unit='rad', least=-10.0, most=10.0)", '1.0'),
         'Mine is not a dataclass of parameters',
     ),
-    'no method': (
-        HEAD.replace('BASE', 'SensorEffect') + "    after = 'bias'\n",
-        'Mine does nothing; define sensor',
-    ),
+    'no method': (HEAD.replace('BASE', 'SensorEffect') + "    after = 'bias'\n",
+                  'Mine does nothing; define sensor'),
     'no place in the tick': (
         HEAD.replace('BASE', 'Effect') + "    after = 'bias'\n",
         'Mine does nothing; derive it from one of LinkageEffect, DriveEffect, MechanismEffect',
     ),
-    'a place that is none': (
-        ADD.replace("'bias'", "'bais'"),
-        "after is 'bais': that is not an effect; did you mean 'bias'?",
-    ),
+    'a place that is none': (ADD.replace("'bias'", "'bais'"),
+                             "after is 'bais': that is not an effect; did you mean 'bias'?"),
     'no place': (ADD.replace('after', 'behind'), 'does not say after which'),
-    'behind the last': (
-        ADD.replace("'bias'", "'delay'"),
-        "after is 'delay', and delay is the last sensor; set after = 'dropout'",
-    ),
+    'behind the last': (ADD.replace("'bias'", "'delay'"),
+                        "after is 'delay', and delay is the last sensor; set after = 'dropout'"),
     'before what it starts from': (
         YIELD.replace("after = 'pin_forces'", "after = 'velocity'"),
         "starts from pin_forces and acts before it; set after = 'pin_forces'",
@@ -287,7 +281,7 @@ REFUSED = {
         TELL.replace('~/mine', '/joint_states'),
         "has the topic '/joint_states'; write one of the node's own: '~/name'",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('case', REFUSED)
@@ -301,27 +295,18 @@ def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
     assert '; ' in text
 
 
-@pytest.mark.parametrize(
-    ('line', 'said'),
-    [
-        (
-            'nobody_has_this.effect: {}',
-            (
-                'effects.nobody_has_this.effect: there is no module nobody_has_this; add its '
-                'folder to PYTHONPATH, or source its workspace'
-            ),
-        ),
-        (
-            'linkage_ros.no_effect: {}',
-            'effects.linkage_ros.no_effect: there is no module linkage_ros.no_effect; add',
-        ),
-        ('.effect: {}', 'effects..effect: is not a dotted module name; write package.module'),
-        ('MINE.add: {buy: 1}', "effects.MINE.add.buy: unknown key; did you mean 'by'?"),
-        ('MINE.add: {by: 11}', 'effects.MINE.add.by: 11 is out of bounds; write a finite number'),
-        ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {…}'),
-        ('biass: {}', "effects.biass: unknown key; did you mean 'bias'?"),
-    ],
-)
+@pytest.mark.parametrize(('line', 'said'), [
+    ('nobody_has_this.effect: {}',
+     ('effects.nobody_has_this.effect: there is no module nobody_has_this; add its '
+      'folder to PYTHONPATH, or source its workspace')),
+    ('linkage_ros.no_effect: {}',
+     'effects.linkage_ros.no_effect: there is no module linkage_ros.no_effect; add'),
+    ('.effect: {}', 'effects..effect: is not a dotted module name; write package.module'),
+    ('MINE.add: {buy: 1}', "effects.MINE.add.buy: unknown key; did you mean 'by'?"),
+    ('MINE.add: {by: 11}', 'effects.MINE.add.by: 11 is out of bounds; write a finite number'),
+    ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {…}'),
+    ('biass: {}', "effects.biass: unknown key; did you mean 'bias'?"),
+])  # fmt: skip
 def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, line, said):
     mine = package(add=ADD)
     file = scene_file(tmp_path, ['velocity: {}', line.replace('MINE', mine)])

@@ -28,7 +28,6 @@ import numpy as np
 import pytest
 
 from .defects import defect
-from .linkages import class_3_linkage
 from .platforms import (
     everything,
     Leg,
@@ -267,16 +266,6 @@ def test_beyond_the_end_of_more_than_a_turn_it_is_open():
     assert position.status is Status.OPEN
     assert position.gap > 0.0
     assert InputSweep(closure).range_about(6.75324) is None
-
-
-def test_of_less_than_a_turn_whole_turns_of_the_input_change_nothing():
-    closure = Closure(class_3_linkage())
-    (interval,) = InputSweep(closure).ranges
-    assert interval.highest - interval.lowest < tau
-    found = InputSweep(closure).range_about(1.0 - 3.0 * tau)
-    assert found is not None
-    assert found.lowest == pytest.approx(interval.lowest - 3.0 * tau)
-    assert closure.position(1.0 - 3.0 * tau).status is Status.CLOSED
 
 
 def two_inputs(rng: random.Random) -> tuple[Linkage, Platform]:

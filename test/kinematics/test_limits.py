@@ -43,24 +43,18 @@ def closed(text, limits=''):
 # Linkage, limits, and the result at values of the input.
 STATES = {
     'within': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {0.5: CLOSED, 1.0: CLOSED}),
-    'beyond, either way': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {
-        0.499: LIMITED, 1.501: LIMITED,
-    }),
-    'an input counts with its turns': (
-        CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {1.0 + tau: LIMITED, 1.0 - tau: LIMITED},
-    ),
-    'limits of more than a turn': (
-        CRANK_ROCKER, ', input: {limits: [-7, 7]}', {6.9: CLOSED, -6.9: CLOSED, 7.1: LIMITED},
-    ),
+    'beyond, either way': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}',
+                           {0.499: LIMITED, 1.501: LIMITED}),
+    'an input counts with its turns': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}',
+                                       {1.0 + tau: LIMITED, 1.0 - tau: LIMITED}),
+    'limits of more than a turn': (CRANK_ROCKER, ', input: {limits: [-7, 7]}',
+                                   {6.9: CLOSED, -6.9: CLOSED, 7.1: LIMITED}),
     'one limit': (CRANK_ROCKER, ', input: {limits: [0, .inf]}', {1e6: CLOSED, -0.1: LIMITED}),
     'the other': (CRANK_ROCKER, ', input: {limits: [-.inf, 0]}', {-1e6: CLOSED, 0.1: LIMITED}),
-    'no limits but of rate and effort': (
-        CRANK_ROCKER, ', input: {velocity: 1, effort: 1}', {1e6: CLOSED},
-    ),
-    'a published angle': (
-        CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
-        {2.0: CLOSED, 1.0: LIMITED, 3.0: LIMITED},
-    ),
+    'no limits but of rate and effort': (CRANK_ROCKER, ', input: {velocity: 1, effort: 1}',
+                                         {1e6: CLOSED}),
+    'a published angle': (CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
+                          {2.0: CLOSED, 1.0: LIMITED, 3.0: LIMITED}),
     'a published angle in another turn is the same pose': (
         CRANK_ROCKER,
         ', joints: {rocker_joint: {limits: [-4.783185307179586, -4.283185307179586]}}',
@@ -70,12 +64,10 @@ STATES = {
         CRANK_ROCKER, ', joints: {rocker_joint: {limits: [-3.1416, 3.1416]}}',
         {0.0: CLOSED, 2.0: CLOSED, 5.0: CLOSED},
     ),
-    'a published slide': (SLIDER_CRANK, ', limits: [0.12, 0.16]', {
-        0.0: LIMITED, 1.0: CLOSED, pi: LIMITED,
-    }),
-    'open is worse than limited': (
-        DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}', {3.0: OPEN, 0.6: LIMITED},
-    ),
+    'a published slide': (SLIDER_CRANK, ', limits: [0.12, 0.16]',
+                          {0.0: LIMITED, 1.0: CLOSED, pi: LIMITED}),
+    'open is worse than limited': (DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}',
+                                   {3.0: OPEN, 0.6: LIMITED}),
 }  # fmt: skip
 
 
@@ -123,16 +115,12 @@ def test_without_limits_nothing_is_asked():
 RANGES = {
     'all of it': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', [(0.5, 1.5)], 'crank_joint'),
     'more than a turn': (CRANK_ROCKER, ', input: {limits: [-7, 7]}', [(-7, 7)], 'crank_joint'),
-    'a toggle and a limit': (
-        DOUBLE_ROCKER, ', input: {limits: [-0.5, 3]}', [(-0.5, 'toggle')], 'crank_joint',
-    ),
-    'a published angle': (
-        CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
-        [('rocker', 'rocker'), ('rocker', 'rocker')], 'rocker_joint',
-    ),
-    'a slide within a stroke': (
-        SLIDER_CRANK, ', limits: [0.12, 0.16]', [('slide', 'slide'), ('slide', 'slide')], 'slide',
-    ),
+    'a toggle and a limit': (DOUBLE_ROCKER, ', input: {limits: [-0.5, 3]}', [(-0.5, 'toggle')],
+                             'crank_joint'),
+    'a published angle': (CRANK_ROCKER, ', joints: {rocker_joint: {limits: [1.5, 2]}}',
+                          [('rocker', 'rocker'), ('rocker', 'rocker')], 'rocker_joint'),
+    'a slide within a stroke': (SLIDER_CRANK, ', limits: [0.12, 0.16]',
+                                [('slide', 'slide'), ('slide', 'slide')], 'slide'),
 }  # fmt: skip
 
 

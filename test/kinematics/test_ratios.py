@@ -419,14 +419,10 @@ WRONG: list[tuple[str, str, dict[str, Ratio], str]] = [
     ('zero', 'ratios.theta5.ratio', {'theta5': Ratio('theta2', 0.0)}, '0, offset 0'),
     ('infinite', 'ratios.theta5.ratio', {'theta5': Ratio('theta2', inf)}, 'inf'),
     ('no pin', 'ratios.theta3', {'theta3': Ratio('theta2', 1.0)}, 'no common pin'),
-    (
-        'too many',
-        'ratios.theta4',
-        {'theta5': Ratio('theta2', 1.0), 'theta4': Ratio('theta2', 1.0)},
-        'no common pin',
-    ),
+    ('too many', 'ratios.theta4', {'theta5': Ratio('theta2', 1.0), 'theta4': Ratio('theta2', 1.0)},
+     'no common pin'),
     ('none', 'links.link3', {}, 'is free'),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(('_', 'key', 'ratios', 'reason'), WRONG, ids=[one[0] for one in WRONG])

@@ -202,16 +202,13 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
     'coupler and rocker short beside crank and ground': (
         four_bar_linkage((40.0, 3.0, 2.5, 41.0), 'left'), ((-0.2, 0.2),),
     ),
-    'parallelogram on the right': (
-        four_bar_linkage((0.04, 0.12, 0.04, 0.12), 'right'), ((-9.0, 9.0),),
-    ),
-    'rod through the crankshaft': (
-        inverted_slider_crank_linkage((0.2, 0.2, 0.0), 'ahead'), ((-9.0, 9.0),),
-    ),
+    'parallelogram on the right': (four_bar_linkage((0.04, 0.12, 0.04, 0.12), 'right'),
+                                   ((-9.0, 9.0),)),
+    'rod through the crankshaft': (inverted_slider_crank_linkage((0.2, 0.2, 0.0), 'ahead'),
+                                   ((-9.0, 9.0),)),
     'rod as long as the crank': (slider_crank_linkage(0.2, 0.2, 0.0, 'ahead'), ((-9.0, 9.0),)),
-    'nearly a parallelogram': (
-        four_bar_linkage((0.04, 0.12, 0.0400002, 0.12), 'left'), ((-9.0, 9.0),),
-    ),
+    'nearly a parallelogram': (four_bar_linkage((0.04, 0.12, 0.0400002, 0.12), 'left'),
+                               ((-9.0, 9.0),)),
     'rod nearly as long as the crank, by tolerance': (
         replace(
             slider_crank_linkage(0.2, 0.200001, 0.0, 'ahead'),

@@ -9,12 +9,12 @@
 """Motor and crank behind play that meet too often: the node keeps ticking, and says so."""
 
 from linkage_ros.messages import EffortCommand
-from linkage_ros.node import chatter_count, CountsSnapshot, DiagnosticsSummary, Warnings
+from linkage_ros.node import Warnings
 from linkage_ros.tick import TickLoop
 from sensor_msgs.msg import JointState
 
 from .graph import NS, stamp_of, wait_for
-from .test_lost_ticks import Said
+from .observed import BEGIN, observe, Said, status_of
 from .test_silence import publishing, WARN
 from ..support.scenes import LINKAGES, pipeline_of
 
@@ -24,7 +24,6 @@ drive: {torque: {start: 1.0, timeout: 0.5, play: {width: 0.02, inertia: 2.0e-4, 
 loads: {drive_inertia: 0.001}
 effects: {velocity: {}}
 """
-BEGIN = 1_700_000_000 * NS
 LINKAGE = (LINKAGES / 'four_bar.yaml').read_text()
 
 
@@ -40,40 +39,38 @@ def run(loop, begin, end):
         loop.tick_at(BEGIN + time_ms * 1_000_000)
 
 
-def summary(loop, before):
-    now = CountsSnapshot.take(loop.counts, BEGIN + NS, chatter_count(loop.pipeline.linkages))
-    return now, DiagnosticsSummary(
-        'node', 's', 0.0, BEGIN, '', (), loop, before, now, '',
-        {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
-    ).make_statuses()[0]  # fmt: skip
-
-
 def test_it_is_told_once_for_each_new_step():
     loop, lines = loop_of(), Said()
-    warnings, before = Warnings(lines), CountsSnapshot()
-    warnings.check_chatter(loop.pipeline.linkages, 0.0)
-    before, status = summary(loop, before)
-    assert (status.message, lines) == ('Ticking', [])
+    before = loop.read_counts(BEGIN)
+    warnings = Warnings(lines, before)
+
+    def tell():
+        nonlocal before
+        state = observe(loop, rate=0.0)
+        for _ in range(2):
+            warnings.warn_of_conditions(state, 0.0)
+        status, values = status_of(state, 'tick', before)
+        before = state.counts
+        return sum(before.chatter), status, values
+
+    assert tell()[1].message == 'Ticking'
     run(loop, 0, 1000)
-    steps = chatter_count(loop.pipeline.linkages)
+    steps, status, values = tell()
     assert steps > 10
-    warnings.check_chatter(loop.pipeline.linkages, 0.0)
-    warnings.check_chatter(loop.pipeline.linkages, 0.0)
     (line,) = lines
     assert f'too often in {steps} steps' in line
     assert 'shorten the step' in line
-    before, status = summary(loop, before)
-    assert status.level == WARN
-    assert 'Motor and crank meet and part too often' in status.message
-    assert str(steps) in [value.value for value in status.values]
-    assert summary(loop, before)[1].message == 'Ticking'
-    # A reset counts anew.
+    assert (status.level, status.message) == (WARN, line)
+    assert str(steps) in values.values()
+    assert tell()[1].message == 'Ticking'
+    # A reset does not count them again.
     loop.reset_requested = True
     loop.tick_at(BEGIN + NS)
-    warnings.check_chatter(loop.pipeline.linkages, 0.0)
+    assert tell()[1].message == 'Ticking'
     run(loop, 1010, 2000)
-    warnings.check_chatter(loop.pipeline.linkages, 0.0)
-    assert f'too often in {chatter_count(loop.pipeline.linkages)} steps' in lines[-1]
+    more, *_ = tell()
+    assert [line, f'too often in {more - steps} steps' in lines[-1]] == [lines[0], True]
+    assert len(lines) == 2
 
 
 def test_a_run_that_ends_says_why_in_a_line():

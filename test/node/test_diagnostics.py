@@ -10,15 +10,13 @@
 
 from linkage_ros.description import parse_scene
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.node import CountsSnapshot, DiagnosticsSummary
 from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
+from .observed import BEGIN, observe, status_of
 from ..support.scenes import FOUR_BAR
 
-BEGIN = 1_700_000_000_000_000_000
 CRANKS = JointStateWriter(['left_crank_joint', 'right_crank_joint'])
-NO_LIMITS = {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0}
 
 
 @pytest.mark.parametrize(
@@ -36,9 +34,5 @@ def test_the_worst_residual_is_said_with_its_linkage(residuals, said, monkeypatc
     loop.tick_at(BEGIN)
     for closure, residual in zip(loop.pipeline.closures, residuals, strict=True):
         monkeypatch.setattr(closure, 'residual', lambda _, found=residual: found, raising=False)
-    summary = DiagnosticsSummary(
-        'node', 's', 1000.0, BEGIN, '/crank', (), loop,
-        CountsSnapshot(), CountsSnapshot.take(loop.counts, BEGIN), '', NO_LIMITS,
-    )  # fmt: skip
-    values = {pair.key: pair.value for status in summary.make_statuses() for pair in status.values}
+    _, values = status_of(observe(loop), 'loop closure')
     assert values['Residual (m)'] == said

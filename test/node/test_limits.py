@@ -14,14 +14,14 @@ from math import pi, tau
 from linkage_ros.description import parse_scene
 from linkage_ros.kinematics import Status
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.node import CountsSnapshot, DiagnosticsSummary, Warnings
 from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
+from .observed import BEGIN, observe, status_of, told
+
 STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
-BEGIN = 1_700_000_000_000_000_000
 WARN = b'\1'
 LIMITED = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0.5, 1.5]}}'
 CRANK = JointStateWriter(['crank_joint'])
@@ -101,13 +101,6 @@ def test_an_input_with_limits_is_published_as_it_is_driven():
     assert message.position[0] == 10.0
 
 
-class Said(list):
-    """Takes the place of a logger."""
-
-    def warning(self, line):
-        self.append(line)
-
-
 def ran(said, angles, linkage=LIMITED):
     """Return a tick loop that has seen crank angles, and what was published."""
     made = scene(said, linkage)
@@ -124,14 +117,6 @@ def ran(said, angles, linkage=LIMITED):
     return loop, published
 
 
-def health(loop):
-    window = CountsSnapshot(), CountsSnapshot.take(loop.counts, BEGIN)
-    return DiagnosticsSummary(
-        'node', 's', 1000.0, BEGIN, '/crank', (), loop, *window, '',
-        {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
-    )  # fmt: skip
-
-
 ANGLES = (1.0, 2.0, 2.1, 1.0)
 
 
@@ -141,17 +126,12 @@ def test_what_is_counted_and_told(said, published):
     counts = loop.counts
     assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
     assert (len(messages), counts.published, counts.suppressed) == (published, published, 0)
-    lines = Said()
-    Warnings(lines).check_events(counts, loop.pipeline.closures, '/crank', 1.0)
     what = 'nothing published' if said else 'published anyway'
-    assert lines == [
-        f'2 ticks beyond limits, {what}: crank_joint at 2.1 rad, limits [0.5, 1.5] rad'
-    ]
-    status = health(loop).make_statuses()[2]
-    assert (status.level, status.message) == (
-        WARN, 'Beyond limits: crank_joint at 2.1 rad, limits [0.5, 1.5] rad',
-    )  # fmt: skip
-    values = {pair.key: pair.value for pair in status.values}
+    line = f'2 ticks beyond limits, {what}: crank_joint at 2.1 rad, limits [0.5, 1.5] rad'
+    run = observe(loop)
+    assert told(run) == [line]
+    status, values = status_of(run, 'loop closure')
+    assert (status.level, status.message) == (WARN, line)
     assert values['Ticks beyond limits'] == '2'
     assert values['Reachable'] == '0.5 to 1.5 rad'
 
@@ -162,11 +142,10 @@ def test_rates_and_efforts_are_told_by_their_limits():
         'input: {velocity: 0.8}, joints: {rocker_joint: {velocity: 100}}',
     )
     loop, _ = ran('effects: {velocity: {}}', (1.0,), linkage)
-    status = health(loop).make_statuses()[2]
+    status, values = status_of(observe(loop), 'loop closure')
     assert (status.level, status.message) == (
         WARN, 'Velocity of crank_joint is 1, its limit 0.8',
     )  # fmt: skip
-    values = {pair.key: pair.value for pair in status.values}
     assert values['Velocity of crank_joint, of its limit'] == '1.25'
     (rate,) = [
         rate
@@ -179,11 +158,11 @@ def test_rates_and_efforts_are_told_by_their_limits():
     ]
     assert values['Velocity of rocker_joint, of its limit'] == f'{abs(rate) / 100:.4g}'
     bare, _ = ran('', (1.0,), linkage)
-    keys = [pair.key for pair in health(bare).make_statuses()[2].values]
-    assert not any('rocker_joint, of its limit' in key for key in keys)
+    _, values = status_of(observe(bare), 'loop closure')
+    assert not any('rocker_joint, of its limit' in key for key in values)
 
 
 def test_where_nothing_has_limits_nothing_is_told_of_them():
     loop, _ = ran('', (1.0,), LIMITED.replace(', input: {limits: [0.5, 1.5]}', ''))
-    keys = [pair.key for status in health(loop).make_statuses() for pair in status.values]
-    assert [key for key in keys if 'limit' in key] == ['Ticks beyond limits']
+    _, values = status_of(observe(loop), 'loop closure')
+    assert [key for key in values if 'limit' in key] == ['Ticks beyond limits']

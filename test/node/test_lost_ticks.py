@@ -8,22 +8,18 @@
 
 """Lost ticks: what stalled, and whether the rate can be held; by a clock that a test sets."""
 
+from math import inf
 from threading import Event
 from types import SimpleNamespace
 
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.node import diagnostics, pacing, Warnings
-from linkage_ros.tick import Counts, Stall
+from linkage_ros.node import conditions, pacing, Warnings
+from linkage_ros.tick import Counts
 import pytest
 
+from .observed import fake_loop, observe, Said, told
+
 MS = 10**6
-
-
-class Said(list):
-    """Takes the place of a logger."""
-
-    def warning(self, line):
-        self.append(line)
 
 
 @pytest.fixture
@@ -53,45 +49,35 @@ def run(monkeypatch):
     return run
 
 
-def told(counts):
-    lines = Said()
-    Warnings(lines).check_events(counts, [], '/crank', 1.0)
-    return lines
+# By name: how long ticks take and how late wake-ups are, in [ms], and the line of the log.
+STALLS = {
+    'one slow tick': (
+        [0] * 50 + [54] + [0] * 50, [],
+        '26 ticks lost at once: a tick took 0.052 s; the rate is kept otherwise',
+    ),
+    'one late wake-up': (
+        [0] * 100, [0] * 50 + [40],
+        ('20 ticks lost at once: the operating system woke the node 0.040 s late; the rate is '
+         'kept otherwise'),
+    ),
+    'two stalls of a long run are no reason for another rate': (
+        [0] * 500 + [32] + [0] * 500 + [42] + [0] * 500, [],
+        '35 ticks lost in 2 stalls, the last: a tick took 0.040 s; the rate is kept otherwise',
+    ),
+    # Each tick is 1 ms late on the one before; at 21 ms ten ticks of 2 ms are given up.
+    'a rate that cannot be held': (
+        [3] * 300, [],
+        '140 ticks lost in 14 stalls, the last: a tick took 0.021 s; lower the rate',
+    ),
+    'no stall': ([1] * 300, [], None),
+}  # fmt: skip
 
 
-def test_one_slow_tick_is_named_and_the_rate_holds_otherwise(run):
-    counts = run([0] * 50 + [54] + [0] * 50)
-    assert counts.last_stall == Stall(52 * MS, in_tick=True)
-    assert told(counts) == [
-        '26 ticks lost at once: a tick took 0.052 s; the rate is kept otherwise'
-    ]
-
-
-def test_one_late_wake_up_is_that_of_the_operating_system(run):
-    counts = run([0] * 100, oversleep=[0] * 50 + [40])
-    assert counts.last_stall == Stall(40 * MS, in_tick=False)
-    assert told(counts) == [
-        (
-            '20 ticks lost at once: the operating system woke the node 0.040 s late; '
-            'the rate is kept otherwise'
-        )
-    ]
-
-
-def test_two_stalls_of_a_long_run_are_no_reason_for_another_rate(run):
-    (line,) = told(run([0] * 500 + [32] + [0] * 500 + [42] + [0] * 500))
-    assert line == (
-        '35 ticks lost in 2 stalls, the last: a tick took 0.040 s; the rate is kept otherwise'
-    )
-
-
-def test_a_rate_that_cannot_be_held_is_to_be_lowered(run):
-    (line,) = told(run([3] * 300))
-    assert line.endswith(' s; lower the rate')
-
-
-def test_a_run_without_a_stall_is_silent(run):
-    assert told(run([1] * 300)) == []
+@pytest.mark.parametrize('name', STALLS)
+def test_a_stall_is_named_and_whether_the_rate_can_be_held(run, name):
+    durations, oversleep, line = STALLS[name]
+    state = observe(fake_loop(), run(durations, oversleep), rate=0.0)
+    assert told(state) == ([line] if line else [])
 
 
 # Messages are taken by ticks: while a tick goes on, nobody knows whether one has come. By name:
@@ -116,23 +102,34 @@ SILENCES = {
     'a tick for each message, and one goes on': (
         0.0, [(0, 1, 1, 1), *((t, 1, 2, 1) for t in range(1, 6))], [NO_TICK],
     ),
-    'a simulation stands still': (float('inf'), [(t, 5, 5, 5) for t in range(9)], []),
+    'a simulation stands still': (inf, [(t, 5, 5, 5) for t in range(9)], []),
 }  # fmt: skip
+
+
+def silence_of(monkeypatch, interval, max_age):
+    """Return what is called with a time, in [s], and the counts then, and returns the log."""
+    now = [0.0]
+    monkeypatch.setattr(conditions, 'monotonic', lambda: now[0])
+    lines = Said()
+    warnings, loop = Warnings(lines), fake_loop()
+    loop.pipeline.max_age = max_age
+    rate = interval and (1.0 / interval or 100.0)
+
+    def watch(seconds, **counts):
+        now[0] = float(seconds)
+        state = observe(loop, Counts(**counts), rate=rate, is_simulated=interval == inf)
+        warnings.warn_of_silence(state, lambda: ['/other'], 100.0)
+        return lines
+
+    return watch
 
 
 @pytest.mark.parametrize('name', SILENCES)
 def test_a_tick_that_goes_on_does_not_say_that_no_message_came(monkeypatch, name):
     interval, timeline, expected = SILENCES[name]
-    now = [0.0]
-    monkeypatch.setattr(diagnostics, 'monotonic', lambda: now[0])
-    counts, lines = Counts(), Said()
-    warnings = Warnings(lines)
+    watch = silence_of(monkeypatch, interval, NANOSECONDS)
     for seconds, ticks, received, used in timeline:
-        now[0] = float(seconds)
-        counts.ticks, counts.received, counts.used, counts.published = ticks, received, used, used
-        warnings.check_silence(
-            counts, '/crank', ['crank_joint'], 100.0, interval, NANOSECONDS, lambda: ['/other']
-        )
+        lines = watch(seconds, ticks=ticks, received=received, used=used, published=used)
     assert [line[: len(start)] for line, start in zip(lines, expected, strict=True)] == expected
 
 
@@ -150,17 +147,10 @@ PATIENCE = {
 @pytest.mark.parametrize('name', PATIENCE)
 def test_silence_is_warned_of_when_no_sample_holds_any_more(monkeypatch, name):
     max_age, received, first = PATIENCE[name]
-    now = [0.0]
-    monkeypatch.setattr(diagnostics, 'monotonic', lambda: now[0])
-    counts, lines = Counts(), Said()
-    counts.received = counts.used = received
-    warnings = Warnings(lines)
+    watch = silence_of(monkeypatch, 0.01, round(max_age * NANOSECONDS))
     warned = []
     for second in range(10):
-        now[0], counts.ticks = float(second), 100 * second
-        warnings.check_silence(
-            counts, '/crank', ['crank_joint'], 100.0, 0.01, round(max_age * NANOSECONDS), list
-        )
+        lines = watch(second, ticks=100 * second, received=received, used=received)
         warned += [second] * (len(lines) - len(warned))
     # The first look, at 0 s, sees what has been received.
     assert warned == ([] if first is None else [first])

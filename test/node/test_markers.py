@@ -190,20 +190,3 @@ def test_every_topic_of_the_views_is_one_of_the_running_node(graph, start, array
     assert topics['/joint_states'] == ['sensor_msgs/msg/JointState']
     assert {marker.header.frame_id for marker in arrays[0].markers} == {'ground'}
     assert node.end() == 0
-
-
-def test_there_is_no_topic_where_no_scene_asks(graph, write_scene, start):
-    node = start(write_scene('blind', 'effects: {velocity: {}}'))
-    states = graph.listen(JointState, '/joint_states')
-    publisher = graph.publisher(JointState, '/crank_states')
-    wait_for(lambda: publisher.publish(crank(1.0)) or states, 'joint states')
-
-    def published():
-        # A node may be known by its name only some time after its first message has come.
-        if ('linkage_node', '/') not in graph.node.get_node_names_and_namespaces():
-            return None
-        topics = dict(graph.node.get_publisher_names_and_types_by_node('linkage_node', '/'))
-        return '/joint_states' in topics and topics
-
-    assert MARKERS not in wait_for(published, 'the topics of the node')
-    assert node.end() == 0

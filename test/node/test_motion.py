@@ -18,10 +18,7 @@ import time
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag import read_bag
-from linkage_ros.replay import recorded_scene, replay_ticks
 import pytest
-from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
@@ -177,45 +174,6 @@ def test_at_a_toggle_positions_alone_and_where_it_is_open_silence(
     open_for(3)
     assert motions == []
     assert node.end() == 0
-
-
-def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, motions):
-    text = f'rate: 200\neffects: {{acceleration: {{}}}}\nrecord: {{directory: {folder}, name: m}}'
-    node = start(write_scene('motion_bag', text))
-    turn(publisher, 1.0, time.time_ns())
-    wait_for(lambda: len(motions) > 50, 'motions')
-    assert node.end() == 0
-    with AnyReader([folder / 'm']) as reader:
-        (connection,) = (c for c in reader.connections if c.topic == MOTION)
-        assert connection.msgtype == 'trajectory_msgs/msg/JointTrajectory'
-        bagged = [
-            reader.deserialize(data, connection.msgtype)
-            for _, _, data in reader.messages([connection])
-        ]
-        assert connection.digest == reader.typestore.hash_rihs01(connection.msgtype)
-    recorded = {stamp_of(message): message.points[0] for message in bagged}
-    for message in motions:
-        (heard,), kept = message.points, recorded[stamp_of(message)]
-        assert list(kept.positions) == list(heard.positions)
-        assert list(kept.velocities) == list(heard.velocities)
-        assert list(kept.accelerations) == list(heard.accelerations)
-    bag = read_bag(folder / 'm')
-    again = list(replay_ticks(bag, recorded_scene(bag)))
-    assert len(again) == len(bagged)
-    assert all(each.recorded == each.tick.message for each in again)
-    assert all(each.recorded_extras == each.tick.extras for each in again)
-
-
-def topics(graph):
-    return dict(graph.node.get_topic_names_and_types())
-
-
-def test_without_the_effect_there_is_no_topic(graph, write_scene, start):
-    node = start(write_scene('no_motion', 'rate: 100\neffects: {velocity: {}}'))
-    wait_for(lambda: '/joint_states' in topics(graph), 'joint states')
-    assert MOTION not in topics(graph)
-    assert node.end() == 0
-    assert MOTION not in node.log
 
 
 def test_it_comes_and_goes_with_the_scene(graph, folder, write_scene, start, publisher, motions):

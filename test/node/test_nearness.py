@@ -10,8 +10,7 @@
 
 from types import SimpleNamespace
 
-from linkage_ros.kinematics import Input
-from linkage_ros.node import CountsSnapshot, DiagnosticsSummary
+from linkage_ros.kinematics import Input, Status
 from linkage_ros.tick import Counts
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -20,6 +19,7 @@ from sensor_msgs.msg import JointState
 
 from .graph import crank, wait_for
 from .loops import transmission_angle
+from .observed import fake_loop, observe, status_of
 
 OK, WARN, ERROR = b'\0', b'\1', b'\2'
 KEYS = 'Transmission angle (rad)', 'Conditioning', 'Input to the nearest toggle (rad)'
@@ -28,15 +28,17 @@ CRANK = Input('crank_joint', 'ground', 'crank')
 CYLINDER = Input('boom_cylinder', slider='bore')
 
 
-def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
+def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, is_open=False):
     """Return the status of the loop closure of a linkage that is so near to trouble."""
     counts = Counts()
-    position = SimpleNamespace(status=None, gap=0.1, joints=(1.0,))
+    position = SimpleNamespace(gap=0.1, joints=(1.0,))
     crank = SimpleNamespace(angles=(0.25,) * len(inputs), rates=(1.0,) * len(inputs))
     look = SimpleNamespace(crank=crank, position=position, reading=None)
-    counts.last_unclosed[position.status] = 0, position
+    counts.last_unclosed[Status.OPEN] = 0, position
+    counts.unclosed[Status.OPEN] = int(is_open)
     closure = SimpleNamespace(
         input_ranges=(),
+        limit_exceeded=lambda _: '',
         residual=lambda _: 0.0,
         singularity_margin=lambda asked: (
             asked is position and SimpleNamespace(**dict(zip(LIMITS, nearness, strict=True)))
@@ -47,22 +49,9 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     )
     linkages = [SimpleNamespace(scene_linkage=scene_linkage, closure=closure, drive=None)]
     counts.last_tick = SimpleNamespace(linkages=linkages, states=(look,))
-    pipeline = SimpleNamespace(linkages=linkages, max_age=1, newest_stamp=0)
-    loop = SimpleNamespace(
-        counts=counts,
-        pipeline=pipeline,
-        newest_stamp=0,
-        missed_messages=0,
-        recorder=None,
-        injection=None,
-    )
-    health = DiagnosticsSummary(
-        'node', 'scene', 0.0, 0, '/crank', (),
-        loop,
-        CountsSnapshot(), CountsSnapshot(unclosed=opened), '', limits,
-    )  # fmt: skip
-    _, _, found, _ = health.make_statuses()
-    return found, {pair.key: pair.value for pair in found.values}
+    counts.chatter = [0]
+    pipeline = SimpleNamespace(linkages=linkages, max_age=1, wrenches=[])
+    return status_of(observe(fake_loop(pipeline=pipeline), counts, limits=limits), 'loop closure')
 
 
 def test_the_values_are_told():
@@ -100,7 +89,7 @@ def test_at_the_limit_all_is_well():
 
 
 def test_what_is_worse_goes_before():
-    found, values = status((0.0, 0.0, 0.0), opened=1)
+    found, values = status((0.0, 0.0, 0.0), is_open=True)
     assert found.level == ERROR
     assert 'nearest' not in found.message
     assert values[KEYS[0]] == '0'

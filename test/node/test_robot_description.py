@@ -97,13 +97,6 @@ def test_it_goes_with_the_scene(graph, write_scene, start):
     wait_for(lambda: heard, 'a robot model')
 
 
-def test_without_the_key_there_is_none(graph, write_scene, start):
-    start(write_scene('bare', TURNING))
-    states = graph.listen(JointState, '/joint_states')
-    wait_for(lambda: states, 'a joint state')
-    assert graph.node.count_publishers(TOPIC) == 0
-
-
 def test_each_file_of_its_bag_has_it_as_it_was_offered(graph, folder, write_scene, start):
     record = f'record: {{directory: {folder}, name: bag, split_seconds: 1}}'
     node = start(write_scene('bagged', TURNING + f'robot_description: true\n{record}'))

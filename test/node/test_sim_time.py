@@ -173,8 +173,9 @@ def test_without_a_clock_it_warns_and_is_stale(graph, write_scene, start):
         write_scene('no_clock', 'rate: 50\ndrive: {constant_rate: {rate: 1}}'),
         *('-p', 'use_sim_time:=true', '-p', 'warning_period:=0.5'),
     )
-    assert graph.wait_for_level('tick', STALE).message == 'No /clock yet'
-    node.wait_for_log('No /clock yet: start the simulation, or set use_sim_time: false')
+    message = 'No /clock yet: start the simulation, or set use_sim_time: false'
+    assert graph.wait_for_level('tick', STALE).message == message
+    node.wait_for_log(message)
     simulation = Simulation(graph)
     simulation.run_until_heard()
     wait_for(

@@ -11,17 +11,12 @@
 from linkage_ros.description import load_scene
 from linkage_ros.messages import CrankSample
 from linkage_ros.node import Warnings
-from linkage_ros.tick import Pipeline
+from linkage_ros.tick import Counts, Pipeline
 import pytest
 
+from .observed import fake_loop, observe, Said
+
 SECOND = 10**9
-
-
-class Said(list):
-    """Takes the place of a logger."""
-
-    def warning(self, line):
-        self.append(line)
 
 
 @pytest.mark.parametrize(
@@ -41,8 +36,9 @@ def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, sa
         stamp = (1 + index) * SECOND // 100
         assert line.drive.offer(CrankSample(stamp, (angle,), (0.0,)), stamp) is None
     lines = Said()
-    warnings = Warnings(lines)
+    counts = Counts(chatter=[0])
+    warnings = Warnings(lines, counts)
     for _ in range(3):
-        warnings.check_jumps(pipeline.linkages, '/crank_states')
+        warnings.warn_of_conditions(observe(fake_loop(pipeline=pipeline), counts), 0.0)
     assert len(lines) == said
     assert all('if these are degrees, publish radians' in each for each in lines)

@@ -13,17 +13,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import json
 from math import acos, cos, nan, pi, sin
 from pathlib import Path
-from struct import unpack_from
 
 from linkage_ros.bag import BagWriter, RUN_FILE
 from linkage_ros.description import load_scene
-from linkage_ros.messages import JointStateWriter, time_message
-from linkage_ros.resources import shipped_path
-from mcap.reader import make_reader
+from linkage_ros.messages import JointStateWriter, text_message, time_message
 import numpy as np
 
-from ..cli.recorded import BEGIN, JOINT_STATE, MS, scene_file, SECOND, STORE, topic
-from ..support.messages import wrench_stamped
+from .runs import diagnostics, Said
+from ..cli.recorded import BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file, SECOND, topic
 
 STATES, CRANK, FAULTS = '/joint_states', '/crank_states', '/linkage/faults'
 WITHHELD, RESETS, HEALTH = '/linkage/withheld', '/linkage/resets', '/diagnostics'
@@ -49,6 +46,7 @@ PERIOD = SECOND // 100
 LATE = MS // 4  # after it was due a tick takes its sample
 OLD = 3 * MS  # is the sample that a tick takes
 LONG_ROWS, LONG_RATE, SPIKE_AT, SPIKE = 40_000, 1000, 12_345, 512.5
+JOINTS = ('crank_joint', 'coupler_joint', 'rocker_joint')
 Message = tuple[str, int, int, bytes]
 """Topic, log time, publish time, data."""
 
@@ -61,13 +59,17 @@ def follow(a: float, b: float, c: float, d: float, crank: float) -> tuple[float,
     return coupler - crank, phase(pin + rect(b, coupler) - d)
 
 
+def close(crank: float) -> tuple[float, float, float]:
+    """Return all published angles of the four-bar of `FOUR_BAR`."""
+    return (crank, *follow(0.04, 0.12, 0.08, 0.1, crank))
+
+
 def write(
     folder: Path,
     messages: Iterable[Message],
     scene: Path | None = None,
     name: str = '',
     types: Mapping[str, str] = TYPES,
-    wrenches: Sequence[str] = (),
 ) -> Path:
     """Write a bag, of a scene's run or of nobody's; return its folder."""
     attachments = {}
@@ -84,7 +86,6 @@ def write(
             'resets_topic': RESETS,
             'diagnostics_topic': HEALTH,
             'extra_topics': [],
-            'wrench_topics': [*wrenches],
         }
         attachments[RUN_FILE] = ('application/json', json.dumps(said).encode())
     numbers = {each: index for index, each in enumerate(types)}
@@ -95,11 +96,35 @@ def write(
     return folder
 
 
-def drill(folder: Path) -> Path:
-    """Write eight seconds in which everything happens that a page has a lane for."""
+def write_states(
+    folder: Path,
+    scene: str,
+    joints: Sequence[str],
+    rows: Iterable[tuple[Sequence[float], Sequence[float]]],
+    *,
+    linkage: str = FOUR_BAR,
+    period: int = PERIOD,
+    name: str = '',
+) -> Path:
+    """Write the run of a scene that drives itself: angles and rates of each tick."""
     folder.mkdir()
+    states = JointStateWriter(joints).write
+    messages = (
+        (STATES, BEGIN + index * period, BEGIN + index * period,
+         states(BEGIN + index * period, *row))
+        for index, row in enumerate(rows)
+    )  # fmt: skip
+    return write(folder / folder.name, messages, scene_file(folder, scene, linkage), name)
+
+
+def drill(folder: Path, begin: float = 0.0) -> Path:
+    """Write the eight seconds, from a time on, in which everything happens that has a lane."""
+    folder.mkdir()
+    messages = [each for each in _drill() if each[1] >= BEGIN + begin * SECOND]
+    if begin:
+        messages.insert(0, (HEALTH, BEGIN, BEGIN, _diagnostics(0)))
     scene = scene_file(folder, DRILL_SCENE, DRILL)
-    return write(folder / 'drill', _drill(), scene, 'drill & <b>bold</b>')
+    return write(folder / folder.name, messages, scene, 'drill & <b>bold</b>')
 
 
 def _drill() -> Iterator[Message]:
@@ -115,16 +140,12 @@ def _drill() -> Iterator[Message]:
         logged = stamp + LATE
         for when, on in ((100, True), (150, False)):
             if tick == when:
-                yield (
-                    FAULTS,
-                    logged,
-                    logged,
-                    _text(json.dumps({'fault': 'plug', 'kind': 'silence', 'injected': on})),
-                )
+                said = json.dumps({'fault': 'plug', 'kind': 'silence', 'injected': on})
+                yield FAULTS, logged, logged, text_message(said)
         if tick == 600:
             yield RESETS, logged, logged, time_message(logged)
         if tick % 100 == 50:
-            yield HEALTH, logged, logged, _diagnostics(tick // 100, stamp)
+            yield HEALTH, logged, logged, _diagnostics(tick // 100)
         opens, refused = 500 <= tick < 530, 200 <= tick < 210
         if not 300 <= tick < 360:
             angle = 1.3 if opens else 0.9 * sin(pi * time)
@@ -164,56 +185,43 @@ DRILL_LANES = {
 """What a page has to tell of it, to a tick: title of the lane, begin and end of spans, a word."""
 
 
-def _diagnostics(number: int, stamp: int) -> bytes:
+def _diagnostics(number: int) -> bytes:
     """Return the message of the second of that number: all counts grow in one of them."""
-
-    def status(task: str, values: dict[str, int], level: int = 0, message: str = '') -> object:
-        pair = STORE.types['diagnostic_msgs/msg/KeyValue']
-        pairs = [pair(key, str(value)) for key, value in values.items()]
-        kind = STORE.types['diagnostic_msgs/msg/DiagnosticStatus']
-        return kind(level, f'linkage: {task}', message, 'robot', pairs)
-
-    header = STORE.types['std_msgs/msg/Header'](
-        STORE.types['builtin_interfaces/msg/Time'](*divmod(stamp, SECOND)), ''
-    )
     warm = number == 6
-    message = STORE.types[TYPES[HEALTH]](
-        header,
+    closing = {'Ticks open': 30 * (number >= 5), 'Ticks at a toggle': 5 * (number >= 4)}
+    return diagnostics(
         [
-            status('tick', {'Lost ticks': 7 * (number >= 2)}, int(warm), 'it is warm' * warm),
-            status(
-                'loop closure',
-                {'Ticks open': 30 * (number >= 5), 'Ticks at a toggle': 5 * (number >= 4)},
-            ),
-            status('recording', {f'Dropped: {STATES}': 4 * (number >= 3)}),
-        ],
+            Said(0, 'tick', {'Lost ticks': 7 * (number >= 2)}, int(warm), 'it is warm' * warm),
+            Said(0, 'loop closure', closing),
+            Said(0, 'recording', {f'Dropped: {STATES}': 4 * (number >= 3)}),
+        ]
     )
-    return bytes(STORE.serialize_cdr(message, TYPES[HEALTH]))
-
-
-def _text(text: str) -> bytes:
-    return bytes(STORE.serialize_cdr(STORE.types[TYPES[FAULTS]](text), TYPES[FAULTS]))
 
 
 def long(folder: Path) -> tuple[Path, np.ndarray]:
     """Write a run with more rows than a page has room for; return it and the rocker's angles."""
-    folder.mkdir()
-    linkage = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-    scene = scene_file(folder, f'rate: {LONG_RATE}\ndrive: {{constant_rate: {{rate: 3.0}}}}\n'
-                       'effects: {velocity: {}}\n', linkage)  # fmt: skip
-    writer = JointStateWriter(['crank_joint', 'coupler_joint', 'rocker_joint'])
-    rockers = np.empty(LONG_ROWS)
+    rows = [close(3.0 * row / LONG_RATE) for row in range(LONG_ROWS)]
+    rates = ([3.0, 0.0, SPIKE if row == SPIKE_AT else 0.0] for row in range(LONG_ROWS))
+    scene = (
+        f'rate: {LONG_RATE}\ndrive: {{constant_rate: {{rate: 3.0}}}}\n'
+        'effects: {velocity: {}}\n'
+    )
+    bag = write_states(
+        folder, scene, JOINTS, zip(rows, rates, strict=True), period=SECOND // LONG_RATE
+    )
+    return bag, np.array(rows)[:, 2]
 
-    def messages() -> Iterator[Message]:
-        for row in range(LONG_ROWS):
-            crank = 3.0 * row / LONG_RATE
-            coupler, rockers[row] = follow(0.04, 0.12, 0.08, 0.1, crank)
-            rates = [3.0, 0.0, SPIKE if row == SPIKE_AT else 0.0]
-            stamp = BEGIN + row * (SECOND // LONG_RATE)
-            data = writer.write(stamp, [crank, coupler, rockers[row]], rates)
-            yield STATES, stamp, stamp, data
 
-    return write(folder / 'long', messages(), scene), rockers
+def turning(folder: Path, angles: str) -> Path:
+    """Write a run of a crank that turns twice in 4 s, with angles as a scene publishes them."""
+    scene = (
+        f'rate: 100\nangles: {angles}\ndrive: {{constant_rate: {{rate: {pi}}}}}\n'
+        'effects: {velocity: {}}\n'
+    )
+    rows = np.array([close(0.01 * pi * row) for row in range(401)])
+    if angles == 'wrapped':
+        rows = np.angle(np.exp(1j * rows))
+    return write_states(folder, scene, JOINTS, ((row, [pi, 0.0, 0.0]) for row in rows.tolist()))
 
 
 MARKUP = '<img src=x onerror="window.hit=1">'
@@ -245,7 +253,6 @@ def foreign(folder: Path) -> Path:
 
 def named(folder: Path) -> Path:
     """Write a run of a scene in which links, joints and the scene itself have such names."""
-    folder.mkdir()
     crank, coupler, link = json.dumps(NAMES[0]), json.dumps(NAMES[1]), json.dumps(NAMES[3])
     linkage = f"""
 links:
@@ -260,25 +267,17 @@ joints:
   rocker_joint: {{parent: ground, child: rocker}}
 traced: [P]
 """
-    scene = scene_file(folder, 'rate: 100\ndrive: {constant_rate: {rate: 3.0}}\n', linkage)
-    writer = JointStateWriter([NAMES[0], NAMES[1], 'rocker_joint'])
-
-    def messages() -> Iterator[Message]:
-        for row in range(200):
-            stamp, angle = BEGIN + row * PERIOD, 0.03 * row
-            angles = [angle, *follow(0.04, 0.12, 0.08, 0.1, angle)]
-            yield STATES, stamp, stamp, writer.write(stamp, angles, [])
-
-    return write(folder / 'named', messages(), scene, MARKUP)
+    scene = 'rate: 100\ndrive: {constant_rate: {rate: 3.0}}\n'
+    rows = ((close(0.03 * row), ()) for row in range(200))
+    joints = [NAMES[0], NAMES[1], 'rocker_joint']
+    return write_states(folder, scene, joints, rows, linkage=linkage, name=MARKUP)
 
 
 def empty(folder: Path) -> Path:
     """Write a run that ended before it began."""
-    folder.mkdir()
-    return write(folder / 'empty', [], scene_file(folder, DRILL_SCENE, DRILL))
+    return write_states(folder, DRILL_SCENE, [], [], linkage=DRILL)
 
 
-FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 FINGERS = """
 rate: 100
 linkages:
@@ -293,99 +292,6 @@ linkages:
 
 def fingers(folder: Path) -> Path:
     """Write a run of two four-bars, the right of which turns the other way, and twice as fast."""
-    folder.mkdir()
-    scene = scene_file(folder, FINGERS, FOUR_BAR)
-    sides = ('left', 'right')
-    names = [f'{side}_{joint}_joint' for side in sides for joint in ('crank', 'coupler', 'rocker')]
-    writer = JointStateWriter(names)
-
-    def messages() -> Iterator[Message]:
-        for row in range(200):
-            stamp, cranks = BEGIN + row * PERIOD, (0.01 * row, -0.02 * row)
-            angles = [x for each in cranks for x in (each, *follow(0.04, 0.12, 0.08, 0.1, each))]
-            yield STATES, stamp, stamp, writer.write(stamp, angles, [])
-
-    return write(folder / 'fingers', messages(), scene)
-
-
-def late(folder: Path) -> Path:
-    """Write a run whose crank comes 0.6 s after its beginning."""
-    folder.mkdir()
-    scene = scene_file(folder, 'rate: 100\ndrive: {topic: {}}\n', FOUR_BAR)
-    crank = JointStateWriter(['crank_joint'])
-    states = JointStateWriter(['coupler_joint', 'rocker_joint'])
-
-    def messages() -> Iterator[Message]:
-        yield HEALTH, BEGIN, BEGIN, _diagnostics(0, BEGIN)
-        for row in range(60, 160):
-            stamp, angle = BEGIN + row * PERIOD, 0.01 * row
-            joints = follow(0.04, 0.12, 0.08, 0.1, angle)
-            yield CRANK, stamp, stamp, crank.write(stamp, [angle], [1.0])
-            yield STATES, stamp, stamp, states.write(stamp, joints, [])
-
-    return write(folder / 'late', messages(), scene)
-
-
-PUSH, TWIST = '/linkage_node/wrenches/coupler', '/linkage_node/wrenches/rocker'
-
-
-def pushed(folder: Path) -> Path:
-    """Write a run of a four-bar on whose links two topics put wrenches, at times of their own."""
-    folder.mkdir()
-    scene = scene_file(
-        folder,
-        'rate: 100\ndrive: {torque: {start: 1.0}}\nloads: {wrenches: {coupler: {}, rocker: {}}}\n',
-        shipped_path('linkages/four_bar.yaml').read_text('utf-8'),
-    )
-    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
-
-    def messages() -> Iterator[Message]:
-        for row in range(100):
-            stamp = BEGIN + row * PERIOD
-            if row % 2:
-                yield PUSH, stamp, stamp, wrench_stamped(3.0 * row, 4.0 * row, 0.0)
-            if row % 5 == 0:
-                yield TWIST, stamp, stamp, wrench_stamped(0.0, -1.0, 0.1 * row)
-            if row == 50:
-                yield TWIST, stamp, stamp, b'no message'
-            angles = follow(0.04, 0.12, 0.08, 0.1, 1.0 + 0.01 * row)
-            yield STATES, stamp, stamp, writer.write(stamp, angles, [])
-
-    types = TYPES | dict.fromkeys((PUSH, TWIST), 'geometry_msgs/msg/WrenchStamped')
-    return write(folder / 'pushed', messages(), scene, types=types, wrenches=[PUSH, TWIST])
-
-
-def joint_states(bag: Path, of: str) -> list[tuple[int, int, int, list[str], Sequence[float]]]:
-    """Return number, log time, stamp, names, positions and rates, as mcap reads them."""
-    found = []
-    (file,) = bag.glob('*.mcap')
-    with file.open('rb') as stream:
-        messages = make_reader(stream).iter_messages(log_time_order=False)
-        for index, (_, channel, message) in enumerate(messages):
-            if channel.topic != of:
-                continue
-            data = message.data
-            seconds, nanoseconds, frame = unpack_from('<iII', data, 4)
-            at = 16 + frame
-            names = []
-            at += -at % 4
-            (count,) = unpack_from('<I', data, at)
-            at += 4
-            for _ in range(count):
-                at += -at % 4
-                (length,) = unpack_from('<I', data, at)
-                begin, at = at + 4, at + 4 + length
-                end = at - 1  # without the zero
-                names.append(data[begin:end].decode())
-            numbers: list[float] = []
-            for _ in range(2):
-                at += -at % 4
-                (length,) = unpack_from('<I', data, at)
-                at += 4
-                # Doubles are aligned behind the four bytes that say how all is encoded.
-                at += -(at - 4) % 8 if length else 0
-                numbers += unpack_from(f'<{length}d', data, at)
-                at += 8 * length
-            stamp = seconds * SECOND + nanoseconds
-            found.append((index, message.log_time, stamp, names, numbers))
-    return found
+    joints = [f'{side}_{joint}' for side in ('left', 'right') for joint in JOINTS]
+    rows = (((*close(0.01 * row), *close(-0.02 * row)), ()) for row in range(200))
+    return write_states(folder, FINGERS, joints, rows)

@@ -9,13 +9,23 @@
 """Runs by the node's own tick loop, without ROS, and what a report reads of their bags."""
 
 from collections.abc import Callable, Iterable, Sequence
+import json
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.bag import Bag, BagMessage, BagWriter, read_bag
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.tools.view.report import event_tracks, Progress, read_run, ReportedRun, Window
+from linkage_ros.tools.view.report import (
+    event_tracks,
+    Progress,
+    read_run,
+    ReportedRun,
+    ReportHeader,
+    run_html,
+    Window,
+)
 import numpy as np
+import pytest
 
 from ..node.ticked import Moment, run
 from ..support.messages import STORE
@@ -42,7 +52,7 @@ class Said(NamedTuple):
     node: str = 'linkage'
 
 
-def diagnostics(said: Sequence[Said]) -> bytes:
+def diagnostics(said: Sequence[Said], little: bool = True) -> bytes:
     """Return a DiagnosticArray, by rosbags."""
     pair = TYPES['diagnostic_msgs/msg/KeyValue']
     status = TYPES['diagnostic_msgs/msg/DiagnosticStatus']
@@ -55,7 +65,8 @@ def diagnostics(said: Sequence[Said]) -> bytes:
     ]  # fmt: skip
     kind = 'diagnostic_msgs/msg/DiagnosticArray'
     header = TYPES['std_msgs/msg/Header'](TYPES['builtin_interfaces/msg/Time'](1, 2), '')
-    return bytes(STORE.serialize_cdr(TYPES[kind](header, statuses), kind))
+    message = TYPES[kind](header, statuses)
+    return bytes(STORE.serialize_cdr(message, kind, little_endian=little))
 
 
 def turning(tick: int) -> Moment:
@@ -144,3 +155,15 @@ def but(ticks: int, changed: Callable[[int, Moment], Moment | None]) -> list[Mom
     """Return so many ticks of `turning`, each as it is changed; nothing: it never was."""
     moments = (changed(tick, turning(tick)) for tick in range(ticks))
     return [moment for moment in moments if moment is not None]
+
+
+def page_of_run(found: ReportedRun, header: ReportHeader | None = None) -> str:
+    """Return the page of a run, without what its bag has beside it."""
+    return run_html(found, header or ReportHeader('t', [], [], []))
+
+
+def data_of(page: str) -> dict[str, Any]:
+    """Return the data of a page; no number of it is NaN or infinite."""
+    text = page.split('id="data">')[1].split('</script>', maxsplit=1)[0]
+    data: dict[str, Any] = json.loads(text, parse_constant=pytest.fail)
+    return data

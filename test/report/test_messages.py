@@ -25,47 +25,34 @@ from linkage_ros.tools.view.report import (
 import numpy as np
 import pytest
 
-from .runs import recorded
-from ..support.messages import STORE
+from .runs import diagnostics, recorded, Said
+from ..support.messages import joint_state, read_joint_state
 
 # Messages as arrays, as rosbags reads them one by one; damaged ones are left out.
 
 
-TYPES = STORE.types
-STATE, ARRAY = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+STATE = 'sensor_msgs/msg/JointState'
 
 
-def header(stamp, frame=''):
-    time = TYPES['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9))
-    return TYPES['std_msgs/msg/Header'](time, frame)
-
-
-def state(stamp, joints, frame='', rates=True, efforts=False):
-    names, values = [*joints], np.array([*joints.values()], float)
-    none = np.array([])
-    return TYPES[STATE](
-        header(stamp, frame), names, values,
-        2 * values if rates else none, 3 * values if efforts else none,
-    )  # fmt: skip
-
-
-def encoded(message, little=True):
-    return bytes(STORE.serialize_cdr(message, message.__msgtype__, little_endian=little))
+def state(joints, rates=True, efforts=False, **options):
+    """Return a joint state of joints with their positions; rates and efforts are multiples."""
+    values = np.array([*joints.values()], float)
+    return joint_state(
+        joints, values, 2 * values if rates else (), 3 * values if efforts else (), **options
+    )
 
 
 NAMES = st.text('abcé', min_size=1, max_size=6)
 
 MESSAGES = st.lists(
-    st.tuples(
-        st.builds(
-            state,
-            st.integers(0, 2**31 * 10**9 - 1),
-            st.dictionaries(NAMES, st.floats(-1e9, 1e9), min_size=1, max_size=4),
-            st.sampled_from(['', 'base']),
-            st.booleans(),
-            st.booleans(),
-        ),
+    st.builds(
+        state,
+        st.dictionaries(NAMES, st.floats(-1e9, 1e9), min_size=1, max_size=4),
         st.booleans(),
+        st.booleans(),
+        stamp=st.tuples(st.integers(0, 2**31 - 1), st.integers(0, 10**9 - 1)),
+        frame=st.sampled_from(['', 'base']),
+        little=st.booleans(),
     ),
     max_size=12,
 )
@@ -73,13 +60,12 @@ MESSAGES = st.lists(
 
 @given(MESSAGES)
 def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
-    data = [encoded(message, little) for message, little in messages]
     reader = JointStates()
-    block = reader.read(data)
+    block = reader.read(messages)
     assert block.good.all()
     assert not +reader.left_out
-    for i, one in enumerate(data):
-        read = STORE.deserialize_cdr(one, STATE)
+    for i, one in enumerate(messages):
+        read = read_joint_state(one)
         stamp = read.header.stamp
         assert block.stamps[i] == stamp.sec * 10**9 + stamp.nanosec
         expected = np.full((3, len(reader.joints)), np.nan)
@@ -89,19 +75,16 @@ def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
         assert np.array_equal(block.numbers[i], expected, equal_nan=True)
 
 
-GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
-TWICE = TYPES[STATE](header(5), ['a', 'a'], np.ones(2), np.array([]), np.array([]))
-UNEQUAL = TYPES[STATE](header(5), ['a', 'b'], np.ones(2), np.ones(1), np.array([]))
-NOTHING = TYPES[STATE](header(5), [], np.array([]), np.array([]), np.array([]))
-NAMES_ALONE = TYPES[STATE](header(5), ['a'], np.array([]), np.array([]), np.array([]))
+GOOD = state({'a': 1.0, 'b': 2.0})
+TWICE = joint_state(['a', 'a'], [1.0, 1.0])
 
 BAD = {
     'malformed message': [
         b'', b'\x00\x01', GOOD[:40], b'\x07' * len(GOOD), GOOD[:4] + b'\xff' * 90
     ],
-    'a joint named twice': [encoded(TWICE)],
-    'arrays of unequal length': [encoded(UNEQUAL)],
-    'no joints or no numbers': [encoded(NOTHING), encoded(NAMES_ALONE)],
+    'a joint named twice': [TWICE],
+    'arrays of unequal length': [joint_state(['a', 'b'], [1.0, 1.0], [1.0])],
+    'no joints or no numbers': [joint_state([]), joint_state(['a'])],
 }  # fmt: skip
 
 
@@ -115,9 +98,8 @@ def test_what_is_no_joint_state_is_left_out_and_counted(reason):
 
 
 def test_a_command_may_have_efforts_alone():
-    command = TYPES[STATE](header(0), ['a'], np.array([]), np.array([]), np.array([1.5]))
     reader = JointStates()
-    block = reader.read([encoded(command)])
+    block = reader.read([joint_state(['a'], efforts=[1.5])])
     assert block.good.all()
     assert np.array_equal(block.numbers[0], [[np.nan], [np.nan], [1.5]], equal_nan=True)
 
@@ -125,7 +107,7 @@ def test_a_command_may_have_efforts_alone():
 def test_joints_beyond_what_one_could_look_at_are_counted():
     many = {f'j{i}': float(i) for i in range(MOST_JOINTS + 3)}
     reader = JointStates()
-    block = reader.read([encoded(state(5, many))] * 2)
+    block = reader.read([state(many)] * 2)
     assert block.numbers.shape == (2, 3, MOST_JOINTS)
     assert [*block.numbers[1, 0]] == [float(i) for i in range(MOST_JOINTS)]
     assert +reader.left_out == {'joints beyond the first 64': 6}
@@ -133,46 +115,29 @@ def test_joints_beyond_what_one_could_look_at_are_counted():
 
 def test_ever_new_layouts_do_not_take_ever_more_time():
     # Of one length, each with other names.
-    data = [encoded(state(5, {f'joint_{i:05}': 1.0})) for i in range(3000)]
+    data = [state({f'joint_{i:05}': 1.0}) for i in range(3000)]
     reader = JointStates()
     block = reader.read(data)
     assert block.good.sum() == 64
     assert +reader.left_out == {'ever new layouts': 2936}
 
 
-LEVELS = [0, 1, 2, 3]
-
-
-def array(*told):
-    pair = TYPES['diagnostic_msgs/msg/KeyValue']
-    status = TYPES['diagnostic_msgs/msg/DiagnosticStatus']
-    said = [
-        status(level, name, message, 'hw', [pair(key, value) for key, value in values.items()])
-        for level, name, message, values in told
-    ]
-    return TYPES[ARRAY](header(7), said)
+TEXTS = st.text(max_size=9).map(lambda text: text.replace('\0', ''))
 
 
 @given(
     st.lists(
-        st.tuples(
-            st.sampled_from(LEVELS),
-            st.text(max_size=9),
-            st.text(max_size=9),
-            st.dictionaries(st.text(max_size=5), st.text(max_size=5), max_size=3),
+        st.builds(
+            Said, st.just(0), TEXTS, st.dictionaries(TEXTS, TEXTS, max_size=3),
+            st.integers(0, 3), TEXTS,
         ),
         max_size=4,
     ),
     st.booleans(),
-)
-def test_diagnostics_are_read_as_rosbags_writes_them(told, little):
-    clean = [
-        (level, *(text.replace('\0', '') for text in (name, message)),
-         {k.replace('\0', ''): v.replace('\0', '') for k, v in values.items()})
-        for level, name, message, values in told
-    ]  # fmt: skip
-    found = read_statuses(encoded(array(*clean), little))
-    assert [tuple(each) for each in found] == clean
+)  # fmt: skip
+def test_diagnostics_are_read_as_rosbags_writes_them(said, little):
+    expected = [(one.level, f'{one.node}: {one.task}', one.message, one.values) for one in said]
+    assert [tuple(each) for each in read_statuses(diagnostics(said, little))] == expected
 
 
 def test_diagnostics_are_read_as_the_node_writes_them():
@@ -195,20 +160,12 @@ def test_diagnostics_are_read_as_the_node_writes_them():
     ]
 
 
-def test_what_says_to_hold_more_than_any_is_damaged():
-    whole = encoded(array(*[(0, '', '', {})] * 10_001))
-    assert read_statuses(whole) == []
-
-
 def test_damaged_diagnostics_say_nothing():
-    whole = encoded(array((2, 'tick', 'late', {'a': 'b'}), (0, 'crank', '', {})))
+    assert read_statuses(diagnostics([Said(0, '', {})] * 10_001)) == []
+    whole = diagnostics([Said(0, 'tick', {'a': 'b'}, 2, 'late'), Said(0, 'crank', {})])
     assert len(read_statuses(whole)) == 2
     for cut in range(len(whole)):
         assert read_statuses(whole[:cut]) == []
-    for at in range(12, len(whole)):
-        data = bytearray(whole)
-        data[at] = 0xFF
-        read_statuses(bytes(data))
 
 
 # A bag in blocks: nothing is lost, ticks stay whole, and counts are those of ``linkage info``.

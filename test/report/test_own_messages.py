@@ -8,12 +8,11 @@
 
 """A report shows curves, diagnostics and samples of a run as they were recorded."""
 
-import json
 from math import inf, nan
 from pathlib import Path
 
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.tools.view.report import page_data, ReportHeader, run_html
+from linkage_ros.tools.view.report import page_data
 from linkage_ros.tools.view.report.diagnostics_summary import _COUNTED
 import numpy as np
 import pytest
@@ -22,22 +21,21 @@ from .runs import (
     BEGIN,
     but,
     curve,
+    data_of,
     MS,
     on_lanes,
+    page_of_run,
     read,
     recorded,
     Said,
     sample,
-    STORE,
     turning,
-    TYPES,
 )
+from .test_own_runs import SHORT_MEMORY, without_samples
+from ..support.messages import joint_state, read_joint_state
 from ..support.scenes import four_bar_text
 
 # Curves agree with the messages of a run; implausible numbers break nothing.
-
-
-STATE = 'sensor_msgs/msg/JointState'
 
 
 def test_ticks_are_late_by_what_they_were_late(tmp_path):
@@ -57,7 +55,7 @@ def test_curves_are_what_messages_say(tmp_path):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
     found = read(bag)
     states = [
-        STORE.deserialize_cdr(message.data, STATE)
+        read_joint_state(message.data)
         for message in bag.messages()
         if message.topic == '/joint_states'
     ]
@@ -85,10 +83,6 @@ TORQUE = 'drive: {torque: {}}\nloads: {drive_inertia: 0.001}\n'
 FOUR_BAR_WITH_MASSES = four_bar_text(0.04, 0.12, 0.08, 0.1, [(0.1, 0, 1e-5)] * 3)
 
 
-def page(found):
-    return run_html(found, ReportHeader('t', [], [], []))
-
-
 @pytest.mark.parametrize('value', [nan, inf, -inf, 1e308])
 def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
     pytest.importorskip('plotly')
@@ -106,18 +100,10 @@ def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
             return iter(messages)
 
     changed = Changed(*(getattr(bag, name) for name in bag.__slots__))
-    text = page(read(changed))
-    json.loads(text.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)
+    data_of(page_of_run(read(changed)))
 
 
 # The diagnostics of a run: lost ticks, dropped messages, warnings, and when it ended.
-
-
-SHORT_MEMORY = 'drive: {topic: {max_age: 0.2}}\n'
-
-
-def without_samples(first, last):
-    return lambda tick, m: m._replace(messages=()) if first <= tick <= last else m
 
 
 def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
@@ -208,28 +194,23 @@ def test_what_could_not_be_known_is_not_said_to_be_none(tmp_path):
 # Samples of the crank: rejected for the reason of the run, with the same age at each tick.
 
 
-def joint_state(stamp, names, positions, rates):
-    time = TYPES['builtin_interfaces/msg/Time'](*divmod(BEGIN + stamp, 10**9))
-    message = TYPES[STATE](
-        TYPES['std_msgs/msg/Header'](time, ''), names, np.array(positions, float),
-        np.array(rates, float), np.array([]),
-    )  # fmt: skip
-    return bytes(STORE.serialize_cdr(message, STATE))
+def sent(names, positions, rates, at=0):
+    """Return a sample, stamped so many [ms] after tick 500; None for a stamp of zero."""
+    stamp = (0, 0) if at is None else divmod(BEGIN + (500 + at) * MS, 10**9)
+    return joint_state(names, positions, rates, stamp=stamp)
 
 
-AT = 500 * MS
 ONE = ['crank_joint']
-
 REJECTED = {
     'malformed message': b'\0\1\0\0abc',
-    'no joints or no positions': joint_state(AT, [], [], []),
-    'arrays of unequal length': joint_state(AT, ONE, [1, 2], [1]),
-    'crank joint named twice': joint_state(AT, ONE * 2, [1, 1], [1, 1]),
-    'position or rate not finite': joint_state(AT, ONE, [nan], [1]),
-    'position or rate beyond 1e10': joint_state(AT, ONE, [1e11], [1]),
-    'stamp zero': joint_state(-BEGIN, ONE, [1], [1]),
-    'stamp in the future': joint_state(AT + 101 * MS, ONE, [1], [1]),
-    'stamp older than the last': joint_state(AT - 2 * MS, ONE, [1], [1]),
+    'no joints or no positions': sent([], [], []),
+    'arrays of unequal length': sent(ONE, [1, 2], [1]),
+    'crank joint named twice': sent(ONE * 2, [1, 1], [1, 1]),
+    'position or rate not finite': sent(ONE, [nan], [1]),
+    'position or rate beyond 1e10': sent(ONE, [1e11], [1]),
+    'stamp zero': sent(ONE, [1], [1], None),
+    'stamp in the future': sent(ONE, [1], [1], 101),
+    'stamp older than the last': sent(ONE, [1], [1], -2),
 }
 
 
@@ -246,9 +227,9 @@ def test_samples_are_rejected_for_the_reason_for_which_the_drive_did(tmp_path, r
 
 
 OTHERS = {
-    'another joint': joint_state(AT, ['knee'], [1], [1]),
-    'another joint, without positions': joint_state(AT, ['knee'], [], [1]),
-    'other joints, arrays of unequal length': joint_state(AT, ['knee', 'hip'], [1], [1, 2]),
+    'another joint': sent(['knee'], [1], [1]),
+    'another joint, without positions': sent(['knee'], [], [1]),
+    'other joints, arrays of unequal length': sent(['knee', 'hip'], [1], [1, 2]),
 }
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from .runs import BEGIN, but, curve, from_then_on, MS, on_lanes, read, recorded, Said, sample
-from .test_messages import encoded, GOOD, TWICE
+from .test_messages import GOOD, TWICE
 from ..node.ticked import Moment
 
 QUIET = 'faults: {quiet: {silence: {}}, worn: {stuck: {joint: rocker_joint}}}\n'
@@ -341,31 +341,34 @@ def test_joints_that_turn_up_later_are_counted(tmp_path):
     assert found.left_out == {('/j', 'messages with joints that turn up later'): 1000}
 
 
-def test_what_stands_late_by_less_than_a_second_is_no_jump(tmp_path):
-    times = [0, 10, 20, 900, 30, 910, 2000, 2010]
-    found = foreign(tmp_path, [('/j', ms, state({'a': float(ms)})) for ms in times])
-    assert (found.curves[0].intervals.begins / MS).tolist() == [
-        0, 10, 20, 900, 900, 910, 2000, 2010
-    ]  # fmt: skip
-    assert found.curves[0].intervals.first[:, 0].tolist() == times
-    assert 'jump' not in on_lanes(found)
+# Log times of messages on one topic in their order, their times in the run where these differ,
+# and what is on the lanes.
+TIMES = {
+    'late by less than a second': (
+        [0, 10, 20, 900, 30, 910, 2000, 2010],
+        [0, 10, 20, 900, 900, 910, 2000, 2010],
+        {'silent': [(20, 900, 1, ''), (910, 2000, 1, '')]},
+    ),
+    'late by more': (
+        [0, 10, 5000, 3000, 3010],
+        [0, 10, 5000, 5000, 5010],
+        {'jump': [(5000, 5000, 1, 'by 2 s')], 'silent': [(10, 5000, 1, '')]},
+    ),
+    'a silence': ([*range(0, 1000, 10), *range(3000, 4000, 10)], None,
+                  {'silent': [(990, 3000, 1, '')]}),
+}  # fmt: skip
 
 
-def test_what_stands_late_by_more_is_one(tmp_path):
-    times = [0, 10, 5000, 3000, 3010]
-    found = foreign(tmp_path, [('/j', ms, state({'a': float(ms)})) for ms in times])
-    assert (found.curves[0].intervals.begins / MS).tolist() == [0, 10, 5000, 5000, 5010]
-    assert on_lanes(found)['jump'] == [(5000, 5000, 1, 'by 2 s')]
-
-
-def test_one_topic_that_is_silent(tmp_path):
-    times = [*range(0, 1000, 10), *range(3000, 4000, 10)]
-    found = foreign(tmp_path, [('/j', ms, state({'a': 0.0})) for ms in times])
-    assert on_lanes(found) == {'silent': [(990, 3000, 1, '')]}
+@pytest.mark.parametrize('name', TIMES)
+def test_the_time_of_one_topic_goes_on(tmp_path, name):
+    logged, times, lanes = TIMES[name]
+    found = foreign(tmp_path, [('/j', ms, state({'a': float(ms)})) for ms in logged])
+    assert curve(found, 'a', 'position') == (times or logged, logged)
+    assert on_lanes(found) == lanes
 
 
 def test_what_cannot_be_read_is_counted_by_topic(tmp_path):
-    rows = [('/j', 0, GOOD), ('/j', 1, encoded(TWICE)), ('/j', 2, b'no'), ('/k', 3, b'')]
+    rows = [('/j', 0, GOOD), ('/j', 1, TWICE), ('/j', 2, b'no'), ('/k', 3, b'')]
     found = foreign(tmp_path, rows)
     assert found.curves[0].rows == 1
     assert found.left_out == {
@@ -388,8 +391,3 @@ def test_other_topics_are_counted_and_not_drawn(tmp_path):
     assert not found.curves
     (topic,) = found.contents.topics
     assert (topic.messages, topic.size) == (5, 15)
-
-
-def test_curve_is_the_helper_that_it_says(tmp_path):
-    found = foreign(tmp_path, [('/j', ms, state({'a': ms / 2})) for ms in range(5)])
-    assert curve(found, 'a', 'position') == ([0, 1, 2, 3, 4], [0, 0.5, 1, 1.5, 2])

@@ -6,9 +6,12 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""The page of a run in a real browser: what it shows is what was recorded, and it can be used."""
+"""The page of a run in a browser: it fits, moves, zooms and tells what was recorded."""
 
+from base64 import b64decode
 from cmath import rect
+from contextlib import contextmanager
+from itertools import combinations, pairwise
 from math import pi
 import random
 import re
@@ -20,6 +23,7 @@ import numpy as np
 import pytest
 
 from . import bags
+from .runs import but, data_of, recorded as recorded_run
 from ..browser.opened import opened
 
 pytest.importorskip('plotly', reason='is within the page')
@@ -28,6 +32,7 @@ FLOAT32 = 2e-8
 """A link's place and angle are numbers of 32 bits: so much of it is seen in a pin, in [m]."""
 
 TICK = 0.0101
+DEGREE = pi / 180
 
 COLOURS = """() => {
   const style = getComputedStyle(document.body);
@@ -81,6 +86,38 @@ COLOUR_AT = f"""([x, y]) => {{ {COPY}
   const [r, g, b, a] = copied(canvas).slice(at, at + 4);
   return a ? [r, g, b].join() : '';
 }}"""
+PLOT = """(key) => {
+  const figure = document.querySelector(`[data-plot="${key}"]`);
+  return {
+    caption: figure.querySelector('figcaption').textContent,
+    axis: figure.querySelector('.plot').layout.yaxis.title.text,
+  };
+}"""
+# Boxes of elements in a plot: left, top, right and bottom.
+BOXES = """(selector) => [
+  ...document.querySelectorAll(`[data-plot=events] ${selector}`),
+].map((each) => {
+  const {left, top, right, bottom} = each.getBoundingClientRect();
+  return [left, top, right, bottom];
+})"""
+# Elements that reach beyond the window; what scrolls within its own box may.
+WIDER = """() => [...document.body.querySelectorAll(':not(.scroll *, svg *)')]
+  .filter((each) =>
+    each.getBoundingClientRect().right > document.documentElement.clientWidth + 0.5)
+  .map((each) => `${each.tagName} ${each.id} ${each.className}`)"""
+BROKEN = """() => {
+  const broken = [];
+  const walk = document.createTreeWalker(document.getElementById('readout'), NodeFilter.SHOW_TEXT);
+  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
+    for (const found of node.data.matchAll(/[A-Za-z]+/g)) {
+      const range = document.createRange();
+      range.setStart(node, found.index);
+      range.setEnd(node, found.index + found[0].length);
+      if (range.getClientRects().length > 1) broken.push(found[0]);
+    }
+  }
+  return broken;
+}"""
 INPUT_FACE, LINK_FACE = '240,160,122', '195,211,226'
 DARK_INPUT_FACE = '168,85,58'
 
@@ -109,30 +146,56 @@ def drill_file(drill_bag):
 @pytest.fixture(scope='module')
 def read(browser, drill_file):
     """Give a page for those who leave it as it was."""
-    with opened(browser, drill_file) as shown:
-        yield shown
+    with quiet(browser, drill_file) as page:
+        yield page
 
 
 @pytest.fixture
 def drill(read):
     """Give the page, at the beginning of the run and with all of it in its plots."""
-    read.page.evaluate('Report.pause(); Report.zoom(null); Report.seek(0)')
-    read.page.locator('#traces').check()
-    read.page.evaluate('document.activeElement.blur(); scrollTo(0, 0)')
-    settle(read.page)
+    read.evaluate('Report.pause(); Report.zoom(null); Report.seek(0)')
+    read.locator('#traces').check()
+    read.evaluate('document.activeElement.blur(); scrollTo(0, 0)')
+    settle(read)
     return read
 
 
 @pytest.fixture(scope='module')
 def long_run(browser, folder):
     bag, rockers = bags.long(folder / 'long')
-    with opened(browser, page_of(bag)) as shown:
-        yield shown, rockers
+    with quiet(browser, page_of(bag)) as page:
+        yield page, rockers
 
 
 @pytest.fixture(scope='module')
 def foreign_file(folder):
     return page_of(bags.foreign(folder / 'foreign'))
+
+
+@pytest.fixture(scope='module')
+def turning_page(browser, folder):
+    """Give the page of a crank that turns twice in 4 s."""
+    with quiet(browser, page_of(bags.turning(folder / 'turning', 'continuous'))) as page:
+        yield page
+
+
+@pytest.fixture
+def turning(turning_page):
+    turning_page.evaluate('document.activeElement.blur(); Report.zoom(null)')
+    turning_page.locator('#unit').select_option('rad')
+    turning_page.locator('#range').select_option('continuous')
+    settle(turning_page)
+    return turning_page
+
+
+@contextmanager
+def quiet(browser, file, **options):
+    """Open a page; at its end it has asked for nothing, said nothing, and fits its window."""
+    with opened(browser, file, **options) as shown:
+        yield shown.page
+        assert not shown.said
+        assert shown.asked == [file.as_uri()]
+        assert not shown.is_wider_than_its_window()
 
 
 def settle(page):
@@ -153,6 +216,28 @@ def readout(page):
     return dict(zip(terms, told, strict=True))
 
 
+def values(page, joint='crank_joint', plot='positions_rad'):
+    """Return the values of a curve, without its interruptions."""
+    told = page.evaluate(TRACE, [plot, joint])['y']
+    return np.array([value for value in told if value is not None])
+
+
+def longest_step(page):
+    """Return the greatest step between neighbours of the crank's angles."""
+    told = page.evaluate(TRACE, ['positions_rad', 'crank_joint'])['y']
+    return max(abs(b - a) for a, b in pairwise(told) if a is not None and b is not None)
+
+
+def data_in(plot):
+    return f'document.querySelector("[data-plot={plot}] .plot").data'
+
+
+def painted_faces(page):
+    """Return whether the crank is painted in its light and in its dark colour."""
+    (painted,) = page.evaluate(PAINTED)
+    return [painted.get(face, 0) > 100 for face in (INPUT_FACE, DARK_INPUT_FACE)]
+
+
 def pixel_of(page, plot, x, y):
     """Return where a place of a plot is in the window, after it has been scrolled there."""
     place = page.locator(f'[data-plot="{plot}"] .plot')
@@ -171,113 +256,147 @@ def brightness(colour):
     return sum(map(int, re.findall(r'\d+', colour)[:3])) / 3
 
 
-def run_times(messages):
-    """Yield messages with the time of the run, in [s], which a clock that is set back leaves."""
-    begin = last = messages[0][1]
-    added = 0
-    for message in messages:
-        added += max(0, last - message[1])
-        last = message[1]
-        yield (message[1] - begin + added) * 1e-9, message
-
-
 @pytest.fixture(scope='module')
-def recorded(drill_bag):
-    """Give times and pins of all poses of the bag, by its numbers and the law of the circle."""
-    samples = bags.joint_states(drill_bag, bags.CRANK)
-    good = [each for each in samples if np.isfinite(each[4]).all()]
-    numbers = [each[0] for each in good]
-    times, pins = [], []
-    for time, (number, _, stamp, names, values) in run_times(
-        bags.joint_states(drill_bag, bags.STATES)
-    ):
-        assert names == ['coupler_joint', 'rocker_joint']
-        _, _, taken, _, (angle, rate) = good[np.searchsorted(numbers, number) - 1]
-        crank = angle + rate * (stamp - taken) * 1e-9
-        coupler, rocker = values[:2]
-        knee = rect(bags.A, crank)
-        times.append(time)
-        pins.append((
-            knee, knee + rect(bags.B, crank + coupler), bags.D + rect(bags.C, rocker)
-        ))  # fmt: skip
-    return np.array(times), np.array(pins)
+def recorded(drill_file):
+    """Give times and pins of all poses, as the page's data have them."""
+    data = data_of(drill_file.read_text('utf-8'))
+    (linkage,) = data['linkages']
+    times = np.frombuffer(b64decode(data['frames']['times']), '<f8')
+    poses = np.frombuffer(b64decode(linkage['poses']), '<f4').astype(float)
+    x, y, angle = np.moveaxis(poses.reshape(len(times), -1, 3), 2, 0)
+    links = [linkage['links'].index(link) for link in ('crank', 'coupler', 'rocker')]
+    pins = (x + 1j * y)[:, links] + [bags.A, bags.B, bags.C] * np.exp(1j * angle[:, links])
+    return times, pins
 
 
-@pytest.mark.parametrize('scheme', ['light', 'dark'])
-@pytest.mark.parametrize('width', [400, 1600])
+# It opens, fits, and has its colours.
+
+
+@pytest.mark.parametrize(('width', 'scheme'), [(400, 'dark'), (1600, 'light')])
 def test_it_opens_without_a_word_a_request_or_a_scroll_bar(browser, drill_file, width, scheme):
-    with opened(browser, drill_file, width=width, color_scheme=scheme) as shown:
-        assert shown.page.title() == 'Run of drill & <b>bold</b>'
-        assert not shown.said
-        assert shown.asked == [drill_file.as_uri()]
-        assert not shown.is_wider_than_its_window()
-        ink, paper = map(brightness, shown.page.evaluate(COLOURS))
+    with quiet(browser, drill_file, width=width, color_scheme=scheme) as page:
+        assert page.title() == 'Run of drill & <b>bold</b>'
+        assert page.evaluate(WIDER) == []
+        ink, paper = map(brightness, page.evaluate(COLOURS))
         assert (paper > 220 and ink < 80) if scheme == 'light' else (paper < 60 and ink > 200)
-        assert all(count for _, count in shown.page.evaluate(DRAWN))
-        (painted,) = shown.page.evaluate(PAINTED)
-        assert painted[INPUT_FACE if scheme == 'light' else DARK_INPUT_FACE] > 100
-        assert (DARK_INPUT_FACE if scheme == 'light' else INPUT_FACE) not in painted
-
-
-def test_light_and_dark_are_what_the_reader_has_chosen_also_while_it_is_open(drill):
-    line = drill.page.evaluate(TRACE, ['positions_rad', 'crank_joint'])['colour']
-    drill.page.emulate_media(color_scheme='dark')
-    settle(drill.page)
-    (painted,) = drill.page.evaluate(PAINTED)
-    assert DARK_INPUT_FACE in painted
-    assert INPUT_FACE not in painted
-    assert drill.page.evaluate(TRACE, ['positions_rad', 'crank_joint'])['colour'] != line
-    drill.page.emulate_media(color_scheme='light')
-    settle(drill.page)
-    assert INPUT_FACE in drill.page.evaluate(PAINTED)[0]
-    assert not drill.said
-
-
-BROKEN = """() => {
-  const broken = [];
-  const walk = document.createTreeWalker(document.getElementById('readout'), NodeFilter.SHOW_TEXT);
-  for (let node = walk.nextNode(); node; node = walk.nextNode()) {
-    for (const found of node.data.matchAll(/[A-Za-z]+/g)) {
-      const range = document.createRange();
-      range.setStart(node, found.index);
-      range.setEnd(node, found.index + found[0].length);
-      if (range.getClientRects().length > 1) broken.push(found[0]);
-    }
-  }
-  return broken;
-}"""
+        assert all(count for _, count in page.evaluate(DRAWN))
+        assert painted_faces(page) == [scheme == 'light', scheme == 'dark']
+        # At 400 pixels no word of the readout is broken, whatever it tells.
+        for time in (0.0, 2.05, 5.1):
+            page.evaluate('(time) => Report.seek(time)', time)
+            assert page.evaluate(BROKEN) == []
 
 
 def test_it_opens_at_the_first_pose(browser, folder):
     """A crank may come long after the run began: an empty picture would say nothing."""
-    with opened(browser, page_of(bags.late(folder / 'late'))) as shown:
-        assert shown.page.evaluate(PINS) is not None
-        assert float(readout(shown.page)['time'].removesuffix(' s')) == pytest.approx(
-            0.6, abs=0.05
+    with quiet(browser, page_of(bags.drill(folder / 'late', begin=0.6))) as page:
+        assert page.evaluate(PINS) is not None
+        time = float(readout(page)['time'].removesuffix(' s'))
+        assert time == pytest.approx(0.6, abs=0.05)
+
+
+def test_light_and_dark_are_what_the_system_and_the_switch_say_and_paper_is_light(
+    browser, drill_file
+):
+    with quiet(browser, drill_file, width=1600, color_scheme='light') as page:
+
+        def looks():
+            settle(page)
+            line = page.evaluate(TRACE, ['positions_rad', 'crank_joint'])['colour']
+            return page.evaluate(COLOURS), line, painted_faces(page)
+
+        light = looks()
+        page.emulate_media(color_scheme='dark')
+        dark = looks()
+        assert light[2:] == ([True, False],)
+        assert dark[2:] == ([False, True],)
+        assert light[1] != dark[1]
+        page.locator('#scheme').click()
+        assert looks() == light
+        page.keyboard.press('l')
+        assert looks() == dark
+        # What was chosen stays, whatever the system asks for.
+        page.emulate_media(color_scheme='light')
+        assert looks() == dark
+        page.emulate_media(media='print', color_scheme='dark')
+        colours, _, faces = looks()
+        assert (colours, faces) == (['rgb(0, 0, 0)', 'rgb(255, 255, 255)'], [True, False])
+        widths = page.evaluate(
+            "[...document.querySelectorAll('.main-svg, canvas')].map((each) => each.clientWidth)"
         )
-        assert not shown.said
+        # What is left of a sheet of A4 between its margins.
+        assert max(widths) <= 178 / 25.4 * 96
+        assert not any(each.is_visible() for each in page.locator('.controls, #scheme').all())
+        page.emulate_media(media='screen', color_scheme='dark')
+        assert looks() == dark
 
 
-def test_at_400_pixels_no_word_of_the_readout_is_broken(browser, drill_file):
-    with opened(browser, drill_file, width=400) as shown:
-        for time in (0.0, 2.05, 5.1):
-            shown.page.evaluate('(time) => Report.seek(time)', time)
-            assert shown.page.evaluate(BROKEN) == []
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_file, scheme):
+    with quiet(browser, drill_file, forced_colors='active', color_scheme=scheme) as page:
+        assert painted_faces(page) == [scheme == 'light', scheme == 'dark']
+        for place in ('canvas', '[data-plot=rates_rad] .main-svg'):
+            ground = page.locator(place).first.evaluate(
+                '(each) => getComputedStyle(each).backgroundColor'
+            )
+            # What is painted was chosen for the page's own paper.
+            assert ground == ('rgb(255, 255, 255)' if scheme == 'light' else 'rgb(21, 25, 30)')
+        page.locator('#onward').click()
+        assert page.evaluate('Report.number') == 1
+        for button in page.locator('.controls button').all():
+            ink, ground = button.evaluate(
+                '(each) => [getComputedStyle(each).color, getComputedStyle(each).backgroundColor]'
+            )
+            assert abs(brightness(ink) - brightness(ground)) > 100
+
+
+def test_it_takes_the_width_of_its_window_and_a_foreign_font_does_not_break_it(
+    browser, drill_file
+):
+    with quiet(browser, drill_file) as page:
+        for width in (1600, 400, 1000):
+            page.set_viewport_size({'width': width, 'height': 900})
+            page.wait_for_function(
+                """() => [...document.querySelectorAll('[data-plot]')].every((figure) =>
+                  Math.abs(figure.clientWidth
+                    - figure.querySelector('.main-svg').clientWidth) < 2)"""
+            )
+            assert page.evaluate(WIDER) == []
+            assert any(painted_faces(page))
+        page.add_style_tag(content='* { font: 22px/1.6 monospace !important; }')
+        page.set_viewport_size({'width': 420, 'height': 900})
+        settle(page)
+        assert all(count for _, count in page.evaluate(DRAWN))
+        page.locator('#onward').click()
+        assert page.evaluate('Report.number') == 1
+
+
+def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
+    with quiet(browser, drill_file, width=400, has_touch=True, is_mobile=True) as page:
+        layout = 'document.querySelector("[data-plot=rates_rad] .plot").layout'
+        assert page.evaluate(f'{layout}.xaxis.fixedrange')
+        assert page.evaluate(f'{layout}.dragmode') is False
+        x, y = pixel_of(page, 'rates_rad', 6.3, 0.0)
+        page.touchscreen.tap(x, y)
+        page.wait_for_function('() => Report.time > 6')
+
+
+# It moves.
 
 
 def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
     times, pins = recorded
-    end = drill.page.evaluate('Report.whole[1]')
+    end = drill.evaluate('Report.whole[1]')
     draws = random.Random(8)
     posed = 0
     for share in [0.0, 1.0, *(draws.random() for _ in range(60))]:
-        time = scrub(drill.page, share)
+        time = scrub(drill, share)
         assert time == pytest.approx(share * end, abs=1e-6 * end)
         newest = np.searchsorted(times, time + 1e-9) - 1
         # Three periods without a joint state are a silence.
         following = times[newest + 1] if newest + 1 < len(times) else times[newest]
         silent = following - times[newest] > 0.03
-        shown = drill.page.evaluate(PINS)
+        shown = drill.evaluate(PINS)
         if silent:
             assert shown is None
             continue
@@ -285,29 +404,24 @@ def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
         found = np.array(shown) @ [1, 1j]
         assert np.abs(found - pins[newest]).max() < FLOAT32
     assert posed > 30
-
-
-def test_a_sensor_that_is_wrong_is_seen_as_such(drill, recorded):
-    times, pins = recorded
-    scrub(drill.page, 0.99)
-    newest = np.searchsorted(times, drill.page.evaluate('Report.time') + 1e-9) - 1
+    # A sensor that is wrong is seen as such.
+    scrub(drill, 0.99)
+    newest = np.searchsorted(times, drill.evaluate('Report.time') + 1e-9) - 1
     apart = abs(pins[newest][1] - pins[newest][2])
     assert apart > 1e-3
-    told = readout(drill.page)['links come apart by']
-    assert told == f'{1e3 * apart:.2f} mm'
+    assert readout(drill)['links come apart by'] == f'{1e3 * apart:.2f} mm'
 
 
 def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
     times, pins = recorded
-    page = drill.page
-    page.locator('#traces').uncheck()
+    drill.locator('#traces').uncheck()
 
     def colour_at(place):
-        return page.evaluate(COLOUR_AT, [place.real, place.imag])
+        return drill.evaluate(COLOUR_AT, [place.real, place.imag])
 
     middles = {}
     for time in (0.5, 1.65):
-        page.evaluate('(time) => Report.seek(time)', time)
+        drill.evaluate('(time) => Report.seek(time)', time)
         newest = np.searchsorted(times, time + 1e-9) - 1
         middles[time] = pins[newest][0] / 2
         for pin_a, pin_b, face in ((0, pins[newest][0], INPUT_FACE),
@@ -317,24 +431,24 @@ def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
     assert abs(middles[0.5] - middles[1.65]) > 0.01
     # Where the crank was before, there is paper.
     assert colour_at(middles[0.5]) == ''
-    page.locator('#traces').check()
+    drill.locator('#traces').check()
 
 
 @pytest.mark.parametrize('time', [1.25, 3.4, 5.1])
 def test_where_no_joint_state_was_recorded_no_pose_is_drawn_and_the_page_says_so(drill, time):
-    assert INPUT_FACE in drill.page.evaluate(PAINTED)[0]
-    drill.page.evaluate('(time) => Report.seek(time)', time)
-    (painted,) = drill.page.evaluate(PAINTED)
+    assert INPUT_FACE in drill.evaluate(PAINTED)[0]
+    drill.evaluate('(time) => Report.seek(time)', time)
+    (painted,) = drill.evaluate(PAINTED)
     assert INPUT_FACE not in painted
     assert LINK_FACE not in painted
-    told = readout(drill.page)
+    told = readout(drill)
     assert told['pose'] == 'none recorded here'
     assert 'gap in joint states' in told['going on']
     assert 'rocker_joint' not in told
 
 
 def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
-    told = readout(drill.page)
+    told = readout(drill)
     assert told['time'] == '0.000000 s'
     coupler, rocker = bags.follow(bags.A, bags.B, bags.C, bags.D, 0.9 * pi * 0.003)
     for joint, value in (('coupler_joint', coupler), ('rocker_joint', rocker)):
@@ -343,23 +457,24 @@ def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
         assert unit == 'rad'
         assert float(degrees.strip('(°)')) == pytest.approx(value * 180 / pi, abs=0.0051)
     assert 'going on' not in told
-    drill.page.evaluate('Report.seek(2.05)')
-    assert 'samples rejected: position or rate not finite' in readout(drill.page)['going on']
+    drill.evaluate('Report.seek(2.05)')
+    assert 'samples rejected: position or rate not finite' in readout(drill)['going on']
 
 
 def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_file):
-    with opened(browser, drill_file) as shown:
-        page = shown.page
+    with quiet(browser, drill_file) as page:
         page.clock.install(time=0)
         page.clock.pause_at(1000)
         for speed in ('1', '0.25', '2'):
             page.evaluate('Report.pause(); Report.seek(0.5)')
+            before = page.evaluate(PINS)
             page.locator('#speed').select_option(speed)
             page.locator('#play').click()
             page.clock.run_for(1000)
             # It goes on picture by picture, of which there are 60 a second.
             passed = page.evaluate('Report.time') - 0.5
             assert passed == pytest.approx(float(speed), abs=0.02 * float(speed))
+            assert page.evaluate(PINS) != before
         assert page.locator('#play').get_attribute('aria-label') == 'Pause'
         page.locator('#play').click()
         stood = page.evaluate('Report.time')
@@ -377,78 +492,84 @@ def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_f
         page.locator('#play').click()
         page.clock.run_for(100)
         assert 0 < page.evaluate('Report.time') < 0.2
-        assert not shown.said
-
-
-def test_the_pose_moves_while_it_plays(drill):
-    before = drill.page.evaluate(PINS)
-    drill.page.locator('#play').click()
-    drill.page.wait_for_function('() => Report.time > 0.05')
-    drill.page.locator('#play').click()
-    assert drill.page.evaluate(PINS) != before
 
 
 def test_buttons_and_keys_step_from_picture_to_picture(drill, recorded):
     times, _ = recorded
-    page = drill.page
     numbers = []
     for act in (
-        lambda: page.locator('#onward').click(),
-        lambda: page.keyboard.press('ArrowRight'),
-        lambda: page.locator('#scrub').press('ArrowRight'),
-        lambda: page.locator('#back').click(),
-        lambda: page.keyboard.press('ArrowLeft'),
+        lambda: drill.locator('#onward').click(),
+        lambda: drill.keyboard.press('ArrowRight'),
+        lambda: drill.locator('#scrub').press('ArrowRight'),
+        lambda: drill.locator('#back').click(),
+        lambda: drill.keyboard.press('ArrowLeft'),
     ):
         act()
-        number = page.evaluate('Report.number')
-        assert page.evaluate('Report.time') == pytest.approx(times[number], abs=1e-9)
+        number = drill.evaluate('Report.number')
+        assert drill.evaluate('Report.time') == pytest.approx(times[number], abs=1e-9)
         numbers.append(number)
     assert numbers == [1, 2, 3, 2, 1]
     for _ in range(3):
-        page.locator('#back').click()
-    assert page.evaluate('Report.number') == 0
-    assert not drill.said
+        drill.locator('#back').click()
+    assert drill.evaluate('Report.number') == 0
 
 
 def test_space_plays_and_pauses_unless_it_is_meant_for_something_else(drill):
-    page = drill.page
-    page.keyboard.press(' ')
-    assert page.evaluate('Report.playing')
-    page.keyboard.press(' ')
-    assert not page.evaluate('Report.playing')
-    page.locator('summary').press(' ')
-    assert page.locator('details').get_attribute('open') is not None
-    assert not page.evaluate('Report.playing')
-    page.locator('summary').press(' ')
-    page.locator('#traces').press(' ')
-    assert not page.evaluate('Report.playing')
-    assert not page.locator('#traces').is_checked()
-    page.locator('#traces').check()
-    before = page.evaluate('Report.number')
-    page.keyboard.press('Control+ArrowRight')
-    assert page.evaluate('Report.number') == before
+    drill.keyboard.press(' ')
+    assert drill.evaluate('Report.playing')
+    drill.keyboard.press(' ')
+    assert not drill.evaluate('Report.playing')
+    drill.locator('summary').press(' ')
+    assert drill.locator('details').get_attribute('open') is not None
+    assert not drill.evaluate('Report.playing')
+    drill.locator('summary').press(' ')
+    drill.locator('#traces').press(' ')
+    assert not drill.evaluate('Report.playing')
+    assert not drill.locator('#traces').is_checked()
+    drill.locator('#traces').check()
+    before = drill.evaluate('Report.number')
+    drill.keyboard.press('Control+ArrowRight')
+    assert drill.evaluate('Report.number') == before
+
+
+def test_each_linkage_of_a_scene_has_its_picture(browser, folder):
+    with quiet(browser, page_of(bags.fingers(folder / 'fingers'))) as page:
+        assert page.locator('.pictures figcaption').all_inner_texts() == ['left', 'right']
+        page.evaluate('Report.seek(1.0)')
+        tips = page.evaluate("""() => Report.linkages.map(
+          (linkage) => linkage.place('crank', 0.04, 0, Report.number))""")
+        for tip, angle in zip(tips, (1.0, -2.0), strict=True):
+            assert abs(complex(*tip) - rect(0.04, angle)) < FLOAT32
+        assert all(painted[INPUT_FACE] > 100 for painted in page.evaluate(PAINTED))
+        told = readout(page)
+        assert told['left_crank_joint'].startswith('1.00000 rad')
+        assert told['right_crank_joint'].startswith('-2.00000 rad')
+        assert [plot for plot, _ in page.evaluate(DRAWN) if plot.startswith('crossed')] == [
+            'crossed_0', 'crossed_1',
+        ]  # fmt: skip
+
+
+# Its plots.
 
 
 def test_a_zoom_in_one_plot_is_one_in_all_and_a_double_click_shows_all_again(drill):
-    page = drill.page
-    whole = page.evaluate('Report.whole')
-    assert page.evaluate(RANGES) == [whole] * 5
-    drag(page, 'rates_rad', 2.0, 4.0)
-    ranges = page.evaluate(RANGES)
+    whole = drill.evaluate('Report.whole')
+    assert drill.evaluate(RANGES) == [whole] * 5
+    drag(drill, 'rates_rad', 2.0, 4.0)
+    ranges = drill.evaluate(RANGES)
     assert ranges == [ranges[0]] * 5
     assert ranges[0] == pytest.approx([2.0, 4.0], abs=0.05)
     # The bar is for all of the run, whatever is shown of it.
-    assert scrub(page, 1.0) == whole[1]
-    lanes = page.evaluate("document.querySelector('[data-plot=events] .plot').data")
+    assert scrub(drill, 1.0) == whole[1]
+    lanes = drill.evaluate("document.querySelector('[data-plot=events] .plot').data")
     shown = [x for lane in lanes for x in lane['x'] if x is not None]
     assert shown
     assert all(whole[0] <= x <= whole[1] for x in shown)
-    x, y = pixel_of(page, 'age', 3.0, 100.0)
-    page.mouse.dblclick(x, y)
-    settle(page)
-    assert page.evaluate(RANGES) == [whole] * 5
-    assert page.evaluate('Report.whole') == whole
-    assert not drill.said
+    x, y = pixel_of(drill, 'age', 3.0, 100.0)
+    drill.mouse.dblclick(x, y)
+    settle(drill)
+    assert drill.evaluate(RANGES) == [whole] * 5
+    assert drill.evaluate('Report.whole') == whole
 
 
 def drag(page, plot, begin, end):
@@ -467,30 +588,25 @@ def drag(page, plot, begin, end):
     settle(page)
 
 
-def test_the_whole_of_a_long_run_holds_its_least_and_greatest_values(long_run):
-    shown, rockers = long_run
-    trace = shown.page.evaluate(TRACE, ['positions_rad', 'rocker_joint'])
-    assert trace['rows'] > 1
-    assert len(trace['x']) < 4000
-    found = 0
-    ends, extremes = np.reshape(trace['x'], (-1, 2)), np.reshape(trace['y'], (-1, 2))
-    for (begin, end), told in zip(
-        np.rint(ends * bags.LONG_RATE).astype(int), extremes, strict=True
-    ):
-        past = end + 1
-        rows = rockers[begin:past]
-        assert sorted(told) == [rows.min(), rows.max()]
-        found += len(rows)
-    assert found == bags.LONG_ROWS
-    spiked = shown.page.evaluate(TRACE, ['rates_rad', 'rocker_joint'])
-    assert max(spiked['y']) == bags.SPIKE
-
-
 def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
-    shown, _ = long_run
-    page = shown.page
+    page, rockers = long_run
     name = ['positions_rad', 'rocker_joint']
-    rows = [page.evaluate(TRACE, name)['rows']]
+    trace = page.evaluate(TRACE, name)
+    rows = [trace['rows']]
+    # All of it has its least and greatest values, and those that run on do not flatten them.
+    assert len(trace['x']) < 4000
+    ends, extremes = np.reshape(trace['x'], (-1, 2)), np.reshape(trace['y'], (-1, 2))
+    numbers = np.rint(ends * bags.LONG_RATE).astype(int)
+    assert (numbers[0, 0], numbers[-1, 1]) == (0, bags.LONG_ROWS - 1)
+    assert (numbers[1:, 0] == numbers[:-1, 1] + 1).all()
+    for (begin, end), told in zip(numbers.tolist(), extremes, strict=True):
+        own = rockers[slice(begin, end + 1)]
+        assert sorted(told) == [own.min(), own.max()]
+    assert max(values(page, 'rocker_joint', 'rates_rad')) == bags.SPIKE
+    low, high = page.evaluate(
+        "document.querySelector('[data-plot=positions_rad] .plot')._fullLayout.yaxis.range"
+    )
+    assert high - low < 1.5 * (rockers.max() - rockers.min())
     for begin, end in ((10.0, 20.0), (12.0, 13.0)):
         drag(page, 'rates_rad', begin, end)
         trace = page.evaluate(TRACE, name)
@@ -504,246 +620,244 @@ def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
     page.evaluate('Report.zoom(null)')
     settle(page)
     assert page.evaluate(TRACE, name)['rows'] == rows[0]
-    assert not shown.said
+    # Each of the 19 jumps leaves the plot at its upper edge, and comes back at its lower one.
+    page.keyboard.press('w')
+    settle(page)
+    wrapped = values(page)
+    assert (np.abs(wrapped) == pi).sum() <= 2 * 19
+    assert np.abs(wrapped).max() <= pi
+    assert longest_step(page) < 0.5
 
 
-def test_angles_that_run_on_do_not_flatten_those_that_swing(long_run):
-    shown, rockers = long_run
-    low, high = shown.page.evaluate(
-        "document.querySelector('[data-plot=positions_rad] .plot')._fullLayout.yaxis.range"
-    )
-    assert high - low < 1.5 * (rockers.max() - rockers.min())
-
-
-def test_the_pointer_over_a_point_tells_its_time_and_its_value_with_units(drill):
-    page = drill.page
-    trace = page.evaluate(TRACE, ['rates_rad', 'crank_joint'])
+def test_the_pointer_tells_what_a_point_and_a_span_are(drill):
+    trace = drill.evaluate(TRACE, ['rates_rad', 'crank_joint'])
     place = next(i for i, x in enumerate(trace['x']) if x is not None and x > 6.2)
-    x, y = pixel_of(page, 'rates_rad', trace['x'][place], trace['y'][place])
-    page.mouse.move(x, y)
-    told = page.locator('.hovertext')
-    told.wait_for()
-    assert 'crank_joint' in told.text_content()
-    assert f'{trace["x"][place]:.6f} s' in told.text_content()
-    assert f'{trace["y"][place]:.9g} rad/s' in told.text_content()
-    page.mouse.move(1, 1)
-
-
-@pytest.mark.parametrize(
-    ('plot', 'word'), [('crossed_0', ' rad'), ('spread_age', ('tick', ' ticks')), ('age', ' ms')]
-)
-def test_every_plot_tells_units(drill, plot, word):
-    told = drill.page.evaluate(
-        '(plot) => document.querySelector(`[data-plot="${plot}"] .plot`).data[0].text', plot
+    time, value = trace['x'][place], trace['y'][place]
+    height = drill.evaluate(
+        "document.querySelector('[data-plot=events] .plot').layout.yaxis.tickvals[2]"
     )
-    assert told
-    assert all(text.endswith(word) for text in told if text and 'NaN' not in text)
-
-
-def test_the_middle_of_a_span_tells_what_it_is(drill):
-    heights = drill.page.evaluate(
-        "document.querySelector('[data-plot=events] .plot').layout.yaxis.tickvals"
-    )
-    x, y = pixel_of(drill.page, 'events', 5.03, heights[2])
-    drill.page.mouse.move(x, y)
-    told = drill.page.locator('.hovertext')
-    told.wait_for()
-    assert 'no pose, by diagnostics' in told.text_content()
-    assert '4.500000 s to 5.500000 s (1 s)' in told.text_content()
-    drill.page.mouse.move(1, 1)
+    for plot, at, told in (
+        ('rates_rad', (time, value), ('crank_joint', f'{time:.6f} s', f'{value:.9g} rad/s')),
+        ('events', (5.03, height), ('no pose, by diagnostics', '4.500000 s to 5.500000 s (1 s)')),
+    ):
+        drill.mouse.move(*pixel_of(drill, plot, *at))
+        text = drill.locator('.hovertext')
+        text.wait_for()
+        assert all(word in text.text_content() for word in told)
+        drill.mouse.move(1, 1)
+        text.wait_for(state='detached')
+    for plot, unit in (('crossed_0', ' rad'), ('spread_age', ('tick', ' ticks')), ('age', ' ms')):
+        texts = [text for text in drill.evaluate(f'{data_in(plot)}[0].text') if text]
+        assert texts
+        assert all(text.endswith(unit) for text in texts if 'NaN' not in text)
 
 
 @pytest.mark.parametrize('y', [0.0, -2.0], ids=['between curves', 'below'])
 def test_a_click_into_a_plot_goes_there(drill, y):
-    page = drill.page
-    x, y = pixel_of(page, 'rates_rad', 6.3, y)
-    page.mouse.click(x, y)
-    assert page.evaluate('Report.time') == pytest.approx(6.3, abs=0.05)
-    for line in page.locator('.cursor').all():
+    x, y = pixel_of(drill, 'rates_rad', 6.3, y)
+    drill.mouse.click(x, y)
+    assert drill.evaluate('Report.time') == pytest.approx(6.3, abs=0.05)
+    for line in drill.locator('.cursor').all():
         assert line.bounding_box()['x'] == pytest.approx(x, abs=5)
-    assert float(page.locator('#scrub').input_value()) / 1e6 == pytest.approx(6.3 / 7.98, abs=0.01)
-    assert not drill.said
+    share = float(drill.locator('#scrub').input_value()) / 1e6
+    assert share == pytest.approx(6.3 / 7.98, abs=0.01)
 
 
-def test_what_happened_stands_on_the_time_line(drill):
-    lanes = drill.page.evaluate(
-        """() => document.querySelector('[data-plot=events] .plot').data
-          .filter((lane) => lane.name).map(({name, x, text}) => ({name, x, text}))"""
+def test_what_happened_stands_on_the_time_line(drill, drill_file):
+    lanes = {lane['title']: lane['spans'] for lane in data_of(drill_file.read_text())['lanes']}
+    assert set(lanes) == set(bags.DRILL_LANES)
+    for title, expected in bags.DRILL_LANES.items():
+        assert len(lanes[title]) == len(expected), title
+        for (begin, end, _, text), wanted in zip(lanes[title], expected, strict=True):
+            assert (begin, end) == pytest.approx(wanted[:2], abs=TICK)
+            assert wanted[2] in text
+    drawn = drill.evaluate(
+        f'{data_in("events")}.filter((lane) => lane.name).map(({{name, x}}) => [name, x])'
     )
-    assert {lane['name'] for lane in lanes} == set(bags.DRILL_LANES)
-    titles = drill.page.locator('[data-plot=events] .ytick text').all_text_contents()
+    for title, times in drawn:
+        spans = lanes.pop(title)
+        assert times.count(None) == len(spans)
+        assert {x for x in times if x is not None} >= {x for span in spans for x in span[:2]}
+    assert not lanes
+    titles = drill.locator('[data-plot=events] .ytick text').all_text_contents()
     # A title of two lines has no space where it is broken.
     assert [title.replace(' ', '') for title in titles] == [
-        lane['name'].replace(' ', '') for lane in lanes
+        title.replace(' ', '') for title, _ in drawn
     ]
-    for lane in lanes:
-        spans, span = [], []
-        for x, text in zip(lane['x'], lane['text'], strict=True):
-            if x is None:
-                spans.append((span[0][0], span[-1][0], span[0][1]))
-                span = []
-            else:
-                span.append((x, text))
-        expected = bags.DRILL_LANES[lane['name']]
-        assert len(spans) == len(expected), lane['name']
-        for (begin, end, text), (wanted_begin, wanted_end, word) in zip(
-            spans, expected, strict=True
-        ):
-            assert begin == pytest.approx(wanted_begin, abs=TICK)
-            assert end == pytest.approx(wanted_end, abs=TICK)
-            assert word in text
 
 
 def test_a_joint_has_one_colour_in_all_plots_and_joints_have_their_own(drill):
     found = {}
     for plot in ('positions_rad', 'rates_rad', 'crossed_0'):
-        for trace in drill.page.evaluate(
-            '(plot) => document.querySelector(`[data-plot="${plot}"] .plot`).data', plot
-        ):
+        for trace in drill.evaluate(data_in(plot)):
             found.setdefault(trace['name'], set()).add(trace['marker']['color'])
     assert set(found) == {'crank_joint', 'coupler_joint', 'rocker_joint'}
     assert all(len(colours) == 1 for colours in found.values())
     assert len(set.union(*found.values())) == 3
 
 
+@pytest.fixture(scope='module')
+def faulty_file(folder):
+    """Return the page of a run in which faults begin together, overlap and follow each other."""
+    names = ('loose_plug', 'worn_gear', 'bad_encoder', 'hung_driver')
+    faults = ', '.join(f'{name}: {{silence: {{}}}}' for name in names)
+    asked = {
+        100: ((names[0], True), (names[1], True)),
+        300: ((names[0], False), (names[2], True)),
+        310: ((names[2], False),),
+        320: ((names[3], True),),
+        980: ((names[1], False),),
+    }
+    place = folder / 'faulty'
+    place.mkdir()
+    moments = but(1000, lambda tick, moment: moment._replace(asked=asked.get(tick, ())))
+    return names, page_of(recorded_run(place, f'faults: {{{faults}}}\n', moments).path)
+
+
+@pytest.mark.parametrize('width', [400, 1600])
+def test_each_fault_is_named_at_its_bar_no_name_lies_on_another_and_wide_tables_scroll(
+    browser, faulty_file, width
+):
+    names, file = faulty_file
+    with quiet(browser, file, width=width) as page:
+        told = page.locator('[data-plot=events] .annotation-text').all_text_contents()
+        assert sorted(told) == sorted(names)
+        boxes = page.evaluate(BOXES, '.annotation-text')
+        rows = page.evaluate(BOXES, '.ytick text')
+        ((left, _, right, _),) = page.evaluate(BOXES, '.nsewdrag')
+        assert all(left <= box[0] and box[2] <= right + 1 for box in boxes)
+        # The names of rows have a gutter of their own, left of the bars and the time.
+        assert all(box[2] <= left for box in rows)
+        assert all(box[0] >= 0 for box in rows)
+        for one, other in combinations([*boxes, *rows], 2):
+            apart = one[2] <= other[0] or other[2] <= one[0]
+            assert apart or one[3] <= other[1] + 2 or other[3] <= one[1] + 2
+        assert page.evaluate(WIDER) == []
+        topics = page.locator('figure:has(figcaption:text-is("Topics")) .scroll')
+        inner, outer = topics.evaluate('(each) => [each.scrollWidth, each.clientWidth]')
+        if width == 400:
+            assert inner > outer
+            topics.focus()
+            page.keyboard.press('ArrowRight')
+            page.wait_for_function(
+                '() => [...document.querySelectorAll(".scroll")].some((each) => each.scrollLeft)'
+            )
+
+
+# Its switches and keys.
+
+
+def test_the_switch_to_degrees_changes_titles_values_and_the_readout(turning):
+    radians = {key: values(turning, plot=key) for key in ('positions_rad', 'rates_rad')}
+    assert turning.evaluate(PLOT, 'rates_rad') == {
+        'caption': 'Rates of angles [rad/s]', 'axis': '[rad/s]'
+    }  # fmt: skip
+    turning.evaluate('Report.seek(2.5)')
+    assert readout(turning)['crank_joint'] == '7.85398 rad (1 turn + 90.00°)'
+    turning.locator('#unit').select_option('degrees')
+    settle(turning)
+    assert turning.evaluate(PLOT, 'positions_rad') == {'caption': 'Angles [°]', 'axis': '[°]'}
+    assert turning.evaluate(PLOT, 'rates_rad') == {
+        'caption': 'Rates of angles [°/s]', 'axis': '[°/s]'
+    }  # fmt: skip
+    for key, before in radians.items():
+        assert values(turning, plot=key) == pytest.approx(before / DEGREE)
+    assert readout(turning)['crank_joint'] == '450.000° (1 turn + 90.00°)'
+    over = "document.querySelector('[data-plot=crossed_0] .plot').layout"
+    assert turning.evaluate(f'{over}.xaxis.range') == [0, 360]
+    assert turning.evaluate(f'{over}.yaxis.title.text') == '[°]'
+    turning.locator('#unit').select_option('rad')
+    settle(turning)
+    assert (values(turning) == radians['positions_rad']).all()
+
+
+def test_within_half_a_turn_continuous_angles_are_interrupted_where_they_jump(turning):
+    continuous = values(turning)
+    assert np.ptp(continuous) == pytest.approx(4 * pi)
+    turning.locator('#range').select_option('wrapped')
+    settle(turning)
+    wrapped = values(turning)
+    assert np.exp(1j * wrapped) == pytest.approx(np.exp(1j * continuous))
+    assert np.abs(wrapped).max() <= pi
+    assert longest_step(turning) < 0.1
+    turning.evaluate('Report.seek(2.5)')
+    assert readout(turning)['crank_joint'] == '1.57080 rad (90.00°)'
+
+
+def test_angles_recorded_within_a_turn_are_shown_so_until_they_are_made_continuous(
+    browser, folder
+):
+    with quiet(browser, page_of(bags.turning(folder / 'wrapped', 'wrapped'))) as page:
+        assert page.locator('#range').input_value() == 'wrapped'
+        assert np.abs(values(page)).max() <= pi
+        page.locator('#range').select_option('continuous')
+        settle(page)
+        expected = 0.01 * pi * np.arange(401)
+        assert values(page) == pytest.approx(expected, abs=1e-12)
+
+
+def test_every_control_is_reached_and_worked_by_keys_alone(turning):
+    reached = set()
+    for _ in range(20):
+        turning.keyboard.press('Tab')
+        reached.add(turning.evaluate('document.activeElement.id'))
+    controls = 'scheme play back onward scrub speed traces unit range'
+    assert {*controls.split()} <= reached
+    turning.evaluate('document.activeElement.blur()')
+    turning.keyboard.press('End')
+    assert turning.evaluate('Report.time === Report.whole[1]')
+    turning.keyboard.press('Home')
+    assert turning.evaluate('Report.time') == 0
+    turning.evaluate('Report.seek(2)')
+    turning.keyboard.press('+')
+    assert turning.evaluate('Report.view') == pytest.approx([2 - 2 / 1.5, 2 + 2 / 1.5])
+    turning.keyboard.press('-')
+    assert turning.evaluate('Report.view') == pytest.approx([0, 4])
+    turning.keyboard.press('+')
+    turning.keyboard.press('0')
+    assert turning.evaluate('Report.view') == [0, 4]
+    turning.keyboard.press('d')
+    turning.keyboard.press('w')
+    assert turning.locator('#unit').input_value() == 'degrees'
+    assert turning.locator('#range').input_value() == 'wrapped'
+    # In a list, a letter chooses among its items.
+    turning.locator('#speed').press('d')
+    assert turning.locator('#unit').input_value() == 'degrees'
+
+
+# Bags of others.
+
+
 def test_names_that_are_markup_stay_names(browser, folder, foreign_file):
     for file in (foreign_file, page_of(bags.named(folder / 'named'))):
-        with opened(browser, file, width=400) as shown:
-            page = shown.page
+        with quiet(browser, file, width=400) as page:
             page.mouse.move(200, 400)
             assert page.evaluate('window.hit') is None
             assert page.locator('img, b:not(.hovertext b)').count() == 0
-            assert not shown.said
-            assert len(shown.asked) == 1
-            assert not shown.is_wider_than_its_window()
             assert bags.NAMES[1] in page.locator('body').inner_text()
             legend = page.locator('.legendtext').all_text_contents()
             assert any(text.startswith(r'$\sqrt{2}$ & <b>') for text in legend)
             assert all(count for _, count in page.evaluate(DRAWN))
             page.evaluate('Report.seek(1.0)')
             assert page.evaluate('window.hit') is None
-            assert not shown.said
 
 
 def test_a_bag_without_a_scene_has_plots_and_no_player(browser, foreign_file):
-    with opened(browser, foreign_file) as shown:
-        assert 'No scene of linkage_ros' in shown.page.locator('.warnings').inner_text()
-        assert shown.page.locator('canvas, .controls').count() == 0
-        assert [plot for plot, _ in shown.page.evaluate(DRAWN)] == ['positions', 'rates']
-        drag(shown.page, 'rates', 0.5, 1.0)
-        ranges = shown.page.evaluate(RANGES)
+    with quiet(browser, foreign_file) as page:
+        assert 'No scene of linkage_ros' in page.locator('.warnings').inner_text()
+        assert page.locator('canvas, .controls').count() == 0
+        assert [plot for plot, _ in page.evaluate(DRAWN)] == ['positions', 'rates']
+        drag(page, 'rates', 0.5, 1.0)
+        ranges = page.evaluate(RANGES)
         assert ranges[0] == ranges[1] == pytest.approx([0.5, 1.0], abs=0.02)
-        assert not shown.said
 
 
 def test_a_bag_without_a_message_says_so(browser, folder):
-    with opened(browser, page_of(bags.empty(folder / 'empty'))) as shown:
-        text = shown.page.locator('body').inner_text()
+    with quiet(browser, page_of(bags.empty(folder / 'empty'))) as page:
+        text = page.locator('body').inner_text()
         assert 'The bag holds no messages.' in text
         assert 'No joint states are in this bag.' in text
-        assert shown.page.locator('canvas').count() == 0
-        shown.page.keyboard.press(' ')
-        for plot in shown.page.locator('.nsewdrag').all():
+        assert page.locator('canvas').count() == 0
+        page.keyboard.press(' ')
+        for plot in page.locator('.nsewdrag').all():
             plot.click(force=True)
-        assert not shown.said
-        assert not shown.is_wider_than_its_window()
-
-
-def test_each_linkage_of_a_scene_has_its_picture(browser, folder):
-    with opened(browser, page_of(bags.fingers(folder / 'fingers'))) as shown:
-        page = shown.page
-        assert page.locator('.pictures figcaption').all_inner_texts() == ['left', 'right']
-        page.evaluate('Report.seek(1.0)')
-        tips = page.evaluate("""() => Report.linkages.map(
-          (linkage) => linkage.place('crank', 0.04, 0, Report.number))""")
-        for tip, angle in zip(tips, (1.0, -2.0), strict=True):
-            assert abs(complex(*tip) - rect(0.04, angle)) < FLOAT32
-        assert all(painted[INPUT_FACE] > 100 for painted in page.evaluate(PAINTED))
-        told = readout(page)
-        assert told['left_crank_joint'].startswith('1.00000 rad')
-        assert told['right_crank_joint'].startswith('-2.00000 rad')
-        assert [plot for plot, _ in page.evaluate(DRAWN) if plot.startswith('crossed')] == [
-            'crossed_0', 'crossed_1',
-        ]  # fmt: skip
-        assert not shown.said
-
-
-@pytest.mark.parametrize('scheme', ['light', 'dark'])
-def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_file, scheme):
-    with opened(browser, drill_file, forced_colors='active', color_scheme=scheme) as shown:
-        page = shown.page
-        (painted,) = page.evaluate(PAINTED)
-        assert painted[INPUT_FACE if scheme == 'light' else DARK_INPUT_FACE] > 100
-        for place in ('canvas', '[data-plot=rates_rad] .main-svg'):
-            ground = page.locator(place).first.evaluate(
-                '(each) => getComputedStyle(each).backgroundColor'
-            )
-            # What is painted was chosen for the page's own paper.
-            assert ground == ('rgb(255, 255, 255)' if scheme == 'light' else 'rgb(21, 25, 30)')
-        page.locator('#onward').click()
-        assert page.evaluate('Report.number') == 1
-        for button in page.locator('.controls button').all():
-            ink, ground = button.evaluate(
-                '(each) => [getComputedStyle(each).color, getComputedStyle(each).backgroundColor]'
-            )
-            assert abs(brightness(ink) - brightness(ground)) > 100
-        assert not shown.said
-
-
-def test_a_foreign_font_does_not_break_it(browser, drill_file):
-    with opened(browser, drill_file, width=400) as shown:
-        page = shown.page
-        page.add_style_tag(content='* { font: 22px/1.6 monospace !important; }')
-        page.set_viewport_size({'width': 420, 'height': 900})
-        settle(page)
-        assert not shown.is_wider_than_its_window()
-        assert all(count for _, count in page.evaluate(DRAWN))
-        page.locator('#onward').click()
-        assert page.evaluate('Report.number') == 1
-        assert not shown.said
-
-
-def test_a_plot_takes_the_width_that_its_window_gets(browser, drill_file):
-    with opened(browser, drill_file) as shown:
-        for width in (1600, 400, 1000):
-            shown.page.set_viewport_size({'width': width, 'height': 900})
-            shown.page.wait_for_function(
-                """() => [...document.querySelectorAll('[data-plot]')].every((figure) =>
-                  Math.abs(figure.clientWidth
-                    - figure.querySelector('.main-svg').clientWidth) < 2)"""
-            )
-            assert not shown.is_wider_than_its_window()
-            (painted,) = shown.page.evaluate(PAINTED)
-            assert INPUT_FACE in painted
-        assert not shown.said
-
-
-def test_on_paper_all_is_light_and_fits(browser, drill_file):
-    with opened(browser, drill_file, width=1600, color_scheme='dark') as shown:
-        page = shown.page
-        page.emulate_media(media='print', color_scheme='dark')
-        settle(page)
-        assert page.evaluate(COLOURS) == ['rgb(0, 0, 0)', 'rgb(255, 255, 255)']
-        assert INPUT_FACE in page.evaluate(PAINTED)[0]
-        widths = page.evaluate(
-            "[...document.querySelectorAll('.main-svg, canvas')].map((each) => each.clientWidth)"
-        )
-        # What is left of a sheet of A4 between its margins.
-        assert max(widths) <= 178 / 25.4 * 96
-        assert not any(each.is_visible() for each in page.locator('.controls, #scheme').all())
-        page.emulate_media(media='screen', color_scheme='dark')
-        settle(page)
-        assert DARK_INPUT_FACE in page.evaluate(PAINTED)[0]
-        assert not shown.said
-
-
-def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
-    with opened(browser, drill_file, width=400, has_touch=True, is_mobile=True) as shown:
-        layout = 'document.querySelector("[data-plot=rates_rad] .plot").layout'
-        assert shown.page.evaluate(f'{layout}.xaxis.fixedrange')
-        assert shown.page.evaluate(f'{layout}.dragmode') is False
-        assert not shown.is_wider_than_its_window()
-        x, y = pixel_of(shown.page, 'rates_rad', 6.3, 0.0)
-        shown.page.touchscreen.tap(x, y)
-        shown.page.wait_for_function('() => Report.time > 6')
-        assert not shown.said

@@ -8,7 +8,6 @@
 
 """Forces in pins that were recorded are plotted, and what is zero throughout is not."""
 
-from linkage_ros.bag import read_bag
 from linkage_ros.messages import MessageValues, PlanarWrenchWriter, WRENCHES
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.view.report import (
@@ -23,8 +22,8 @@ from linkage_ros.tools.view.report import (
 import numpy as np
 import pytest
 
-from . import bags
 from .runs import BEGIN, but, curve, read, recorded
+from ..support.messages import wrench_stamped
 
 SCENE = """\
 drive: {constant_rate: {rate: 7.0}}
@@ -119,14 +118,22 @@ def test_other_messages_are_counted_and_left_out():
 
 
 def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
-    found = read(read_bag(bags.pushed(tmp_path / 'pushed')))
-    times, force = curve(found, 'coupler', 'load')
+    def pushed(row, moment):
+        wrenches = [(0, wrench_stamped(3.0 * row, 4.0 * row, 0.0))] if row % 2 else []
+        wrenches += [(1, wrench_stamped(0.0, -1.0, 0.1 * row))] if row % 5 == 0 else []
+        wrenches += [(1, b'no message')] if row == 50 else []
+        return moment._replace(messages=(), wrenches=tuple(wrenches))
+
+    scene = 'drive: {torque: {start: 1.0}}\nloads: {wrenches: {coupler: {}, rocker: {}}}\n'
+    linkage = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
+    found = read(recorded(tmp_path, scene, but(100, pushed), linkage))
+    times, force = curve(found, 'wrench_0', 'load')
     rows = np.arange(1, 100, 2)
     assert force == pytest.approx(5.0 * rows)
     assert np.diff(times) == pytest.approx(times[1] - times[0])
-    moment = np.array(curve(found, 'rocker', 'moment of a load')[1], float)
+    moment = np.array(curve(found, 'wrench_1', 'moment of a load')[1], float)
     assert moment[np.isfinite(moment)] == pytest.approx(0.1 * np.arange(0, 100, 5))
     titles = {each['key']: [one['name'] for one in each['curves']] for each in time_plots(found)}
-    assert titles['loads'] == ['coupler', 'rocker']
-    assert 'rocker' in titles['load_moments']
+    assert titles['loads'] == ['wrench_0', 'wrench_1']
+    assert 'wrench_1' in titles['load_moments']
     assert found.left_out['wrenches', 'malformed message'] == 1

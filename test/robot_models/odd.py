@@ -78,26 +78,19 @@ def joints(linkage, **published):
 
 
 ODD = {
-    'coupler from the ground': joints(
-        FOUR_BAR, coupler_joint='ground coupler', rocker_joint='ground rocker'
-    ),
-    'all turned round': joints(
-        FOUR_BAR, coupler_joint='coupler crank', rocker_joint='rocker ground'
-    ),
-    'coupler from the rocker': joints(
-        FOUR_BAR, coupler_joint='rocker coupler', rocker_joint='ground rocker'
-    ),
-    'rocker from the crank, which no pin joins': joints(
-        FOUR_BAR, rocker_joint='crank rocker', coupler_joint='coupler rocker'
-    ),
-    'one more than needed, and the crank once more': joints(
-        FOUR_BAR,
-        B_joint='coupler rocker',
-        crank_again='ground crank',
-        coupler_joint='crank coupler',
-        crossing='rocker crank',
-        rocker_joint='ground rocker',
-    ),
+    'coupler from the ground': joints(FOUR_BAR, coupler_joint='ground coupler',
+                                      rocker_joint='ground rocker'),
+    'all turned round': joints(FOUR_BAR, coupler_joint='coupler crank',
+                               rocker_joint='rocker ground'),
+    'coupler from the rocker': joints(FOUR_BAR, coupler_joint='rocker coupler',
+                                      rocker_joint='ground rocker'),
+    'rocker from the crank, which no pin joins': joints(FOUR_BAR, rocker_joint='crank rocker',
+                                                        coupler_joint='coupler rocker'),
+    'one more than needed, and the crank once more': joints(FOUR_BAR, B_joint='coupler rocker',
+                                                            crank_again='ground crank',
+                                                            coupler_joint='crank coupler',
+                                                            crossing='rocker crank',
+                                                            rocker_joint='ground rocker'),
     'names that XML and YAML have to quote': FOUR_BAR.replace('coupler', '"a <b> & \\"c\\" --"')
     .replace('rocker', "'öß -- -'")
     .replace('B:', '"B -- <"  :')
@@ -113,9 +106,8 @@ joints:
     ),
     'a ram whose slide is told': joints(SLIDER_CRANK, rod_joint='crank rod', ram_slide='guide'),
     'a ram whose slide is not told': joints(SLIDER_CRANK, rod_joint='ground rod'),
-    'a ram whose slide is told and the rod from it': joints(
-        SLIDER_CRANK, ram_slide='guide', rod_joint='rod ram'
-    ),
+    'a ram whose slide is told and the rod from it': joints(SLIDER_CRANK, ram_slide='guide',
+                                                            rod_joint='rod ram'),
     'a pin in a slot, told': joints(QUICK_RETURN, arm_joint='ground arm', slot_slide='slot'),
     'a pin in a slot, not told': joints(QUICK_RETURN, arm_joint='crank arm'),
     'a rod that only slides hold': """
@@ -134,9 +126,8 @@ joints:
     'a yoke that slides over a point of the ground': joints(YOKE, guide_slide='guide'),
     'a yoke, and its slot': joints(YOKE, slot_slide='slot'),
     'a cylinder': joints(CYLINDER, arm_joint='ground arm', rod_joint='arm rod'),
-    'a cylinder that is seen from the arm': joints(
-        CYLINDER, arm_joint='rod arm', tube_joint='tube ground'
-    ),
+    'a cylinder that is seen from the arm': joints(CYLINDER, arm_joint='rod arm',
+                                                   tube_joint='tube ground'),
     'three links at a pin': """
 links:
   ground: {O: [0, 0], Q: [0.1, 0], R: [0.05, 0.12]}
@@ -153,7 +144,7 @@ joints:
   three_joint: {parent: two, child: three}
   four_joint: {parent: three, child: four}
 """,
-}
+}  # fmt: skip
 
 # Linkages whose published joints do not determine all links, and the joints that would.
 UNTOLD = {

@@ -254,14 +254,10 @@ def closed_values(crank):
         SDF_JOINT.replace('<pose>', '<pose relative_to="coupler">'),
     ],
     ids=[
-        'loop_joint',
-        'spherical',
-        'loop_constraint',
-        'one pin by both',
-        'gazebo',
+        'loop_joint', 'spherical', 'loop_constraint', 'one pin by both', 'gazebo',
         'gazebo, frame named',
     ],
-)
+)  # fmt: skip
 def test_loop_tags_close_as_places_do(tags):
     at = closed_values(0.5)
     asked = linkage_from_urdf(read_urdf(robot(TREE).encode(), 'r'), [PLACES], ['crank_joint'], at)
@@ -341,23 +337,15 @@ BAD = {
     ),
     'no XML': ('<robot', 'x.urdf:1: is not XML (unclosed token: line 1, column 0); name a URDF'),
     'another file': ('<sdf/>', 'x.urdf: holds <sdf>, not <robot>; name a URDF file'),
-    'xacro': (
-        robot('<link name="${prefix}a"/>'),
-        'x.urdf: is written in xacro; run first: xacro FILE > FILE.urdf',
-    ),
+    'xacro': (robot('<link name="${prefix}a"/>'),
+              'x.urdf: is written in xacro; run first: xacro FILE > FILE.urdf'),
     'nothing': (robot(), 'x.urdf: has no link; name a URDF file'),
     'no name': (robot('<link/>'), "x.urdf: a link has the name ''; give it a name"),
-    'a link twice': (
-        robot(LINK('a'), LINK('a')),
-        'x.urdf: link a: is a duplicate name; rename one',
-    ),
-    'a joint of no kind': (
-        robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='ball')),
-        (
-            "x.urdf: joint j: type='ball' is not a joint type; "
-            'write revolute, continuous, prismatic or fixed'
-        ),
-    ),
+    'a link twice': (robot(LINK('a'), LINK('a')),
+                     'x.urdf: link a: is a duplicate name; rename one'),
+    'a joint of no kind': (robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='ball')),
+                           ("x.urdf: joint j: type='ball' is not a joint type; "
+                            'write revolute, continuous, prismatic or fixed')),
     'a planar joint': (
         robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='planar')),
         (
@@ -369,30 +357,18 @@ BAD = {
         robot(A_B, FLAT, joint('free', 'a', 'b', '0 0 0', kind='floating')),
         'x.urdf: joint free: type floating cannot be a pin',
     ),
-    'a joint to nothing': (
-        robot(A_B, joint('j', 'base', 'c', '0 0 0')),
-        "x.urdf: joint j: its child 'c' is not a link; name a link",
-    ),
-    'no number': (
-        robot(A_B, joint('j', 'base', 'a', '0 nan 0')),
-        "x.urdf: joint j: xyz='0 nan 0' is not 3 finite numbers; correct it",
-    ),
-    'an axis of nothing': (
-        robot(A_B, joint('j', 'base', 'a', '0 0 0', axis='0 0 0')),
-        'x.urdf: joint j: its axis is 0 0 0; write 0 0 1, for example',
-    ),
-    'two parents': (
-        robot(A_B, FLAT, joint('k', 'b', 'a', '0 0 0')),
-        (
-            'x.urdf: link a: is the child of two joints, j and k; let one end in its own '
-            'frame, and close it by --close'
-        ),
-    ),
+    'a joint to nothing': (robot(A_B, joint('j', 'base', 'c', '0 0 0')),
+                           "x.urdf: joint j: its child 'c' is not a link; name a link"),
+    'no number': (robot(A_B, joint('j', 'base', 'a', '0 nan 0')),
+                  "x.urdf: joint j: xyz='0 nan 0' is not 3 finite numbers; correct it"),
+    'an axis of nothing': (robot(A_B, joint('j', 'base', 'a', '0 0 0', axis='0 0 0')),
+                           'x.urdf: joint j: its axis is 0 0 0; write 0 0 1, for example'),
+    'two parents': (robot(A_B, FLAT, joint('k', 'b', 'a', '0 0 0')),
+                    ('x.urdf: link a: is the child of two joints, j and k; let one end in its own '
+                     'frame, and close it by --close')),
     'two roots': (robot(A_B, FLAT), 'x.urdf: has 2 roots (base, b); join all links by joints'),
-    'a ring': (
-        robot(A_B, joint('j', 'a', 'b', '0 0 0'), joint('k', 'b', 'a', '0 0 0')),
-        'x.urdf: joint j: is in a ring of joints; close it by --close instead',
-    ),
+    'a ring': (robot(A_B, joint('j', 'a', 'b', '0 0 0'), joint('k', 'b', 'a', '0 0 0')),
+               'x.urdf: joint j: is in a ring of joints; close it by --close instead'),
     'a mimic of nothing': (
         robot(
             A_B,
@@ -402,21 +378,14 @@ BAD = {
         ),
         "x.urdf: joint j: mimics 'q', which is not a joint; name a joint",
     ),
-    'no such frame': (
-        robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
-        "x.urdf: --close a=bb: there is no link 'bb'; did you mean 'b'?",
-        [('a', 'bb')],
-    ),
-    'one frame': (
-        robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
-        'x.urdf: --close a=a: names one link twice; name two',
-        [('a', 'a')],
-    ),
-    'no loop': (
-        robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
-        'x.urdf: closes no loop; name frames that meet: --close FRAME=FRAME, or call them',
-        [],
-    ),
+    'no such frame': (robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
+                      "x.urdf: --close a=bb: there is no link 'bb'; did you mean 'b'?",
+                      [('a', 'bb')]),
+    'one frame': (robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
+                  'x.urdf: --close a=a: names one link twice; name two', [('a', 'a')]),
+    'no loop': (robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', axis='0 0 1')),
+                'x.urdf: closes no loop; name frames that meet: --close FRAME=FRAME, or call them',
+                []),
     'frames of one body': (
         robot(
             A_B,
@@ -436,7 +405,7 @@ BAD = {
         robot(A_B, FLAT, joint('k', 'base', 'b', '1 0 0', kind='prismatic', axis='0 0 1')),
         'x.urdf: joint k: does not slide in the plane that j turns in; write it fixed',
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', BAD)

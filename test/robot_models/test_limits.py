@@ -12,7 +12,6 @@ from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros.description import load
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, Limits
 from linkage_ros.tools.models import (
@@ -25,7 +24,7 @@ from linkage_ros.tools.models import (
 import mujoco
 import pytest
 
-from ..support.scenes import closure_of, LINKAGES, ONE_INPUT
+from ..support.scenes import closure_of
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
 
@@ -62,13 +61,6 @@ def test_the_same_limits_come_back(name):
         read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')
     ).linkage
     assert made.limits == linkage.limits
-
-
-@pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
-def test_what_gives_none_comes_back_with_none(name):
-    closure = load(LINKAGES / f'{name}.yaml')
-    made = linkage_from_urdf(read_urdf(urdf_model('it', [ModelPart(closure)]), 'it.urdf')).linkage
-    assert made.limits == closure.linkage.limits
 
 
 WIDTH = st.floats(0.5, 3.0)

@@ -312,6 +312,7 @@ def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
     closure = load(LINKAGES / f'{name}.yaml')
     again = back(closure)
     assert list(again.linkage.joints) == list(closure.linkage.joints)
+    assert again.linkage.limits == closure.linkage.limits
     assert [e.joint for e in again.linkage.inputs] == [e.joint for e in closure.linkage.inputs]
     assert max(differences(closure, again)) <= WITHIN
     assert again.linkage.masses.keys() == closure.linkage.masses.keys()

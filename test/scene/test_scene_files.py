@@ -14,7 +14,7 @@ from linkage_ros.description import load_scene, parse_scene, RecordParameters, S
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import RevoluteJoint, SlideJoint, Status
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.stages.drives import ConstantRateParameters, TopicParameters
+from linkage_ros.stages.drives import ConstantRateDrive, TopicDrive
 from linkage_ros.stages.effects import VelocityEffect
 from linkage_ros.tick import Pipeline
 import pytest
@@ -72,7 +72,7 @@ def test_a_scene_that_says_nothing(build):
     (scene_linkage,) = scene.linkages
     assert scene_linkage.drive == (
         'topic',
-        TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1),
+        TopicDrive(carry_forward=True, max_age=0.2, max_lead=0.1),
     )
     assert scene_linkage.effects == {}
     assert (scene_linkage.name, scene_linkage.loads, scene.faults) == ('', None, {})
@@ -96,7 +96,7 @@ record: {directory: bags, name: first, queue: 1000}
     (scene_linkage,) = scene.linkages
     assert scene_linkage.drive == (
         'topic',
-        TopicParameters(carry_forward=False, max_age=0.5, max_lead=0.0),
+        TopicDrive(carry_forward=False, max_age=0.5, max_lead=0.0),
     )
     assert scene_linkage.effects == {'velocity': VelocityEffect()}
     assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
@@ -301,12 +301,12 @@ def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(fil
         assert len(reading[2]) == len(scene.joint_names)  # rates
         cranks.append(crank.angles[0])
     if file.stem == 'five_bar':
-        assert scene.linkages[0].drive == ('topic', TopicParameters())
+        assert scene.linkages[0].drive == ('topic', TopicDrive())
     elif file.stem == 'gripper':  # its motor has limits, and starts at the pose
         assert cranks[0] == 0.25
         assert [min(cranks), max(cranks)] == pytest.approx([0.0, 0.74], abs=1e-6)
     elif ends is None:
-        assert scene.linkages[0].drive == ('constant_rate', ConstantRateParameters(1.0, SIXTY))
+        assert scene.linkages[0].drive == ('constant_rate', ConstantRateDrive(1.0, SIXTY))
         assert cranks[0] == SIXTY
         assert cranks[-1] == pytest.approx(SIXTY + 5.0, rel=1e-15)
     else:

@@ -189,7 +189,7 @@ def _check_rows(budget: Budget) -> None:
     }
     for row in rows[: len(budget.knobs)]:
         name = next(each.name for each in budget.knobs if each.name in row.name)
-        assert (row.cost == NOISE) == (name in noisy)
+        assert (row.cost.shown == NOISE) == (name in noisy)
     count = sum(
         setting.price is not None and setting.price.is_noise
         for knob in budget.knobs

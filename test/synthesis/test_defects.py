@@ -57,16 +57,12 @@ class Case(NamedTuple):
 
 
 CASES = {
-    'a crank-rocker as it should be': Case(
-        CRANK_ROCKER, [(20, L), (90, L), (150, L)], [], (20, 150)
-    ),
+    'a crank-rocker as it should be': Case(CRANK_ROCKER, [(20, L), (90, L), (150, L)], [],
+                                           (20, 150)),
     'the crank goes down': Case(CRANK_ROCKER, [(150, L), (90, L), (20, L)], [], (150, 20)),
-    'the crank wraps at 360°': Case(
-        CRANK_ROCKER, [(340, R), (350, R), (10, R)], [], (340, 370)
-    ),
-    'the crank wraps at 180°': Case(
-        DOUBLE_CRANK, [(170, L), (-170, L), (-120, L)], [], (170, 240)
-    ),
+    'the crank wraps at 360°': Case(CRANK_ROCKER, [(340, R), (350, R), (10, R)], [], (340, 370)),
+    'the crank wraps at 180°': Case(DOUBLE_CRANK, [(170, L), (-170, L), (-120, L)], [],
+                                    (170, 240)),
     'downwards through 0': Case(CRANK_ROCKER, [(15, L), (0, L), (-30, L)], [], (15, -30)),
     'turns in the angles asked for do not matter': Case(
         CRANK_ROCKER, [(20, L), (90 - 720, L), (150 + 360, L)], [], (20, 150)
@@ -77,83 +73,64 @@ CASES = {
     'the same crank angle twice but for rounding': Case(
         CRANK_ROCKER, [(20, L), (20 - 1e-12, L), (140, L), (260, L)], [], (20, 260)
     ),
-    'once round, and back at the first': Case(
-        CRANK_ROCKER, [(20, L), (140, L), (260, L), (20, L)], [], (20, 380)
-    ),
+    'once round, and back at the first': Case(CRANK_ROCKER, [(20, L), (140, L), (260, L), (20, L)],
+                                              [], (20, 380)),
     'most of a turn': Case(CRANK_ROCKER, [(20, L), (10, L), (330, L), (50, L)], [], (20, -310)),
-    'two assemblies of a crank that turns': Case(
-        CRANK_ROCKER, [(20, L), (90, L), (150, R)], ['circuit']
-    ),
+    'two assemblies of a crank that turns': Case(CRANK_ROCKER, [(20, L), (90, L), (150, R)],
+                                                 ['circuit']),
     'two assemblies of a double crank': Case(DOUBLE_CRANK, [(20, R), (90, L)], ['circuit']),
-    'out of order in a turn': Case(
-        CRANK_ROCKER, [(20, L), (150, L), (90, L), (200, L)], ['order']
-    ),
-    'out of order twice round': Case(
-        CRANK_ROCKER, [(0, L), (150, L), (300, L), (90, L)], ['order']
-    ),
+    'out of order in a turn': Case(CRANK_ROCKER, [(20, L), (150, L), (90, L), (200, L)],
+                                   ['order']),
+    'out of order twice round': Case(CRANK_ROCKER, [(0, L), (150, L), (300, L), (90, L)],
+                                     ['order']),
     'between two toggles': Case(DOUBLE_ROCKER, [(55, L), (60, L), (80, L)], [], (55, 80)),
-    'between two toggles, on the other side': Case(
-        DOUBLE_ROCKER, [(-55, L), (-60, L), (-80, L)], [], (-55, -80)
-    ),
-    'two branches between two toggles': Case(
-        DOUBLE_ROCKER, [(55, L), (60, L), (80, R)], ['branch']
-    ),
+    'between two toggles, on the other side': Case(DOUBLE_ROCKER, [(-55, L), (-60, L), (-80, L)],
+                                                   [], (-55, -80)),
+    'two branches between two toggles': Case(DOUBLE_ROCKER, [(55, L), (60, L), (80, R)],
+                                             ['branch']),
     'two ranges, one assembly': Case(DOUBLE_ROCKER, [(60, L), (-60, L)], ['circuit']),
     'two ranges, two assemblies': Case(DOUBLE_ROCKER, [(60, L), (300, R)], ['circuit']),
     'no way round in a range': Case(DOUBLE_ROCKER, [(60, R), (80, R), (55, R)], ['order']),
     'branch and order': Case(DOUBLE_ROCKER, [(60, R), (80, L), (55, R)], ['branch', 'order']),
-    'the same crank angle twice in a range': Case(
-        DOUBLE_ROCKER, [(60, L), (60, L), (80, L)], [], (60, 80)
-    ),
+    'the same crank angle twice in a range': Case(DOUBLE_ROCKER, [(60, L), (60, L), (80, L)], [],
+                                                  (60, 80)),
     'the same crank angle twice in a range, downwards': Case(
         DOUBLE_ROCKER, [(60, L), (420, L), (55, L)], [], (60, 55)
     ),
     'an output crank': Case(ROCKER_CRANK, [(40, L), (60, L)], [], (40, 60)),
     'a range about 0': Case(STRETCHES, [(300, L), (0, L), (100, L)], [], (300, 460)),
-    'a range about 0 is not left backwards': Case(
-        STRETCHES, [(110, L), (250, L)], [], (110, -110)
-    ),
+    'a range about 0 is not left backwards': Case(STRETCHES, [(110, L), (250, L)], [],
+                                                  (110, -110)),
     'two branches of the only circuit': Case(STRETCHES, [(-30, L), (30, R)], ['branch']),
     'a range across 180°': Case(FOLDS, [(160, R), (180, R), (-160, R)], [], (160, 200)),
     'a range across 180° is not left at 0': Case(FOLDS, [(300, R), (60, R)], [], (300, 60)),
     'out of order across 180°': Case(FOLDS, [(190, L), (100, L), (200, L)], ['order']),
-    'a parallelogram between its change points': Case(
-        PARALLELOGRAM, [(30, L), (90, L), (150, L)], [], (30, 150)
-    ),
-    'a parallelogram and what it folds into': Case(
-        PARALLELOGRAM, [(30, L), (90, R)], ['branch']
-    ),
+    'a parallelogram between its change points': Case(PARALLELOGRAM, [(30, L), (90, L), (150, L)],
+                                                      [], (30, 150)),
+    'a parallelogram and what it folds into': Case(PARALLELOGRAM, [(30, L), (90, R)], ['branch']),
     'a parallelogram through its change point': Case(
         # Beyond it the parallelogram is on the other side of A→O4.
         PARALLELOGRAM, [(150, L), (210, R)], ['transmission'], (150, 210)
     ),
-    'an antiparallelogram comes out of a parallelogram': Case(
-        PARALLELOGRAM, [(150, L), (210, L)], ['branch']
-    ),
-    'a single change point': Case(
-        ONE_CHANGE_POINT, [(-40, L), (30, R)], ['transmission'], (-40, 30)
-    ),
-    'a single change point, sent beyond a turn': Case(
-        ONE_CHANGE_POINT, [(320, L), (390, R)], ['transmission'], (320, 390)
-    ),
-    'not through a single change point': Case(
-        ONE_CHANGE_POINT, [(30, R), (180, R), (330, R)], [], (30, 330)
-    ),
-    'through a change point between two toggles': Case(
-        CHANGE_POINT_ACROSS, [(170, L), (190, R)], ['transmission'], (170, 190)
-    ),
+    'an antiparallelogram comes out of a parallelogram': Case(PARALLELOGRAM, [(150, L), (210, L)],
+                                                              ['branch']),
+    'a single change point': Case(ONE_CHANGE_POINT, [(-40, L), (30, R)], ['transmission'],
+                                  (-40, 30)),
+    'a single change point, sent beyond a turn': Case(ONE_CHANGE_POINT, [(320, L), (390, R)],
+                                                      ['transmission'], (320, 390)),
+    'not through a single change point': Case(ONE_CHANGE_POINT, [(30, R), (180, R), (330, R)], [],
+                                              (30, 330)),
+    'through a change point between two toggles': Case(CHANGE_POINT_ACROSS, [(170, L), (190, R)],
+                                                       ['transmission'], (170, 190)),
     'through a change point at 0 between two toggles': Case(
         CHANGE_POINT_AHEAD, [(-40, L), (30, R), (90, R)], ['transmission'], (-40, 90)
     ),
-    'beside a change point between two toggles': Case(
-        CHANGE_POINT_ACROSS, [(100, L), (170, L), (120, L)], ['order']
-    ),
-    'a position at a toggle': Case(
-        RIGHT_ANGLE, [(40, L), (60, L), (90, L)], ['transmission'], (40, 90)
-    ),
-    'a toggle, and two branches': Case(
-        RIGHT_ANGLE, [(40, L), (90, R), (60, R)], ['branch', 'order']
-    ),
+    'beside a change point between two toggles': Case(CHANGE_POINT_ACROSS,
+                                                      [(100, L), (170, L), (120, L)], ['order']),
+    'a position at a toggle': Case(RIGHT_ANGLE, [(40, L), (60, L), (90, L)], ['transmission'],
+                                   (40, 90)),
+    'a toggle, and two branches': Case(RIGHT_ANGLE, [(40, L), (90, R), (60, R)],
+                                       ['branch', 'order']),
 }  # fmt: skip
 
 

@@ -245,16 +245,10 @@ def test_sines_of_twofold_angles(kind, data):
 
 # Pairs in degrees: crank, rocker, and the error.
 REFUSED: dict[str, tuple[Angles, Angles, str]] = {
-    'the same twice': (
-        (25, 35, 25),
-        (30, 40, 30),
-        'pairs 1 and 3: are the same, 25° → 30°; give each position once',
-    ),
-    'the same, a turn on': (
-        (25, 385, 50),
-        (30, 30, 60),
-        'pairs 1 and 2: are the same, 25° → 30°; give each position once',
-    ),
+    'the same twice': ((25, 35, 25), (30, 40, 30),
+                       'pairs 1 and 3: are the same, 25° → 30°; give each position once'),
+    'the same, a turn on': ((25, 385, 50), (30, 30, 60),
+                            'pairs 1 and 2: are the same, 25° → 30°; give each position once'),
     'one crank angle': (
         (25, 35, 35),
         (30, 40, 60),
@@ -301,7 +295,7 @@ REFUSED: dict[str, tuple[Angles, Angles, str]] = {
             'one of the angles'
         ),
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize('name', REFUSED)

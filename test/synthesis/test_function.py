@@ -8,7 +8,7 @@
 
 """Function generation: pairs of angles, and functions that have no value somewhere."""
 
-from math import cos, inf, nan, pi, radians, sqrt
+from math import inf, nan, pi, radians
 
 from hypothesis import given, strategies
 from linkage_ros.errors import SynthesisError
@@ -67,13 +67,6 @@ def test_precision_points_lie_as_the_cosines_say(low, high, count):
     # They are the zeros of Chebyshev's polynomial of that degree.
     inner = (2.0 * found - low - high) / (high - low)
     assert np.max(np.abs(chebval(inner, [0.0] * count + [1.0]))) < 1e-13 * max(abs(low), 1.0) * 10
-
-
-def test_three_points_lie_where_every_textbook_has_them():
-    by = 0.25 * sqrt(3.0)
-    assert chebyshev_points(1.0, 2.0, 3).tolist() == pytest.approx(
-        [1.5 - by, 1.5, 1.5 + by], rel=1e-15
-    )
 
 
 def test_points_near_the_beginning_have_all_their_digits():
@@ -187,59 +180,31 @@ def test_points_that_are_none_are_refused(xs, message):
 GOOD = ((0, 1), (45, 105), (135, 225))
 
 
-@pytest.mark.parametrize(
-    ('case', 'message'),
-    [
-        (
-            ('x', (1, 1), *GOOD[1:]),
-            'range: begins and ends at 1; let it end where it does not begin',
-        ),
-        (
-            ('x', (0, 1), (45, 45), GOOD[2]),
-            'crank range: begins and ends at 45; let it end where it does not begin',
-        ),
-        (
-            ('x', *GOOD[:2], (90, 90)),
-            'rocker range: begins and ends at 90; let it end where it does not begin',
-        ),
-        (
-            ('x', (0, 1), (0, 360), GOOD[2]),
-            'crank range: 0° to 360° is a full turn or more; keep it below 360°',
-        ),
-        (
-            ('x', *GOOD[:2], (200, -200)),
-            'rocker range: 200° to -200° is a full turn or more; keep it below 360°',
-        ),
-        (('x', (0, nan), *GOOD[1:]), 'range: 0 to nan is not a range; write two finite numbers'),
-        (('x', (0, inf), *GOOD[1:]), 'range: 0 to inf is not a range; write two finite numbers'),
-        (
-            ('x', (0, 1), (inf, 0), GOOD[2]),
-            'crank range: inf to 0.0 is not a range; write two finite numbers',
-        ),
-        (
-            ('sin(x)', (0, pi), *GOOD[1:]),
-            (
-                "function 'sin(x)': is 0 both at x = 0 and at 3.141592654, so that both ends of "
-                'the rocker range would be one; let the range end where the function is another'
-            ),
-        ),
-        (
-            ('5', *GOOD),
-            (
-                "function '5': is 5 both at x = 0 and at 1, so that both ends of the rocker range "
-                'would be one; let the range end where the function is another'
-            ),
-        ),
-        (
-            ('x^2', (-1, 1.01), *GOOD[1:]),
-            (
-                "function 'x^2': goes from 1 to 1.0201, but 1.0201 up and down between: "
-                'the rocker would swing by 4567.61°; choose a range without its summits and '
-                'valleys, or a smaller rocker range'
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize(('case', 'message'), [
+    (('x', (1, 1), *GOOD[1:]), 'range: begins and ends at 1; let it end where it does not begin'),
+    (('x', (0, 1), (45, 45), GOOD[2]),
+     'crank range: begins and ends at 45; let it end where it does not begin'),
+    (('x', *GOOD[:2], (90, 90)),
+     'rocker range: begins and ends at 90; let it end where it does not begin'),
+    (('x', (0, 1), (0, 360), GOOD[2]),
+     'crank range: 0° to 360° is a full turn or more; keep it below 360°'),
+    (('x', *GOOD[:2], (200, -200)),
+     'rocker range: 200° to -200° is a full turn or more; keep it below 360°'),
+    (('x', (0, nan), *GOOD[1:]), 'range: 0 to nan is not a range; write two finite numbers'),
+    (('x', (0, inf), *GOOD[1:]), 'range: 0 to inf is not a range; write two finite numbers'),
+    (('x', (0, 1), (inf, 0), GOOD[2]),
+     'crank range: inf to 0.0 is not a range; write two finite numbers'),
+    (('sin(x)', (0, pi), *GOOD[1:]),
+     ("function 'sin(x)': is 0 both at x = 0 and at 3.141592654, so that both ends of "
+      'the rocker range would be one; let the range end where the function is another')),
+    (('5', *GOOD),
+     ("function '5': is 5 both at x = 0 and at 1, so that both ends of the rocker range "
+      'would be one; let the range end where the function is another')),
+    (('x^2', (-1, 1.01), *GOOD[1:]),
+     ("function 'x^2': goes from 1 to 1.0201, but 1.0201 up and down between: "
+      'the rocker would swing by 4567.61°; choose a range without its summits and '
+      'valleys, or a smaller rocker range')),
+])  # fmt: skip
 def test_what_cannot_be_generated_is_refused_in_one_line(case, message):
     with pytest.raises(SynthesisError) as caught:
         task_of(case)
@@ -249,13 +214,6 @@ def test_what_cannot_be_generated_is_refused_in_one_line(case, message):
 def test_a_range_may_be_narrow():
     task = FunctionTask(Expression('x^2'), (1.0, 1.0 + 1e-9), (0.0, 1.0), (0.0, 1.0))
     assert wanted_rocker(task, 0.5) == pytest.approx(0.5, abs=1e-6)
-
-
-def test_chebyshev_points_of_the_angles_are_those_of_x():
-    """An even scale takes them along."""
-    crank, _ = angle_pairs(LOG, chebyshev_points(1.0, 2.0, 4))
-    expected = [75.0 - 30.0 * cos((2 * j - 1) * pi / 8.0) for j in range(1, 5)]
-    assert np.degrees(crank) == pytest.approx(expected, rel=1e-14)
 
 
 # A function without a value somewhere in its range is refused; the error says where.
@@ -289,19 +247,11 @@ def test_where_a_function_has_no_value_is_told(text, low, high, message):
 @pytest.mark.parametrize(
     ('text', 'low', 'high'),
     [
-        ('cbrt(x - 0.4)', 0, 1),
-        ('sqrt(x)', 0, 1),
-        ('abs(x - 0.4)', 0, 1),
-        ('tanh(1e6*(x - 0.4003))', 0, 1),
-        ('1/(x^2 + 1e-6)', -1, 1.01),
-        ('sin(1000*x)', 0, 1),
-        ('x*1e300', 0, 1),
-        ('x*1e-300', 0, 1),
-        ('1/x', 1e-3, 1),
-        ('tan(x)', -1.57, 1.57),
-        ('3', 0, 1),
-        ('sin(x)^2 + cos(x)^2', 0, 1),
+        ('cbrt(x - 0.4)', 0, 1), ('sqrt(x)', 0, 1), ('abs(x - 0.4)', 0, 1),
+        ('tanh(1e6*(x - 0.4003))', 0, 1), ('1/(x^2 + 1e-6)', -1, 1.01), ('sin(1000*x)', 0, 1),
+        ('x*1e300', 0, 1), ('x*1e-300', 0, 1), ('1/x', 1e-3, 1), ('tan(x)', -1.57, 1.57),
+        ('3', 0, 1), ('sin(x)^2 + cos(x)^2', 0, 1),
     ],
-)
+)  # fmt: skip
 def test_a_steep_function_is_taken(text, low, high):
     check_defined(Expression(text), low, high)

@@ -303,10 +303,8 @@ OFF_THE_POLE = 1e-15 + 1e-15j
 
 @pytest.mark.parametrize(('way', 'poses', 'pivots', 'where', 'reason'), [
     ('moving', [START, RAISED], (0j, 1j), 'poses', '2 were given'),
-    (
-        'moving', [START, RAISED, pose(0, nan, 0)], (0j, 1j), 'pose 3',
-        r'\(0.0, nan\), 0.0 is not a pose',
-    ),
+    ('moving', [START, RAISED, pose(0, nan, 0)], (0j, 1j), 'pose 3',
+     r'\(0.0, nan\), 0.0 is not a pose'),
     ('fixed', [START, pose(0, 0, inf), OVER], (0j, 1j), 'pose 2', 'inf is not a pose'),
     ('fixed', [START, RAISED, OVER], (0j, complex(inf, 0)), 'O4', r'\(inf, 0.0\) is not a place'),
     ('moving', [START, RAISED, OVER], (nan + 0j, 0j), 'A', 'is not a place'),
@@ -323,14 +321,10 @@ OFF_THE_POLE = 1e-15 + 1e-15j
     ('fixed', ABOUT, (1j, 2 + 0j), 'O2 and O4', 'the same moving pivot.* the coupler would have'),
     ('moving', [START, OVER, ABOUT[1]], (1j, 0j), 'B', 'the pole of poses 1 and 3'),
     ('fixed', [OVER, START, ABOUT[1]], (0j, 1j), 'O2', 'the pole of poses 2 and 3'),
-    (
-        'fixed', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, OFF_THE_POLE), 'O4',
-        'the pole of poses 1 and 2',
-    ),
-    (
-        'moving', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, -1 + 1e-14j), 'B',
-        'so near a pole that its fixed pivot has no certain digit',
-    ),
+    ('fixed', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, OFF_THE_POLE), 'O4',
+     'the pole of poses 1 and 2'),
+    ('moving', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, -1 + 1e-14j), 'B',
+     'so near a pole that its fixed pivot has no certain digit'),
 ])  # fmt: skip
 def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):
     design = from_moving_pivots if way == 'moving' else from_fixed_pivots

@@ -326,37 +326,23 @@ NEITHER = (
     ({'points': (0j, 1j, 1j)}, 'points 2 and 3: both at (0, 1); leave one out'),
     ({'points': (0j, 1j, complex(inf, 0.0))}, 'point 3: (inf, 0) is not a place; correct it'),
     ({'points': (0j, 1j, complex(0.0, nan))}, 'point 3: (0, nan) is not a place; correct it'),
-    (
-        {'points': (*HOOK, 0j), 'closed': True},
-        'point 4: is the first one again; leave it out: a closed path returns by itself',
-    ),
-    (
-        {'points': HOOK, 'timing': (0.0, 0.1)},
-        'timing: 2 crank angles for 3 points; give one for each',
-    ),
+    ({'points': (*HOOK, 0j), 'closed': True},
+     'point 4: is the first one again; leave it out: a closed path returns by itself'),
+    ({'points': HOOK, 'timing': (0.0, 0.1)},
+     'timing: 2 crank angles for 3 points; give one for each'),
     ({'points': HOOK, 'timing': (0.0, 0.2, 0.1)}, NEITHER),
     ({'points': HOOK, 'timing': (0.0, nan, 0.1)}, NEITHER),
-    (
-        {'points': HOOK, 'timing': (0.0, 1.0, 2.5 * pi)},
-        'timing: the crank travels 450°; the points must be within one turn',
-    ),
-    (
-        {'points': HOOK, 'timing': (0.0, -1.0, -inf)},
-        'timing: the crank travels inf°; the points must be within one turn',
-    ),
+    ({'points': HOOK, 'timing': (0.0, 1.0, 2.5 * pi)},
+     'timing: the crank travels 450°; the points must be within one turn'),
+    ({'points': HOOK, 'timing': (0.0, -1.0, -inf)},
+     'timing: the crank travels inf°; the points must be within one turn'),
     ({'points': HOOK, 'timing': (0.0, 1.0, tau), 'closed': True}, WHOLE),
-    (
-        {'points': HOOK, 'timing': UP, 'links': (2.0, 1.0)},
-        'links: from 2 to 1 of the path; write e.g. 0.2 to 4',
-    ),
-    (
-        {'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},
-        'path: its size is inf m; make it 1e-12 to 1e+09 m',
-    ),
-    (
-        {'points': (0j, 1e-200 + 0j, 1e-200j)},
-        'path: its size is 1.41421e-200 m; make it 1e-12 to 1e+09 m',
-    ),
+    ({'points': HOOK, 'timing': UP, 'links': (2.0, 1.0)},
+     'links: from 2 to 1 of the path; write e.g. 0.2 to 4'),
+    ({'points': (-1e308 - 1e308j, 0j, 1e308 + 1e308j)},
+     'path: its size is inf m; make it 1e-12 to 1e+09 m'),
+    ({'points': (0j, 1e-200 + 0j, 1e-200j)},
+     'path: its size is 1.41421e-200 m; make it 1e-12 to 1e+09 m'),
 ])  # fmt: skip
 def test_what_is_no_path_is_said_in_one_line(arguments, line):
     with pytest.raises(SynthesisError) as caught:

@@ -280,20 +280,13 @@ def test_a_word_stands_for_kinds_of_four_bars(word, name):
         assert needs_penalty(found, needs) == 1.0
 
 
-@pytest.mark.parametrize(
-    ('word', 'remedy'),
-    [
-        ('crank_rocker', "did you mean 'crank-rocker'?"),
-        ('Grashoff', "did you mean 'grashof'?"),
-        (
-            'quick',
-            (
-                'name one of crank-rocker, rocker-crank, double-crank, drag-link, double-rocker, '
-                'triple-rocker, grashof, non-grashof, turning'
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize(('word', 'remedy'), [
+    ('crank_rocker', "did you mean 'crank-rocker'?"),
+    ('Grashoff', "did you mean 'grashof'?"),
+    ('quick',
+     ('name one of crank-rocker, rocker-crank, double-crank, drag-link, double-rocker, '
+      'triple-rocker, grashof, non-grashof, turning')),
+])  # fmt: skip
 def test_an_unknown_word_is_refused(word, remedy):
     with pytest.raises(SynthesisError) as caught:
         Needs(word).check()

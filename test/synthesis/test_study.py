@@ -149,8 +149,3 @@ def test_what_is_missing_is_told_with_what_installs_it(library, asked, extra, mo
     with pytest.raises(LinkageError) as caught:
         asked()
     assert str(caught.value) == f"{library}: is not installed; pip install 'linkage_ros[{extra}]'"
-
-
-def test_what_is_there_is_returned():
-    optimize = pytest.importorskip('scipy.optimize')
-    assert scipy_optimize() is optimize

@@ -200,10 +200,3 @@ def test_who_listens_and_says_nothing(impatient):
 def test_the_address_of_a_worker(cluster):
     worker = next(iter(cluster.scheduler.workers))
     assert refusal(worker).startswith(f'{worker}: is a Dask Worker')
-
-
-def test_where_distributed_is_not_installed(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'distributed', None)
-    assert refusal('tcp://127.0.0.1:1') == (
-        "distributed: is not installed; pip install 'linkage_ros[dask]'"
-    )

@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
+from functools import wraps
 from itertools import count
 import json
 from queue import SimpleQueue
@@ -26,6 +27,16 @@ from linkage_ros.tools.view import Route, Server
 
 _PATIENCE = 60.0
 """A guard against a test that hangs, in [s]."""
+
+
+def in_loop(test: Callable[..., Any]) -> Callable[..., None]:
+    """Make a test of a coroutine, which is run to its end."""
+
+    @wraps(test)
+    def run(**fixtures: Any) -> None:
+        asyncio.run(test(**fixtures))
+
+    return run
 
 
 class Served(NamedTuple):

@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 
 from linkage_ros.tools.view import add_live, Server
 
-from .served import opened, served
+from .served import in_loop, opened, served
 
 PATIENCE = 20.0
 LARGE = 'x' * 200_000
@@ -63,56 +63,38 @@ def live(script: Script) -> Callable[[Any], None]:
     return lambda app: add_live(app, script)
 
 
-def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
+@in_loop
+async def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
     script = Script()
     for index in range(50):
         script.say('state', index)
     script.say('node', 'well')
     script.say('model', 'four_bar')
-
-    async def page(address: str) -> list[Any]:
-        async with opened(address, 'live') as page:
-            first = [await page.get() for _ in range(3)]
-            script.say('state', 'new')
-            return [*first, await page.get()]
-
     with served([live(script)]) as server:
-        heard = asyncio.run(page(server.address))
+        async with opened(server.address, 'live') as page:
+            heard = [await page.get() for _ in range(3)]
+            script.say('state', 'new')
+            heard.append(await page.get())
     assert heard == [{'model': 'four_bar'}, {'node': 'well'}, {'state': 49}, {'state': 'new'}]
     assert not script.heard
 
 
-def test_what_is_asked_is_answered_while_another_request_waits() -> None:
-    script = Script()
-
-    async def page(address: str) -> Any:
-        async with opened(address, 'live') as page:
-            await page.send('wait')
-            await page.send('reset')
-            return await page.get()
-
-    with served([live(script)]) as server:
-        assert asyncio.run(page(server.address)) == {'said': 'did reset', 'do': 'reset'}
-    assert [content['do'] for content in script.asked] == ['wait', 'reset']
-
-
-def test_what_is_no_request_is_counted_and_the_page_goes_on() -> None:
+@in_loop
+async def test_a_request_is_answered_while_another_waits_and_others_are_counted() -> None:
     script = Script()
     bad = ['', '{', '[]', '{"do": 1}', '"do"', '[' * 5000, '{"d\ud800": 1}']
-
-    async def page(address: str) -> Any:
-        async with opened(address, 'live') as page:
+    with served([live(script)]) as server:
+        async with opened(server.address, 'live') as page:
+            await page.send('wait')
             for text in bad:
                 await page.socket.send_bytes(text.encode('utf-8', 'surrogatepass'))
             for text in bad[:-1]:
                 await page.socket.send_str(text)
             await page.send('reset')
-            return await page.get()
-
-    with served([live(script)]) as server:
-        assert asyncio.run(page(server.address))['said'] == 'did reset'
+            assert await page.get() == {'said': 'did reset', 'do': 'reset'}
         refused = server.server.refused
     assert refused == {'a message that is not a request': 2 * len(bad) - 1}
+    assert [content['do'] for content in script.asked] == ['wait', 'reset']
 
 
 def test_a_page_that_never_reads_is_sent_no_more_than_fits_and_holds_nobody_up() -> None:

@@ -16,10 +16,10 @@ from typing import Any
 import linkage_ros as lr
 from linkage_ros.kinematics import Closure, frames_of_links, Position
 from linkage_ros.resources import shipped_path
-from linkage_ros.tools.view import LARGEST, read_request, RequestError, RequestHandler, requests
+from linkage_ros.tools.view import read_request, RequestError, RequestHandler, requests
 import pytest
 
-from .test_server import FOUR_BAR, LONGER
+from .test_server import BAD_MESSAGES, FOUR_BAR
 
 
 def asked(do: str, answers: RequestHandler | None = None, **content: Any) -> dict[str, Any]:
@@ -50,27 +50,7 @@ def error(do: str, **content: Any) -> str:
 # Messages.
 
 
-@pytest.mark.parametrize(
-    ('message', 'line'),
-    [
-        ('', 'is not JSON'),
-        ('{', 'is not JSON'),
-        ('[' * 100_000, 'is not JSON'),
-        ('{"id": NaN, "do": "names"}', 'is not JSON'),
-        ('{"id": 1, "do": "names", "x": ' + '9' * 10_000 + '}', 'is not JSON'),
-        ('[]', 'is not an object'),
-        ('"names"', 'is not an object'),
-        ('{"do": "names"}', 'has no id'),
-        ('{"id": "1", "do": "names"}', 'has no id'),
-        ('{"id": true, "do": "names"}', 'has no id'),
-        ('{"id": 1e300, "do": "names"}', 'has no id'),
-        ('{"id": 1}', 'asks for None'),
-        ('{"id": 1, "do": "eval"}', "asks for 'eval'"),
-        ('{"id": 1, "do": ["names"]}', "asks for ['names']"),
-        (json.dumps({'id': 1, 'do': 'names', 'x': 'x' * LARGEST}), 'is larger than 1000000 bytes'),
-        (json.dumps({'id': 1, 'x': 'é' * (LARGEST // 2)}, ensure_ascii=False), 'is larger than'),
-    ],
-)
+@pytest.mark.parametrize(('message', 'line'), BAD_MESSAGES.items())
 def test_what_is_no_request_is_refused(message: str, line: str) -> None:
     with pytest.raises(RequestError) as refused:
         read_request(message)
@@ -91,11 +71,6 @@ def test_the_model_of_a_text_has_this_text_and_its_name() -> None:
     found = ok('model', text=FOUR_BAR, whole=True)
     assert (found['name'], found['text']) == ('mine', FOUR_BAR)
     assert ok('model', text=FOUR_BAR, name='other')['name'] == 'other'
-
-
-def test_an_edit_is_answered_with_the_model_of_the_edited_text() -> None:
-    found = ok('edit', text=FOUR_BAR, edit=LONGER)
-    assert found['text'] == FOUR_BAR.replace('0.040', '0.041')
 
 
 def test_a_shipped_linkage_is_opened_by_its_name() -> None:

@@ -11,8 +11,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, ExitStack
 from itertools import pairwise
 import json
 import os
@@ -36,9 +36,10 @@ from linkage_ros.tools.view import bag_page, Conversation, LARGEST, MOST_PAGES, 
 from linkage_ros.tools.view.report import Window
 import pytest
 
-from .served import asked, opened, Page, Served, served
+from .served import asked, in_loop, opened, Served, served
 from ..cli.recorded import Recorded, scene_file
 from ..support.commands import environment, linkage
+from ..support.sampling import sample_count
 
 FOUR_BAR = """\
 # A crank-rocker.
@@ -53,6 +54,26 @@ joints:
   rocker_joint: {parent: ground, child: rocker}
 """
 EXAMPLES = Path(__file__).parents[2] / 'examples'
+BAD_MESSAGES = {
+    '': 'is not JSON',
+    '{': 'is not JSON',
+    '[' * 100_000: 'is not JSON',
+    '{"id": NaN, "do": "names"}': 'is not JSON',
+    '{"id": 1, "do": "names", "x": ' + '9' * 10_000 + '}': 'is not JSON',
+    '[]': 'is not an object',
+    '"names"': 'is not an object',
+    '{"do": "names"}': 'has no id',
+    '{"id": "1", "do": "names"}': 'has no id',
+    '{"id": true, "do": "names"}': 'has no id',
+    '{"id": 1e300, "do": "names"}': 'has no id',
+    '{"id": 1}': 'asks for None',
+    '{"id": 1, "do": "eval"}': "asks for 'eval'",
+    '{"id": 1, "do": ["names"]}': "asks for ['names']",
+    '{"id": 1, "do": "names", "x": "' + 'x' * LARGEST + '"}': 'is larger than 1000000 bytes',
+    '{"id": 1, "x": "' + 'é' * (LARGEST // 2) + '"}': 'is larger than',
+}
+"""Messages that are no requests, and what is said of them."""
+
 LONGER = {'length': {'link': 'crank', 'from': 'O2', 'to': 'A', 'value': 0.041}}
 
 
@@ -81,10 +102,7 @@ def server(one_server: Served, file: Path) -> Served:
 # What does not come from the page itself.
 
 
-def own(server: Served) -> str:
-    return f'Host: 127.0.0.1:{server.port}'
-
-
+HOST = 'Host: 127.0.0.1:{p}'
 UPGRADE = (
     'Upgrade: websocket',
     'Connection: Upgrade',
@@ -104,7 +122,7 @@ def test_the_page_is_answered_at_its_address_by_either_name_of_this_machine(
 
 
 def test_a_page_may_load_and_reach_nothing_but_its_own_server(server: Served) -> None:
-    _, answer = asked(server, f'GET /{server.token}/', own(server))
+    _, answer = asked(server, f'GET /{server.token}/', HOST.format(p=server.port))
     head = answer.split('\r\n\r\n')[0]
     assert f'connect-src ws://127.0.0.1:{server.port} ws://localhost:{server.port};' in head
     assert "default-src 'none'" in head
@@ -119,88 +137,54 @@ def test_a_page_may_load_and_reach_nothing_but_its_own_server(server: Served) ->
     assert 'Access-Control' not in answer
 
 
-@pytest.mark.parametrize(
-    'path',
-    ['/', '/ws', '/favicon.ico', '/wrong/', '/{t}x/', '/{t}', '/%00/', '/../{t}/', '//'],
-)
-def test_without_the_token_nothing_is_there(server: Served, path: str) -> None:
-    path = path.replace('{t}', server.token if path != '/{t}x/' else server.token[:-1])
-    status, answer = asked(server, f'GET {path}', own(server))
-    assert status == 404
-    assert '<!doctype' not in answer
-    known = 'a request for something that is not here'
-    unknown = 'a request without the token'
-    assert server.server.refused == {known if path == f'/{server.token}' else unknown: 1}
-
-
-@pytest.mark.parametrize(
-    'path',
-    [
-        '../../../../../etc/passwd',
-        '%2e%2e/%2e%2e/%2e%2e/etc/passwd',
-        '..%2f..%2f..%2fetc%2fpasswd',
-        '..\\..\\etc\\passwd',
-        '/etc/passwd',
-        'static/',
-        'ws/x',
-        'x' * 5000,
-    ],
-)
-def test_no_path_leads_to_a_file(server: Served, path: str) -> None:
-    status, answer = asked(server, f'GET /{server.token}/{path}', own(server))
-    assert status == 404
-    assert 'root:' not in answer
-    assert sum(server.server.refused.values()) == 1
-
-
-@pytest.mark.parametrize(
-    'headers',
-    [
-        ['Host: example.org'],
-        ['Host: example.org:{p}'],
-        ['Host: 127.0.0.1'],
-        ['Host: 127.0.0.1:1'],
-        ['Host: [::1]:{p}'],
-        ['Host: 127.0.0.1:{p}.example.org'],
-        ['Host:'],
-        [],
-    ],
-)
-def test_another_host_is_refused(server: Served, headers: list[str]) -> None:
-    named = [header.replace('{p}', str(server.port)) for header in headers]
+def refused() -> Iterator[tuple[str, Sequence[str], int, str | None]]:
+    """Yield requests, their headers, the status of the answer, and what is counted."""
+    for path in ('/', '/ws', '/favicon.ico', '/wrong/', '/{cut}x/', '/%00/', '/../{t}/', '//'):
+        yield f'GET {path}', [HOST], 404, 'a request without the token'
+    yield 'GET /{t}', [HOST], 404, 'a request for something that is not here'
+    for path in (
+        '../../../../../etc/passwd', '%2e%2e/%2e%2e/%2e%2e/etc/passwd', '/etc/passwd', 'static/',
+        '..%2f..%2f..%2fetc%2fpasswd', '..\\..\\etc\\passwd', 'ws/x', 'x' * 5000,
+    ):  # fmt: skip
+        yield f'GET /{{t}}/{path}', [HOST], 404, None
     for path in ('', 'ws'):
-        status, _ = asked(server, f'GET /{server.token}/{path}', *named)
-        # Without any, it is no HTTP/1.1.
-        assert status == (403 if headers else 400)
-    assert not headers or server.server.refused == {'a request that names another host': 2}
+        for host in (
+            'example.org', 'example.org:{p}', '127.0.0.1', '127.0.0.1:1', '[::1]:{p}',
+            '127.0.0.1:{p}.example.org', '',
+        ):  # fmt: skip
+            what = 'a request that names another host'
+            yield f'GET /{{t}}/{path}', [f'Host: {host}'], 403, what
+        yield f'GET /{{t}}/{path}', [], 400, None  # no HTTP/1.1
+        for origin in (
+            'http://example.org', 'null', 'https://127.0.0.1:{p}', 'http://127.0.0.1:1', '',
+        ):  # fmt: skip
+            headers = [HOST, f'Origin: {origin}', *(UPGRADE if path else ())]
+            yield f'GET /{{t}}/{path}', headers, 403, 'a request of another origin'
+    yield 'GET /{t}/ws', [HOST, *UPGRADE], 403, 'a request of another origin'
+    for method in ('POST', 'PUT', 'DELETE', 'OPTIONS', 'PATCH'):
+        yield f'{method} /{{t}}/', [HOST, 'Content-Length: 0'], 405, 'a request that is not a GET'
 
 
-@pytest.mark.parametrize(
-    'origin', ['http://example.org', 'null', 'https://127.0.0.1:{p}', 'http://127.0.0.1:1', '']
-)
-def test_another_origin_is_refused(server: Served, origin: str) -> None:
-    header = f'Origin: {origin.replace("{p}", str(server.port))}'
-    page = asked(server, f'GET /{server.token}/', own(server), header)
-    asking = asked(server, f'GET /{server.token}/ws', own(server), header, *UPGRADE)
-    assert (page[0], asking[0]) == (403, 403)
-    assert server.server.refused == {'a request of another origin': 2}
-
-
-def test_a_socket_without_an_origin_is_refused(server: Served) -> None:
-    status, _ = asked(server, f'GET /{server.token}/ws', own(server), *UPGRADE)
-    assert status == 403
-
-
-@pytest.mark.parametrize('method', ['POST', 'PUT', 'DELETE', 'OPTIONS', 'PATCH'])
-def test_nothing_can_be_sent_to_a_path(server: Served, method: str) -> None:
-    status, _ = asked(server, f'{method} /{server.token}/', own(server), 'Content-Length: 0')
-    assert status == 405
+@pytest.mark.parametrize(('request_line', 'headers', 'status', 'what'), [*refused()])
+def test_what_does_not_come_from_the_page_is_refused_and_counted(
+    server: Served, request_line: str, headers: Sequence[str], status: int, what: str | None
+) -> None:
+    line, *lines = (
+        each.format(t=server.token, cut=server.token[:-1], p=server.port)
+        for each in (request_line, *headers)
+    )
+    found, answer = asked(server, line, *lines)
+    assert found == status
+    assert '<!doctype' not in answer
+    assert 'root:' not in answer
+    assert sum(server.server.refused.values()) == (status != 400)
+    assert what is None or server.server.refused == {what: 1}
 
 
 def test_what_is_refused_is_counted_each_time_and_said_once() -> None:
     with served([]) as server:
         for _ in range(5):
-            asked(server, 'GET /', own(server))
+            asked(server, 'GET /', HOST.format(p=server.port))
         assert server.server.refused == {'a request without the token': 5}
         assert server.lines == ['refused a request without the token']
 
@@ -225,294 +209,219 @@ def ok(answer: dict[str, Any]) -> Any:
     return answer['ok']
 
 
-def test_a_page_gets_models_of_texts_that_it_edits(server: Served) -> None:
-    async def run() -> None:
-        async with opened(server.address) as page:
-            first = ok(await page.ask('model', text=FOUR_BAR))
-            assert first['text'] == FOUR_BAR
-            second = ok(await page.ask('edit', text=FOUR_BAR, edit=LONGER))
-            assert second['text'] == FOUR_BAR.replace('0.040', '0.041')
+def talk(address: str, *requests: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the answers that one page gets, each before its next request."""
 
-    asyncio.run(run())
+    async def run() -> list[dict[str, Any]]:
+        async with opened(address) as page:
+            return [await page.ask(**request) for request in requests]
+
+    return asyncio.run(run())
+
+
+def save(text: str, **more: Any) -> dict[str, Any]:
+    return {'do': 'save', 'text': text, **more}
+
+
+EDIT = {'do': 'edit', 'text': FOUR_BAR, 'edit': LONGER}
+
+
+def test_a_page_gets_models_of_texts_that_it_edits(server: Served) -> None:
+    first, second = talk(server.address, {'do': 'model', 'text': FOUR_BAR}, EDIT)
+    assert ok(first)['text'] == FOUR_BAR
+    assert ok(second)['text'] == FOUR_BAR.replace('0.040', '0.041')
 
 
 def bad_messages(count: int) -> Iterator[str | bytes]:
     """Yield messages of which none is a request."""
     rng = random.Random(22)
-    good = {'id': 1, 'do': 'model', 'text': FOUR_BAR, 'whole': False}
-    written = json.dumps(good)
-    for index in range(count):
-        match index % 10:
-            case 0:
-                yield rng.randbytes(rng.randrange(200))
-            case 1:
-                yield written[: rng.randrange(len(written))]
-            case 2:
-                yield written.replace(
-                    '1', rng.choice(('NaN', '-Infinity', '1e999', '9' * 5000)), 1
-                )
-            case 3:
-                yield rng.choice('[{') * rng.randrange(1, 50_000)
-            case 4:
-                yield '{"id": 1, "do": ' * 5000 + '1' + '}' * 5000
-            case 5:
-                yield json.dumps(good | {'do': rng.choice(('', 'eval', '__init__', None, [], {}))})
-            case 6:
-                yield json.dumps(good | {'id': rng.choice(('1', None, [], True, 2**70))})
-            case 7:
-                yield json.dumps(rng.choice(([], 'model', 1, None, True, [good])))
-            case 8:
-                yield ''.join(chr(rng.randrange(32, 0xD800)) for _ in range(100))
-            case _:
-                yield json.dumps(
-                    {key: good[key] for key in rng.sample(sorted(good), 2)} | {'id': {}}
-                )
+    good = json.dumps({'id': 1, 'do': 'model', 'text': FOUR_BAR, 'whole': False})
+    yield from BAD_MESSAGES
+    for _ in range(count - len(BAD_MESSAGES)):
+        letters = ''.join(chr(rng.randrange(32, 0xD800)) for _ in range(100))
+        yield rng.choice((rng.randbytes(100), letters, good[: rng.randrange(len(good))]))
 
 
-def test_ten_thousand_bad_messages_are_counted_and_the_next_good_one_is_answered(
-    server: Served,
-) -> None:
-    count = 10_000
-
-    async def run() -> None:
-        async with opened(server.address) as page:
-
-            async def send() -> None:
-                for message in bad_messages(count):
-                    if isinstance(message, bytes):
-                        await page.socket.send_bytes(message)
-                    else:
-                        await page.socket.send_str(message)
-                await page.socket.send_str(' ' * (LARGEST + 1))
-
-            sending = asyncio.create_task(send())
-            for _ in range(count + 1):
-                error = (await page.get())['error']
-                assert '\n' not in error['text']
-                assert len(error['text']) < 1000
-            await sending
-            assert ok(await page.ask('model', text=FOUR_BAR))['text'] == FOUR_BAR
-
-    asyncio.run(run())
-    assert server.server.refused == {'a message that is not a request': count + 1}
+@in_loop
+async def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server: Served) -> None:
+    count = sample_count(10_000, 1000)
+    async with opened(server.address) as page:
+        for message in bad_messages(count):
+            if isinstance(message, bytes):
+                await page.socket.send_bytes(message)
+            else:
+                await page.socket.send_str(message)
+            error = (await page.get())['error']
+            assert '\n' not in error['text']
+            assert len(error['text']) < 1000
+        assert ok(await page.ask('model', text=FOUR_BAR))['text'] == FOUR_BAR
+    assert server.server.refused == {'a message that is not a request': count}
 
 
 @pytest.mark.parametrize(
     'frame',
     [b'\x81\x81\x00\x00\x00\x00\xff', b'\xff' * 20, b'\xc1\x00', b'\x81\x7f' + b'\xff' * 8],
 )
-def test_bytes_that_are_no_messages_end_their_page_alone(server: Served, frame: bytes) -> None:
-    async def run() -> None:
-        async with opened(server.address) as broken, opened(server.address) as page:
-            transport = broken.socket._conn.transport  # type: ignore[union-attr]
-            transport.write(frame)
-            message = await broken.socket.receive(60.0)
-            assert message.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
-            ok(await page.ask('names'))
+@in_loop
+async def test_bytes_that_are_no_messages_end_their_page_alone(
+    server: Served, frame: bytes
+) -> None:
+    async with opened(server.address) as broken, opened(server.address) as page:
+        transport = broken.socket._conn.transport  # type: ignore[union-attr]
+        transport.write(frame)
+        message = await broken.socket.receive(60.0)
+        assert message.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
+        ok(await page.ask('names'))
 
-    asyncio.run(run())
 
-
-def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
+@in_loop
+async def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
     # An answer of a megabyte, of which more are asked for than all buffers hold.
     large = {'text': f'{FOUR_BAR}# {"x" * 700_000}\n', 'kind': 'yaml'}
-
-    async def run() -> None:
-        async with opened(server.address) as deaf, opened(server.address) as page:
-            transport = deaf.socket._conn.transport  # type: ignore[union-attr]
-            transport.pause_reading()
-            sending = asyncio.gather(*(deaf.send('export', **large) for _ in range(17)))
-            for _ in range(20):
-                ok(await page.ask('export', **large))
-            assert await asyncio.wait_for(sending, 60.0)
-            transport.abort()
-            ok(await page.ask('names'))
-
-    asyncio.run(run())
+    async with opened(server.address) as deaf, opened(server.address) as page:
+        transport = deaf.socket._conn.transport  # type: ignore[union-attr]
+        transport.pause_reading()
+        sending = asyncio.gather(*(deaf.send('export', **large) for _ in range(17)))
+        for _ in range(20):
+            ok(await page.ask('export', **large))
+        assert await asyncio.wait_for(sending, 60.0)
+        transport.abort()
+        ok(await page.ask('names'))
 
 
-def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None:
+@in_loop
+async def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None:
     count = 40
-
-    async def run() -> None:
-        async with opened(server.address) as page:
-            numbers = [await page.send('edit', text=FOUR_BAR, edit=LONGER) for _ in range(count)]
-            answers = [await page.get() for _ in numbers]
-        assert sorted(answer['id'] for answer in answers) == numbers
-        done = [answer['id'] for answer in answers if 'ok' in answer]
-        dropped = [answer['id'] for answer in answers if answer.get('dropped')]
-        assert sorted(done + dropped) == numbers
-        assert numbers[-1] in done
-        assert dropped
-
-    asyncio.run(run())
+    async with opened(server.address) as page:
+        numbers = [await page.send('edit', text=FOUR_BAR, edit=LONGER) for _ in range(count)]
+        answers = [await page.get() for _ in numbers]
+    assert sorted(answer['id'] for answer in answers) == numbers
+    done = [answer['id'] for answer in answers if 'ok' in answer]
+    dropped = [answer['id'] for answer in answers if answer.get('dropped')]
+    assert sorted(done + dropped) == numbers
+    assert numbers[-1] in done
+    assert dropped
 
 
-def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_closes(
+@in_loop
+async def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_closes(
     server: Served,
 ) -> None:
-    async def run() -> None:
-        pages = [opened(server.address) for _ in range(MOST_PAGES)]
-        for page in pages:
-            await page.__aenter__()
-        async with opened(server.address) as fifth:
-            message = await fifth.socket.receive(60.0)
-            assert (message.data, message.extra) == (1013, '4 pages are open; close one')
-        for page in pages:
-            await page.__aexit__(None, None, None)
-        async with opened(server.address) as page:
-            ok(await page.ask('names'))
-
-    asyncio.run(run())
+    pages = [opened(server.address) for _ in range(MOST_PAGES)]
+    for page in pages:
+        await page.__aenter__()
+    async with opened(server.address) as fifth:
+        message = await fifth.socket.receive(60.0)
+        assert (message.data, message.extra) == (1013, '4 pages are open; close one')
+    for page in pages:
+        await page.__aexit__(None, None, None)
+    async with opened(server.address) as page:
+        ok(await page.ask('names'))
     assert server.server.refused == {'a page too many': 1}
 
 
-def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
+@in_loop
+async def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
     server: Served,
 ) -> None:
-    async def run() -> None:
-        for _ in range(5):
-            async with opened(server.address) as page:
-                await page.send('edit', text=FOUR_BAR, edit=LONGER, whole=True)
+    for _ in range(5):
         async with opened(server.address) as page:
-            ok(await page.ask('edit', text=FOUR_BAR, edit=LONGER))
-
-    asyncio.run(run())
+            await page.send('edit', text=FOUR_BAR, edit=LONGER, whole=True)
+    async with opened(server.address) as page:
+        ok(await page.ask('edit', text=FOUR_BAR, edit=LONGER))
     assert not server.server.refused
 
 
-def test_a_request_that_takes_too_long_ends_with_one_line_and_the_next_is_answered() -> None:
-    async def run() -> None:
-        worker = Worker('mine', None, 0.001)
-        with pytest.raises(LinkageError, match=r'^names: took longer than 0\.001 s; '):
-            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
-        worker.longest = 60.0
-        assert 'ok' in json.loads(
-            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
-        )
-        await worker.end()
-
-    asyncio.run(run())
-
-
-def test_a_process_that_dies_is_said_and_replaced() -> None:
-    async def run() -> None:
-        worker = Worker('mine', None, 60.0)
+@pytest.mark.parametrize(
+    ('longest', 'line'),
+    [
+        (0.001, r'^names: took longer than 0\.001 s; '),
+        (60.0, r'^names: ended the process that computes it; '),
+    ],
+)
+@in_loop
+async def test_a_process_that_takes_too_long_or_dies_is_said_and_replaced(
+    longest: float, line: str
+) -> None:
+    names = 1, 'names', '{"id": 1, "do": "names"}'
+    worker = Worker('mine', None, longest)
+    if longest > 1.0:
         await worker.start()
         os.kill(worker.pid, signal.SIGKILL)
-        with pytest.raises(LinkageError, match=r'^names: ended the process that computes it; '):
-            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
-        assert 'ok' in json.loads(
-            await worker.send_request(1, 'names', '{"id": 1, "do": "names"}')
-        )
-        await worker.end()
-
-    asyncio.run(run())
+    with pytest.raises(LinkageError, match=line):
+        await worker.send_request(*names)
+    worker.longest = 60.0
+    assert 'ok' in json.loads(await worker.send_request(*names))
+    await worker.end()
 
 
 # Saving.
 
 
-async def edited(page: Page, text: str, edit: dict[str, Any]) -> str:
-    return str(ok(await page.ask('edit', text=text, edit=edit))['text'])
-
-
 def test_an_edit_is_saved_and_undone_to_the_same_bytes(server: Served, file: Path) -> None:
-    async def run() -> None:
-        async with opened(server.address) as page:
-            longer = await edited(page, FOUR_BAR, LONGER)
-            assert ok(await page.ask('save', text=longer)) == {'file': 'mine.yaml'}
-            assert file.read_text() == FOUR_BAR.replace('0.040', '0.041')
-            ok(await page.ask('save', text=FOUR_BAR))
-            assert file.read_bytes() == FOUR_BAR.encode()
-        assert [path.name for path in file.parent.iterdir()] == ['mine.yaml']
+    longer = FOUR_BAR.replace('0.040', '0.041')
+    found = talk(server.address, save(longer))
+    assert ok(found[0]) == {'file': 'mine.yaml'}
+    assert file.read_text() == longer
+    # Windows' line ends and a byte order mark are saved as they are.
+    for text in (FOUR_BAR, '\ufeff' + FOUR_BAR.replace('\n', '\r\n')):
+        ok(talk(server.address, save(text))[0])
+        assert file.read_bytes() == text.encode()
+    assert [path.name for path in file.parent.iterdir()] == ['mine.yaml']
 
-    asyncio.run(run())
 
-
-def test_windows_line_ends_and_a_byte_order_mark_are_saved_as_they_were(
+@in_loop
+async def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
     server: Served, file: Path
 ) -> None:
-    written = '\ufeff' + FOUR_BAR.replace('\n', '\r\n')
-    file.write_bytes(written.encode())
-
-    async def run() -> None:
-        async with opened(server.address) as page:
-            ok(await page.ask('save', text=written))
-
-    asyncio.run(run())
-    assert file.read_bytes() == written.encode()
-
-
-def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
-    server: Served, file: Path
-) -> None:
-    async def run() -> None:
-        async with opened(server.address) as page:
-            ok(await page.ask('names'))
-            file.write_text(f'{FOUR_BAR}# by hand\n')
-            error = (await page.ask('save', text=FOUR_BAR))['error']['text']
-        assert error == (
-            'mine.yaml: has changed since this page read it; download this version, or load the '
-            'page again to go on from the file'
-        )
-
-    asyncio.run(run())
+    async with opened(server.address) as page:
+        ok(await page.ask('names'))
+        file.write_text(f'{FOUR_BAR}# by hand\n')
+        error = (await page.ask('save', text=FOUR_BAR))['error']['text']
+    assert error == (
+        'mine.yaml: has changed since this page read it; download this version, or load the '
+        'page again to go on from the file'
+    )
     assert file.read_text() == f'{FOUR_BAR}# by hand\n'
 
 
-def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
+@in_loop
+async def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
     server: Served, file: Path
 ) -> None:
-    async def run() -> None:
-        async with opened(server.address) as one, opened(server.address) as other:
-            ok(await other.ask('names'))
-            ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
-            assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
-            ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
-
-    asyncio.run(run())
+    async with opened(server.address) as one, opened(server.address) as other:
+        ok(await other.ask('names'))
+        ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
+        assert 'error' in await other.ask('save', text=f'{FOUR_BAR}# other\n')
+        ok(await one.ask('save', text=f'{FOUR_BAR}# one again\n'))
     assert file.read_text() == f'{FOUR_BAR}# one again\n'
 
 
 def test_a_text_that_is_no_linkage_is_not_saved(server: Served, file: Path) -> None:
-    async def run() -> None:
-        async with opened(server.address) as page:
-            for text in ('', 'links: 1', FOUR_BAR.replace('0.100', '1.100'), '\ud800'):
-                assert 'error' in await page.ask('save', text=text)
-            assert 'error' in await page.ask('save', text=FOUR_BAR, name='jansen_leg')
-
-    asyncio.run(run())
+    texts = ('', 'links: 1', FOUR_BAR.replace('0.100', '1.100'), '\ud800')
+    bad = [*map(save, texts), save(FOUR_BAR, name='jansen_leg')]
+    assert all('error' in answer for answer in talk(server.address, *bad))
     assert file.read_text() == FOUR_BAR
 
 
 def test_a_shipped_linkage_is_not_saved_and_the_error_says_what_to_do() -> None:
-    async def run(address: str) -> None:
-        async with opened(address) as page:
-            error = (await page.ask('save', text=FOUR_BAR))['error']['text']
-            assert error == 'save: no file of yours is open; download the linkage'
-
     with served([Conversation('four_bar', None, None).add_routes]) as found:
-        asyncio.run(run(found.address))
+        (answer,) = talk(found.address, save(FOUR_BAR))
+    assert answer['error']['text'] == 'save: no file of yours is open; download the linkage'
 
 
 # The command.
 
 
-def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.Popen[str], str]:
-    """Start ``linkage view``, and return its process and its address."""
-    limited = (
-        f'import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))'
-    )
+@contextmanager
+def started(
+    folder: Path, *arguments: str, files: int = 1024, end: int = signal.SIGINT
+) -> Iterator[tuple[subprocess.Popen[str], str, list[str]]]:
+    """Run ``linkage view``; give process, address, and at its end what it said; none is left."""
+    limits = f'resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))'
+    program = f'import resource, sys; {limits}; from linkage_ros.cli.main import main; '
     process = subprocess.Popen(
-        [
-            *(
-                sys.executable,
-                '-c',
-                f'{limited}; from linkage_ros.cli.main import main; sys.exit(main())',
-            ),
-            *('view', *arguments, '--no-browser'),
-        ],
+        [sys.executable, '-c', f'{program}sys.exit(main())', 'view', *arguments, '--no-browser'],
         cwd=folder,
         env=environment(folder),
         stdout=subprocess.PIPE,
@@ -520,45 +429,44 @@ def start(folder: Path, *arguments: str, files: int = 1024) -> tuple[subprocess.
         text=True,
     )
     assert process.stdout is not None
-    return process, process.stdout.readline().rpartition(' ')[2].strip()
+    said: list[str] = []
+    address = process.stdout.readline().rpartition(' ')[2].strip()
+    # Any thread of a process may have started another one.
+    tasks = Path(f'/proc/{process.pid}/task').iterdir()
+    workers = ' '.join((task / 'children').read_text() for task in tasks).split()
+    try:
+        yield process, address, said
+    finally:
+        process.send_signal(end)
+        said += process.communicate(timeout=30.0)
+    until = time.monotonic() + 30.0
+    while any(Path(f'/proc/{worker}').exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.05)
 
 
-def children(pid: int) -> set[int]:
-    """Return the processes that any thread of a process has started."""
-    tasks = Path(f'/proc/{pid}/task').iterdir()
-    return {int(child) for task in tasks for child in (task / 'children').read_text().split()}
-
-
-def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
+@in_loop
+async def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
-    process, address = start(tmp_path, 'mine.yaml')
-
-    async def run() -> None:
+    with started(tmp_path, 'mine.yaml', end=0) as (process, address, said):
         async with opened(address) as page, opened(address) as other:
             assert ok(await page.ask('model', text=FOUR_BAR))['name'] == 'mine'
             await other.send('export', kind='gif', text=FOUR_BAR)
             process.send_signal(signal.SIGINT)
             message = await page.socket.receive(60.0)
             assert (message.data, message.extra) == (1001, 'linkage view has ended')
-
-    workers = children(process.pid)
-    asyncio.run(run())
-    out, err = process.communicate(timeout=30.0)
-    assert (process.returncode, out, err) == (0, 'linkage view: ended\n', '')
-    assert workers
-    assert not any(Path(f'/proc/{worker}').exists() for worker in workers)
+    assert (process.returncode, said) == (0, ['linkage view: ended\n', ''])
 
 
-def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+@in_loop
+async def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
     """The scene has an effect of the user's own, from the folder of the command."""
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(
         'linkage: mine.yaml\nrate: 60\neffects: {mine.dead_zone: {width: 0.05}}\n'
     )
     shutil.copytree(EXAMPLES / 'mine', tmp_path / 'mine')
-    process, address = start(tmp_path, 'scene.yaml')
-
-    async def run() -> None:
+    with started(tmp_path, 'scene.yaml', end=signal.SIGKILL) as (_, address, said):
         async with opened(address) as page:
             reads = [
                 ok(await page.ask('read', t=n / 60, inputs=[0.02 * n], rates=[1.2]))['read']
@@ -567,67 +475,37 @@ def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
             changes = [b != a for a, b in pairwise(read['rocker_joint'] for read in reads)]
             assert 0 < sum(changes) < len(changes)
             assert ok(await page.ask('save', text=FOUR_BAR)) == {'file': 'mine.yaml'}
-
-    try:
-        asyncio.run(run())
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30.0)[1] == ''
-
-
-def test_a_server_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
-    process, _ = start(tmp_path, 'four_bar')
-    workers = children(process.pid)
-    assert workers
-    process.kill()
-    process.communicate(timeout=30.0)
-    until = time.monotonic() + 30.0
-    while any(Path(f'/proc/{worker}').exists() for worker in workers):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    assert said[1] == ''
 
 
 def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR)
-    process, address = start(tmp_path, 'mine.yaml')
-
-    async def run() -> None:
-        async with aiohttp.ClientSession() as session:
-            pages = []
-            for text in (FOUR_BAR, FOUR_BAR.replace('rocker.', 'rocker, longer.'), 'links: 1'):
-                file.write_text(text)
-                async with session.get(address) as answer:
-                    pages.append(await answer.text())
-        assert ['rocker, longer.' in page for page in pages] == [False, True, True]
-
-    try:
-        asyncio.run(run())
-    finally:
-        process.send_signal(signal.SIGTERM)
-        _, err = process.communicate(timeout=30.0)
-    assert len(err.splitlines()) == 1, err
-    (line,) = err.splitlines()
+    with started(tmp_path, 'mine.yaml', end=signal.SIGTERM) as (_, address, said):
+        for text, is_longer in (
+            (FOUR_BAR, False), (FOUR_BAR.replace('rocker.', 'rocker, longer.'), True),
+            ('links: 1', True),
+        ):  # fmt: skip
+            file.write_text(text)
+            with urlopen(address, timeout=60.0) as page:
+                assert ('rocker, longer.' in page.read().decode()) == is_longer
+    (line,) = said[1].splitlines()
     assert line.startswith('linkage view: mine.yaml:1: links: ')
     assert line.endswith('; the page shows it as it was')
 
 
 def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path: Path) -> None:
-    process, address = start(tmp_path, 'four_bar', files=64)
-    parts = urlsplit(address)
-    try:
+    with started(tmp_path, 'four_bar', files=64) as (process, address, said):
+        place = urlsplit(address).hostname, urlsplit(address).port
         with ExitStack() as connections:
             for _ in range(100):
-                place = parts.hostname, parts.port
                 connections.enter_context(socket.create_connection(place, timeout=60.0))
             assert process.stderr is not None
             line = process.stderr.readline()
         with urlopen(address, timeout=60.0) as page:
             assert page.status == 200
-    finally:
-        process.send_signal(signal.SIGINT)
-        _, rest = process.communicate(timeout=30.0)
-    assert (line, rest) == ('linkage view: refused a connection (Too many open files)\n', '')
+    assert line == 'linkage view: refused a connection (Too many open files)\n'
+    assert said[1] == ''
 
 
 def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
@@ -647,15 +525,11 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
     answer = linkage(tmp_path, 'view', 'bag', '-o', 'view.html')
     assert (answer.returncode, answer.stderr) == (0, '')
     assert (tmp_path / 'view.html').read_bytes() == expected
-    process, address = start(tmp_path, 'bag')
-    try:
+    with started(tmp_path, 'bag') as (_, address, _):
         with urlopen(address, timeout=60.0) as page:
             assert page.read() == expected
         with pytest.raises(HTTPError, match='404'):
             urlopen(f'{address}ws', timeout=60.0)
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30.0)
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.stages.drives.bag import BagParameters as BagParameters
-from linkage_ros.stages.drives.chirp import Chirp as Chirp, ChirpParameters as ChirpParameters
+from linkage_ros.stages.drives.bag import BagDrive as BagDrive
+from linkage_ros.stages.drives.chirp import Chirp as Chirp, ChirpDrive as ChirpDrive
 from linkage_ros.stages.drives.compiled_drive import compile_drive as compile_drive
-from linkage_ros.stages.drives.constant_rate import (
-    ConstantRate as ConstantRate,
-    ConstantRateParameters as ConstantRateParameters,
-)
 from linkage_ros.stages.drives.dependent_samples import (
     crank_of as crank_of,
     DependentSampleReader as DependentSampleReader,
@@ -21,27 +17,29 @@ from linkage_ros.stages.drives.dependent_samples import (
 )
 from linkage_ros.stages.drives.drive import (
     Context as Context,
+    Crank as Crank,
     CrankAtRest as CrankAtRest,
     CrankBehindPlay as CrankBehindPlay,
     CrankState as CrankState,
     describe_chatter as describe_chatter,
     Drive as Drive,
+    drive_class as drive_class,
     DRIVES as DRIVES,
 )
-from linkage_ros.stages.drives.profile import (
-    Profile as Profile,
-    ProfileParameters as ProfileParameters,
-    value_range as value_range,
+from linkage_ros.stages.drives.profile import Profile as Profile, ProfileDrive as ProfileDrive
+from linkage_ros.stages.drives.steady_motion import (
+    ConstantRate as ConstantRate,
+    ConstantRateDrive as ConstantRateDrive,
+    Sine as Sine,
+    SineDrive as SineDrive,
 )
-from linkage_ros.stages.drives.sine import Sine as Sine, SineParameters as SineParameters
 from linkage_ros.stages.drives.topic import (
+    SampledCrank as SampledCrank,
     TopicDrive as TopicDrive,
-    TopicParameters as TopicParameters,
 )
 from linkage_ros.stages.drives.torque import (
     MotorParameters as MotorParameters,
     PlayParameters as PlayParameters,
-    reader as reader,
-    TOPIC as TOPIC,
-    TorqueParameters as TorqueParameters,
+    TorqueCrank as TorqueCrank,
+    TorqueDrive as TorqueDrive,
 )

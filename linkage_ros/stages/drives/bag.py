@@ -34,8 +34,8 @@ from linkage_ros.bag import Bag, read_bag, read_raw_metadata
 from linkage_ros.description import choice, file, flag, number, text
 from linkage_ros.errors import BagError, DefinitionError, list_names
 from linkage_ros.messages import CrankSample, JointStateReader, Rejection
-from linkage_ros.stages.drives.drive import Context, CrankState, Drive
-from linkage_ros.stages.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.stages.drives.drive import Context, Crank, CrankState, Drive
+from linkage_ros.stages.drives.topic import SampledCrank, TopicDrive
 
 _TYPE = 'sensor_msgs/msg/JointState'
 
@@ -64,11 +64,11 @@ class BagSamples:
     rejected: Counter[Rejection]
     """Number of skipped messages, by reason."""
 
-    def __init__(self, use: TopicParameters, context: Context) -> None:
+    def __init__(self, use: TopicDrive, context: Context) -> None:
         inputs = context.closure.linkage.inputs
         self._inputs = len(inputs)
         self._read = JointStateReader(context.inputs_in_messages).read
-        self._sieve = TopicDrive(use, context.needs_rate, inputs)
+        self._sieve = SampledCrank(use, context.needs_rate, inputs)
         self._at_arrival = use.stamp == 'arrival'
         self._log_times, self._stamps = array('Q'), array('Q')
         self._values = array('d')
@@ -119,7 +119,7 @@ class BagSamples:
         return tuple(self._values[first:middle]), tuple(self._values[middle:end])
 
 
-def read_samples(bag: Bag, topic: str, use: TopicParameters, context: Context) -> BagSamples:
+def read_samples(bag: Bag, topic: str, use: TopicDrive, context: Context) -> BagSamples:
     """
     Return the samples of a topic of a bag, or raise `BagError`.
 
@@ -175,7 +175,7 @@ def _crank_topic_of_run(bag: Bag) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class BagParameters:
+class BagDrive(Drive):
     """The crank samples of a recorded bag, from the first tick on."""
 
     file: str = file("the bag's folder, or its MCAP file")
@@ -203,35 +203,31 @@ class BagParameters:
     )
     allow_truncated: bool = flag('take a bag whose recording was killed, as far as it goes', False)
 
+    def build(self, context: Context) -> RecordedPace | FastPace:
+        """
+        Read the bag and build the drive.
 
-PARAMETERS = BagParameters
-
-
-def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPace:
-    """
-    Read the bag and build the drive.
-
-    Raise `BagError` if the bag cannot be read, or if no topic, or more than one, has the input
-    joints; raise `DefinitionError` if the samples should repeat, but take no time.
-    """
-    recorded = parameters.pace == 'recorded'
-    use = TopicParameters(
-        carry_forward=parameters.carry_forward and recorded,
-        max_age=parameters.max_age,
-        stamp=parameters.stamp,
-    )
-    bag = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
-    samples = read_samples(bag, parameters.topic, use, context)
-    if recorded:
-        return RecordedPace(samples, use, repeat=parameters.repeat)
-    return FastPace(samples, repeat=parameters.repeat)
+        Raise `BagError` if the bag cannot be read, or if no topic, or more than one, has the input
+        joints; raise `DefinitionError` if the samples should repeat, but take no time.
+        """
+        recorded = self.pace == 'recorded'
+        use = TopicDrive(
+            carry_forward=self.carry_forward and recorded,
+            max_age=self.max_age,
+            stamp=self.stamp,
+        )
+        bag = read_bag(self.file, allow_truncated=self.allow_truncated)
+        samples = read_samples(bag, self.topic, use, context)
+        if recorded:
+            return RecordedPace(samples, use, repeat=self.repeat)
+        return FastPace(samples, repeat=self.repeat)
 
 
-class RecordedPace(Drive):
+class RecordedPace(Crank):
     """
     Recorded samples at their times: each as long after the first tick as after the first sample.
 
-    A `TopicDrive` makes the crank state between and after them. If they ``repeat``, but take no
+    A `SampledCrank` makes the crank state between and after them. If they ``repeat``, but take no
     time, `DefinitionError` is raised.
     """
 
@@ -240,9 +236,9 @@ class RecordedPace(Drive):
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
 
-    def __init__(self, samples: BagSamples, use: TopicParameters, *, repeat: bool) -> None:
+    def __init__(self, samples: BagSamples, use: TopicDrive, *, repeat: bool) -> None:
         self.samples = samples
-        self._topic = TopicDrive(replace(use, stamp='measured'), needs_rate=False)
+        self._topic = SampledCrank(replace(use, stamp='measured'), needs_rate=False)
         self.max_age = self._topic.max_age
         self._start: int | None = None
         self._newest = (-1, -1)
@@ -275,7 +271,7 @@ class RecordedPace(Drive):
         return self._topic.state(elapsed + 1)
 
 
-class FastPace(Drive):
+class FastPace(Crank):
     """Recorded samples one by one: each tick takes the next one as measured, whatever the time."""
 
     __slots__ = ('_next', '_repeat', 'samples')

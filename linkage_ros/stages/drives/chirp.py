@@ -27,19 +27,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from math import cos, exp, expm1, inf, log, sin, tau
 from typing import NamedTuple
 
 from linkage_ros.description import choice, each_part, flag, number
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives.clocked import as_integers, build_clocked, Curve, LARGEST
+from linkage_ros.stages.drives.clocked import (
+    as_integers,
+    ClockedDrive,
+    Curve,
+    InputMotion,
+    LARGEST,
+)
 
 _FINEST = 2**60
 
 
 @dataclass(frozen=True, slots=True)
-class Chirp:
+class Chirp(InputMotion):
     """A chirp of one input."""
 
     amplitude: float = number('amplitude', unit='rad or m', least=0.0, most=LARGEST)
@@ -50,61 +55,57 @@ class Chirp:
     sweep: str = choice('growth of the frequency', ('linear', 'logarithmic'), 'linear')
     repeat: bool = flag('at the end sweep back, and so on; else rest there', False)
 
+    def value_range(self) -> tuple[float, float]:
+        """Return the least and the greatest value of an input, in [rad] or [m]."""
+        mean, A = self.mean, self.amplitude
+        length = round(self.seconds * NANOSECONDS)
+        sweep = _linear_sweep if self.sweep == 'linear' else _logarithmic_sweep
+        periods, below, _ = sweep(self.start_frequency, self.end_frequency, length)
+        passed = inf if self.repeat else periods(length) / below
+        # The sine begins at 0; its maximum is a quarter of a period later, its minimum three.
+        there = sin(tau * passed) if passed < 1.0 else 0.0
+        return mean + A * (-1.0 if passed >= 0.75 else min(0.0, there)), mean + A * (
+            1.0 if passed >= 0.25 else there
+        )
+
+    def motion_curve(self, _where: str = '') -> Curve:
+        """Return value, rate and acceleration as a function of time, in [ns]."""
+        mean, A = self.mean, self.amplitude
+        length = round(self.seconds * NANOSECONDS)
+        sweep = _linear_sweep if self.sweep == 'linear' else _logarithmic_sweep
+        periods, below, frequency = sweep(self.start_frequency, self.end_frequency, length)
+        there = periods(length)
+        rest = None if self.repeat else (mean + A * sin(tau * (there % below / below)), 0.0, 0.0)
+
+        def chirp(time: int) -> tuple[float, float, float]:
+            if time < length:
+                passed = periods(time)
+                f, slope = frequency(time)
+            elif rest:
+                return rest
+            else:
+                sweeps, time = divmod(time, length)
+                if sweeps % 2:
+                    passed = (sweeps + 1) * there - periods(length - time)
+                    f, slope = frequency(length - time)
+                    slope = -slope
+                else:
+                    passed = sweeps * there + periods(time)
+                    f, slope = frequency(time)
+            phase = tau * (passed % below / below)
+            w = tau * f
+            s, c = sin(phase), cos(phase)
+            return mean + A * s, A * w * c, A * (tau * slope * c - w * w * s)
+
+        return chirp
+
 
 @dataclass(frozen=True, slots=True)
-class ChirpParameters(Chirp):
+class ChirpDrive(Chirp, ClockedDrive):
     """A sine of the inputs whose frequency sweeps through a range, from the first tick on."""
 
+    KEY = 'drive.chirp'
     inputs: Mapping[str, Chirp] = each_part('inputs with a different chirp', 'input', Chirp)
-
-
-PARAMETERS = ChirpParameters
-
-
-def value_range(parameters: Chirp) -> tuple[float, float]:
-    """Return the least and the greatest value of an input, in [rad] or [m]."""
-    mean, A = parameters.mean, parameters.amplitude
-    length = round(parameters.seconds * NANOSECONDS)
-    sweep = _linear_sweep if parameters.sweep == 'linear' else _logarithmic_sweep
-    periods, below, _ = sweep(parameters.start_frequency, parameters.end_frequency, length)
-    passed = inf if parameters.repeat else periods(length) / below
-    # The sine begins at 0; its maximum is a quarter of a period later, its minimum three quarters.
-    there = sin(tau * passed) if passed < 1.0 else 0.0
-    return mean + A * (-1.0 if passed >= 0.75 else min(0.0, there)), mean + A * (
-        1.0 if passed >= 0.25 else there
-    )
-
-
-def motion_curve(parameters: Chirp, _where: str = '') -> Curve:
-    """Return value, rate and acceleration as a function of time, in [ns]."""
-    mean, A = parameters.mean, parameters.amplitude
-    length = round(parameters.seconds * NANOSECONDS)
-    sweep = _linear_sweep if parameters.sweep == 'linear' else _logarithmic_sweep
-    periods, below, frequency = sweep(parameters.start_frequency, parameters.end_frequency, length)
-    there = periods(length)
-    rest = None if parameters.repeat else (mean + A * sin(tau * (there % below / below)), 0.0, 0.0)
-
-    def chirp(time: int) -> tuple[float, float, float]:
-        if time < length:
-            passed = periods(time)
-            f, slope = frequency(time)
-        elif rest:
-            return rest
-        else:
-            sweeps, time = divmod(time, length)
-            if sweeps % 2:
-                passed = (sweeps + 1) * there - periods(length - time)
-                f, slope = frequency(length - time)
-                slope = -slope
-            else:
-                passed = sweeps * there + periods(time)
-                f, slope = frequency(time)
-        phase = tau * (passed % below / below)
-        w = tau * f
-        s, c = sin(phase), cos(phase)
-        return mean + A * s, A * w * c, A * (tau * slope * c - w * w * s)
-
-    return chirp
 
 
 class _FrequencySweep(NamedTuple):
@@ -146,6 +147,3 @@ def _logarithmic_sweep(start: float, end: float, length: int) -> _FrequencySweep
         return f, f * growth / seconds
 
     return _FrequencySweep(periods, _FINEST, frequency)
-
-
-build = partial(build_clocked, 'drive.chirp', motion_curve, value_range)

@@ -15,12 +15,13 @@ no digit is lost before the multiplication by a rate or a frequency.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import call, Closure, InputSweep
-from linkage_ros.stages.drives.drive import Context, CrankState, FormulaDrive
+from linkage_ros.stages.drives.drive import Context, CrankState, Drive, FormulaCrank
 
 LARGEST = 1e10
 """Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
@@ -80,7 +81,7 @@ def refuse_beyond(
             )
 
 
-class ClockedDrive(FormulaDrive):
+class ClockedCrank(FormulaCrank):
     """Inputs that follow curves, one for each input of the linkage, from the first tick on."""
 
     __slots__ = ('_curves', 'start')
@@ -116,37 +117,54 @@ class ClockedDrive(FormulaDrive):
         return CrankState(values, rates, accelerations, 0)
 
 
-def build_clocked(
-    where: str,
-    curve: Callable[[Any, str], Curve],
-    extent: Callable[[Any], tuple[float, float]],
-    use: Any,
-    context: Context,
-) -> ClockedDrive:
-    """
-    Build a drive from curves; ``where`` is its key.
+class InputMotion(ABC):
+    """The parameters of the motion of one input."""
 
-    ``curve`` makes a curve from parameters and their key; ``extent`` returns its least and
-    greatest value, in [rad] or [m]; infinite without bound. ``use`` has the parameters of an
-    input, and in its ``inputs`` the parameters that differ, by name. Raise `DefinitionError` if
-    every input has its own parameters, so that the common ones have no effect, or if an input
-    leaves the limits of a joint.
-    """
-    names = [given.joint for given in context.closure.linkage.inputs]
-    inputs = use.inputs
-    if inputs and len(inputs) == len(names):
-        raise DefinitionError(
-            f'{where}.inputs',
-            f'names every input ({list_names(names)}), so the values beside it are unused',
-            f'leave one of them out: it then takes the values beside {where}.inputs',
-        )
-    curves = []
-    for index, name in enumerate(names):
-        of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (use, where)
-        curves.append(curve(of, key))
-        if context.hard_limited.bounds:
-            refuse_beyond(context.hard_limited, index, key, curves[-1](0)[0], extent(of))
-    return ClockedDrive(tuple(curves))
+    __slots__ = ()
+
+    @abstractmethod
+    def value_range(self) -> tuple[float, float]:
+        """Return the least and the greatest value, in [rad] or [m]; infinite without bound."""
+
+    @abstractmethod
+    def motion_curve(self, where: str = '') -> Curve:
+        """Return the motion; ``where`` is its key, for errors."""
+
+
+class ClockedDrive(InputMotion, Drive):
+    """A drive that moves each input on a curve."""
+
+    __slots__ = ()
+
+    KEY: ClassVar[str]
+    """Key of the drive in a scene."""
+    inputs: Mapping[str, InputMotion]
+    """Inputs that move otherwise, by name."""
+
+    def build(self, context: Context) -> ClockedCrank:
+        """
+        Build the crank.
+
+        Raise `DefinitionError` if every input has its own parameters, so that the common ones have
+        no effect, or if an input leaves the limits of a joint.
+        """
+        names = [given.joint for given in context.closure.linkage.inputs]
+        where = self.KEY
+        if self.inputs and len(self.inputs) == len(names):
+            raise DefinitionError(
+                f'{where}.inputs',
+                f'names every input ({list_names(names)}), so the values beside it are unused',
+                f'leave one of them out: it then takes the values beside {where}.inputs',
+            )
+        curves = []
+        for index, name in enumerate(names):
+            own = self.inputs.get(name)
+            moved, key = (own, f'{where}.inputs.{name}') if own else (self, where)
+            curves.append(moved.motion_curve(key))
+            if context.hard_limited.bounds:
+                start, extent = curves[-1](0)[0], moved.value_range()
+                refuse_beyond(context.hard_limited, index, key, start, extent)
+        return ClockedCrank(tuple(curves))
 
 
 def as_integers(*numbers: float) -> tuple[list[int], int]:

@@ -21,17 +21,17 @@ from linkage_ros.kinematics.compiling import (
     python_body,
     Tape,
 )
-from linkage_ros.stages.drives.drive import CrankState, Drive, FormulaDrive
+from linkage_ros.stages.drives.drive import Crank, CrankState, FormulaCrank
 
 
-def compile_drive(drive: Drive, inputs: int, leave: str, leave_without_crank: str) -> Lines:
+def compile_drive(drive: Crank, inputs: int, leave: str, leave_without_crank: str) -> Lines:
     """
     Return lines that compute the fields of `CrankState` from ``now``.
 
     ``inputs`` is the number of inputs of the linkage. ``leave`` is the statement where a formula
     decides otherwise than usually, and ``leave_without_crank`` where another drive has no state.
     """
-    if not isinstance(drive, FormulaDrive):
+    if not isinstance(drive, FormulaCrank):
         fields = ', '.join(CrankState._fields)
         lines = ['crank = drive_state(now)', 'if crank is None:', f'    {leave_without_crank}']
         return Lines([*lines, f'{fields} = crank'], {'drive_state': drive.state})

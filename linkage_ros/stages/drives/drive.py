@@ -7,25 +7,16 @@
 # language governing permissions and limitations under the License.
 
 """
-Interface of the drives, which determine the crank state.
+The drives, which determine the crank state, and the classes that they derive from.
 
-Each drive is a module, imported only if a scene names the drive, with
-
-``PARAMETERS``
-    The type of its parameters (see `linkage_ros.description.parameters`).
-``build(parameters, context: Context) -> Drive``
-    Build it.
-
-A drive that listens to a topic also has
-
-``TOPIC``
-    The topic; its messages are ``sensor_msgs/msg/JointState``.
-``reader(parameters, context) -> Callable[[bytes], sample | Rejection]``
-    Build a function that reads a sample from a message; the drive then has ``offer(sample, now)``.
+A drive is a frozen dataclass: its fields are its parameters, made by the functions of
+`linkage_ros.description.parameters`; its class variables say all else about it. It builds the
+crank that it moves. A scene imports only the drive that it names.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,20 +24,23 @@ from random import Random
 from typing import Any, ClassVar, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.kinematics import Closure, without_limits
+from linkage_ros.stages.plugin import load_class
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import Friction, Loads, Mechanics, Reactions
 
+_HERE = 'linkage_ros.stages.drives'
+
 DRIVES = {
-    'topic': 'linkage_ros.stages.drives.topic',
-    'constant_rate': 'linkage_ros.stages.drives.constant_rate',
-    'profile': 'linkage_ros.stages.drives.profile',
-    'sine': 'linkage_ros.stages.drives.sine',
-    'chirp': 'linkage_ros.stages.drives.chirp',
-    'bag': 'linkage_ros.stages.drives.bag',
-    'torque': 'linkage_ros.stages.drives.torque',
+    'topic': f'{_HERE}.topic.TopicDrive',
+    'constant_rate': f'{_HERE}.steady_motion.ConstantRateDrive',
+    'profile': f'{_HERE}.profile.ProfileDrive',
+    'sine': f'{_HERE}.steady_motion.SineDrive',
+    'chirp': f'{_HERE}.chirp.ChirpDrive',
+    'bag': f'{_HERE}.bag.BagDrive',
+    'torque': f'{_HERE}.torque.TorqueDrive',
 }
-"""Module of each drive, by name of the drive."""
+"""Class of each drive, by name."""
 
 LARGEST = 1e10
 """Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
@@ -93,8 +87,11 @@ class CrankAtRest(CrankState):
     bearing: tuple[float, ...] = ()
 
 
-class Drive(Protocol):
-    """Drive with its state; a reset builds a new one."""
+class Crank(Protocol):
+    """A crank that a drive moves, with its state; a reset builds a new one."""
+
+    exerts_effort: bool = False
+    """Whether its state says what the drive exerts on an input at rest."""
 
     @property
     def stamp(self) -> int:
@@ -113,9 +110,9 @@ class Drive(Protocol):
         return 0
 
 
-class FormulaDrive(Drive):
+class FormulaCrank(Crank):
     """
-    Drive whose crank state is a formula of the time and of the numbers that it holds.
+    A crank whose state is a formula of the time and of the numbers that it holds.
 
     A compiled tick runs `crank_state` on symbols: it takes its functions from
     `linkage_ros.kinematics`, and where it decides otherwise than usually, the tick is interpreted.
@@ -141,7 +138,7 @@ class FormulaDrive(Drive):
 
 
 def describe_chatter(steps: int) -> str:
-    """Return a line on the steps that `Drive.chatter_count` counts."""
+    """Return a line on the steps that `Crank.chatter_count` counts."""
     return (
         f'drive.torque.play: motor and crank met and parted too often in {steps} steps, at whose '
         'ends the play was closed; shorten the step, or look at the controller'
@@ -235,3 +232,41 @@ class Context:
         from linkage_ros.dynamics import Reactions  # local import: only with forces
 
         return Reactions(self.mechanics)
+
+
+class Drive(ABC):
+    """
+    A drive: the parameters of a scene, and what the drive is.
+
+    Attributes
+    ----------
+    listens_to
+        Its topic, of ``sensor_msgs/msg/JointState``; '' for none. Then its crank has
+        ``offer(sample, now) -> Rejection | None``.
+    publishes, message
+        Its own topic, and the type of the message: package/msg/Type; '' for none.
+
+    """
+
+    __slots__ = ()
+
+    listens_to: ClassVar[str] = ''
+    publishes: ClassVar[str] = ''
+    message: ClassVar[str] = ''
+
+    @abstractmethod
+    def build(self, context: Context) -> Crank:
+        """Build the crank; raise `DefinitionError` if it cannot move as the parameters say."""
+
+    def reader(self, _context: Context) -> Reader:
+        """Build a function that reads a sample from a message."""
+        raise NotImplementedError
+
+    def writer(self, _context: Context, _crank: Any) -> Callable[..., bytes] | None:
+        """Build the writer of its own message, for its crank; None if there is none."""
+        return None
+
+
+def drive_class(name: str) -> type[Drive]:
+    """Import a drive."""
+    return load_class(DRIVES[name])

@@ -28,20 +28,19 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from math import copysign, inf, sqrt
 
 from linkage_ros.description import choice, each_part, flag, number_rows
 from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives.clocked import build_clocked, Curve, LARGEST
+from linkage_ros.stages.drives.clocked import ClockedDrive, Curve, InputMotion, LARGEST
 
 _Polynomial = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class Profile(InputMotion):
     """A table of one input."""
 
     table: tuple[tuple[float, float], ...] = number_rows(
@@ -54,30 +53,65 @@ class Profile:
     )
     repeat: bool = flag('continue with the first row after the last; else rest there', False)
 
+    def value_range(self) -> tuple[float, float]:
+        """Return the least and the greatest value of an input, in [rad] or [m]."""
+        values = [value for _, value in self.table]
+        gain = values[-1] - values[0] if self.repeat else 0.0
+        extremes = list(values)
+        if self.interpolation == 'cubic':  # the others stay between their rows
+            times = [time for time, _ in self.table]
+            seconds = [after - before for before, after in pairwise(times)]
+            for value, (c1, c2, c3, _, _) in zip(
+                values, _row_polynomials(self, seconds), strict=False
+            ):
+                extremes += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
+        return (-inf if gain < 0.0 else min(extremes)), (inf if gain > 0.0 else max(extremes))
+
+    def motion_curve(self, where: str = 'drive.profile') -> Curve:
+        """
+        Return value, rate and acceleration as a function of time, in [ns].
+
+        Raise `DefinitionError` if the table has less than two rows, or times that do not increase.
+        """
+        times = _table_times(self.table, f'{where}.table')
+        values = [value for _, value in self.table]
+        begin, length = times[0], times[-1] - times[0]
+        starts = [time - begin for time in times[:-1]]
+        seconds = [(after - before) / NANOSECONDS for before, after in pairwise(times)]
+        polynomials = _row_polynomials(self, seconds)
+        durations = [after - before for before, after in pairwise(times)]
+        pieces = list(zip(starts, durations, values, seconds, polynomials, strict=False))
+        before, after = (values[0], 0.0, 0.0), (values[-1], 0.0, 0.0)
+        gain = values[-1] - values[0] if self.repeat else None
+
+        def profile(time: int) -> tuple[float, float, float]:
+            time -= begin
+            gained = 0.0
+            if time < 0:
+                return before
+            if time >= length:
+                if gain is None:
+                    return after
+                rounds, time = divmod(time, length)
+                gained = rounds * gain
+            piece = pieces[bisect_right(starts, time) - 1]
+            start, duration, value, h, (c1, c2, c3, c4, c5) = piece
+            x = (time - start) / duration
+            return (
+                value + gained + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5)))),
+                (c1 + x * (2 * c2 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h,
+                (2 * c2 + x * (6 * c3 + x * (12 * c4 + x * 20 * c5))) / (h * h),
+            )
+
+        return profile
+
 
 @dataclass(frozen=True, slots=True)
-class ProfileParameters(Profile):
+class ProfileDrive(Profile, ClockedDrive):
     """A table of times and values that the inputs follow, from the first tick on."""
 
+    KEY = 'drive.profile'
     inputs: Mapping[str, Profile] = each_part('inputs with a different table', 'input', Profile)
-
-
-PARAMETERS = ProfileParameters
-
-
-def value_range(parameters: Profile) -> tuple[float, float]:
-    """Return the least and the greatest value of an input, in [rad] or [m]."""
-    values = [value for _, value in parameters.table]
-    gain = values[-1] - values[0] if parameters.repeat else 0.0
-    extremes = list(values)
-    if parameters.interpolation == 'cubic':  # the others stay between their rows
-        times = [time for time, _ in parameters.table]
-        seconds = [after - before for before, after in pairwise(times)]
-        for value, (c1, c2, c3, _, _) in zip(
-            values, _row_polynomials(parameters, seconds), strict=False
-        ):
-            extremes += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
-    return (-inf if gain < 0.0 else min(extremes)), (inf if gain > 0.0 else max(extremes))
 
 
 def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
@@ -90,44 +124,6 @@ def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
     roots = [q / (3.0 * c3)] if c3 else []
     roots += [c1 / q] if q else []
     return [x for x in roots if 0.0 < x < 1.0]
-
-
-def motion_curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
-    """
-    Return value, rate and acceleration as a function of time, in [ns].
-
-    Raise `DefinitionError` if the table has less than two rows, or times that do not increase.
-    """
-    times = _table_times(parameters.table, f'{where}.table')
-    values = [value for _, value in parameters.table]
-    begin, length = times[0], times[-1] - times[0]
-    starts = [time - begin for time in times[:-1]]
-    seconds = [(after - before) / NANOSECONDS for before, after in pairwise(times)]
-    polynomials = _row_polynomials(parameters, seconds)
-    durations = [after - before for before, after in pairwise(times)]
-    pieces = list(zip(starts, durations, values, seconds, polynomials, strict=False))
-    before, after = (values[0], 0.0, 0.0), (values[-1], 0.0, 0.0)
-    gain = values[-1] - values[0] if parameters.repeat else None
-
-    def profile(time: int) -> tuple[float, float, float]:
-        time -= begin
-        gained = 0.0
-        if time < 0:
-            return before
-        if time >= length:
-            if gain is None:
-                return after
-            rounds, time = divmod(time, length)
-            gained = rounds * gain
-        start, duration, value, h, (c1, c2, c3, c4, c5) = pieces[bisect_right(starts, time) - 1]
-        x = (time - start) / duration
-        return (
-            value + gained + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5)))),
-            (c1 + x * (2 * c2 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h,
-            (2 * c2 + x * (6 * c3 + x * (12 * c4 + x * 20 * c5))) / (h * h),
-        )
-
-    return profile
 
 
 def _row_polynomials(parameters: Profile, seconds: Sequence[float]) -> list[_Polynomial]:
@@ -198,6 +194,3 @@ def _spline_slopes(seconds: Sequence[float], chords: Sequence[float], ends: floa
     for i in range(len(slopes) - 2, 0, -1):
         slopes[i] -= upper[i] * slopes[i + 1]
     return slopes
-
-
-build = partial(build_clocked, 'drive.profile', motion_curve, value_range)

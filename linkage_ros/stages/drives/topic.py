@@ -34,15 +34,20 @@ from linkage_ros.description import choice, flag, number, part_name, whole_numbe
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Input
 from linkage_ros.messages import CrankSample, JointStateReader, NANOSECONDS, Rejection
-from linkage_ros.stages.drives.drive import Context, CrankState, FormulaDrive, LARGEST, Reader
-
-TOPIC = 'crank_states'
+from linkage_ros.stages.drives.drive import (
+    Context,
+    CrankState,
+    Drive,
+    FormulaCrank,
+    LARGEST,
+    Reader,
+)
 
 _Values = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class TopicParameters:
+class TopicDrive(Drive):
     """A measured crank: the newest sample of crank_states, a sensor_msgs/JointState."""
 
     carry_forward: bool = flag(
@@ -89,43 +94,40 @@ class TopicParameters:
         most=10_000,
     )
 
+    listens_to = 'crank_states'
 
-PARAMETERS = TopicParameters
+    def build(self, context: Context) -> SampledCrank:
+        """
+        Build the drive.
 
+        Raise `DefinitionError` if a low-pass has nothing to filter, or if a branch has no joint.
+        """
+        if self.cutoff and self.acceleration == 'zero':
+            raise DefinitionError(
+                'drive.topic.cutoff', 'has nothing to filter', 'add acceleration: differenced'
+            )
+        if self.branch and not self.joint:
+            raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
+        return SampledCrank(self, context.needs_rate, context.closure.linkage.inputs)
 
-def reader(parameters: TopicParameters, context: Context) -> Reader:
-    """
-    Build the reader of the messages.
+    def reader(self, context: Context) -> Reader:
+        """
+        Build the reader of the messages.
 
-    Raise `DefinitionError` if the joint does not determine the crank.
-    """
-    if parameters.joint:
-        from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
-            DependentSampleReader,
-            sampled_inverse,
-        )
+        Raise `DefinitionError` if the joint does not determine the crank.
+        """
+        if self.joint:
+            from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
+                DependentSampleReader,
+                sampled_inverse,
+            )
 
-        inverse = sampled_inverse(context.closure, parameters.joint, parameters.branch)
-        return DependentSampleReader(inverse.branch, context.prefix + parameters.joint).read
-    return JointStateReader(context.inputs_in_messages).read
-
-
-def build(parameters: TopicParameters, context: Context) -> TopicDrive:
-    """
-    Build the drive.
-
-    Raise `DefinitionError` if a low-pass has nothing to filter, or if a branch has no joint.
-    """
-    if parameters.cutoff and parameters.acceleration == 'zero':
-        raise DefinitionError(
-            'drive.topic.cutoff', 'has nothing to filter', 'add acceleration: differenced'
-        )
-    if parameters.branch and not parameters.joint:
-        raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
-    return TopicDrive(parameters, context.needs_rate, context.closure.linkage.inputs)
+            inverse = sampled_inverse(context.closure, self.joint, self.branch)
+            return DependentSampleReader(inverse.branch, context.prefix + self.joint).read
+        return JointStateReader(context.inputs_in_messages).read
 
 
-class TopicDrive(FormulaDrive):
+class SampledCrank(FormulaCrank):
     """
     Drive that keeps the newest good sample only.
 
@@ -157,9 +159,7 @@ class TopicDrive(FormulaDrive):
     jump: float
     """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
 
-    def __init__(
-        self, use: TopicParameters, needs_rate: bool, inputs: Sequence[Input] = ()
-    ) -> None:
+    def __init__(self, use: TopicDrive, needs_rate: bool, inputs: Sequence[Input] = ()) -> None:
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)

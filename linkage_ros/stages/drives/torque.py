@@ -36,15 +36,18 @@ from linkage_ros.messages import (
     NANOSECONDS,
     Rejection,
 )
-from linkage_ros.stages.drives.drive import Context, CrankAtRest, CrankState, Drive, Reader
+from linkage_ros.stages.drives.drive import (
+    Context,
+    Crank,
+    CrankAtRest,
+    CrankState,
+    Drive,
+    Reader,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import HeldWrench, Mechanics, Motor, Winding
     from linkage_ros.messages import PlanarWrench
-
-TOPIC = 'crank_commands'
-EXTRA_TOPIC, EXTRA_MESSAGE = '~/motor', JOINT_STATE_TYPE
-"""The topic of the motor's encoder, if the motor is published."""
 
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
@@ -147,7 +150,7 @@ class MotorEncoderParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class TorqueParameters:
+class TorqueDrive(Drive):
     """Hardware in the loop: the effort commanded on crank_commands moves the linkage's masses."""
 
     start: float = number('input at the first tick', 0.0, unit='rad or m', least=-1e6, most=1e6)
@@ -187,52 +190,62 @@ class TorqueParameters:
         'publishes the motor, as its own encoder reads it, on ~/motor', MotorEncoderParameters
     )
 
+    listens_to = 'crank_commands'
+    publishes = '~/motor'
+    message = JOINT_STATE_TYPE
 
-PARAMETERS = TorqueParameters
+    def build(self, context: Context) -> TorqueCrank:
+        """
+        Build the crank.
 
-
-def reader(_parameters: TorqueParameters, context: Context) -> Reader:
-    """Build the reader of the messages."""
-    return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
-
-
-def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
-    """
-    Build the drive.
-
-    Raise `DefinitionError` if the linkage has several inputs or lacks masses, no motion can start
-    at the given start, or the brake is not specified.
-    """
-    _refuse_useless(parameters, context)
-    motion = _build_motion(parameters, context)
-    given = context.closure.linkage.inputs[0]
-    most = given.limits.effort
-    motor = None
-    if parameters.motor is not None:
-        motor = _build_motor(parameters.motor, most)
-        motion = motor.mount_on(motion)
-        if parameters.motor.command != 'effort':
-            most = LARGEST
-    start = motion.state_at(parameters.start, parameters.rate)
-    if start is None:
-        raise DefinitionError(
-            'drive.torque.start',
-            f'at {parameters.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
-            'start elsewhere',
+        Raise `DefinitionError` if the linkage has several inputs or lacks masses, no motion can
+        start at the given start, or the brake is not specified.
+        """
+        _refuse_useless(self, context)
+        motion = _build_motion(self, context)
+        given = context.closure.linkage.inputs[0]
+        most = given.limits.effort
+        motor = None
+        if self.motor is not None:
+            motor = _build_motor(self.motor, most)
+            motion = motor.mount_on(motion)
+            if self.motor.command != 'effort':
+                most = LARGEST
+        start = motion.state_at(self.start, self.rate)
+        if start is None:
+            raise DefinitionError(
+                'drive.torque.start',
+                f'at {self.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
+                'start elsewhere',
+            )
+        mechanics = context.mechanics
+        low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+        _check_step(self, mechanics, motor, (low, high))
+        period = round(NANOSECONDS / context.rate) if context.rate else 0
+        wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
+        # An effect of the user's may ask for it.
+        exerts = any(name == 'effort' or '.' in name for name in context.effects)
+        return TorqueCrank(
+            motion, start, self, period, min(most, LARGEST), motor, wrenches, exerts
         )
-    mechanics = context.mechanics
-    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-    _check_step(parameters, mechanics, motor, (low, high))
-    period = round(NANOSECONDS / context.rate) if context.rate else 0
-    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-    # An effect of the user's may ask for it.
-    exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    return TorqueDrive(
-        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
-    )
+
+    def reader(self, context: Context) -> Reader:
+        """Build the reader of the messages."""
+        return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
+
+    def writer(self, context: Context, drive: TorqueCrank) -> Any:
+        """Build the writer of ~/motor; None if the motor is not published."""
+        if self.motor_encoder is None:
+            return None
+        from linkage_ros.stages.drives.motor_encoder import (
+            MotorEncoder,  # local import: only if published
+        )
+
+        name = f'{context.inputs_in_messages[0]}_motor'
+        return MotorEncoder(name, self.motor_encoder.counts, lambda: drive.motor)
 
 
-def _refuse_useless(parameters: TorqueParameters, context: Context) -> None:
+def _refuse_useless(parameters: TorqueDrive, context: Context) -> None:
     """Refuse a linkage that the drive cannot move, and a brake that does nothing."""
     n_inputs = len(context.closure.linkage.inputs)
     if n_inputs > 1:
@@ -254,7 +267,7 @@ def _refuse_useless(parameters: TorqueParameters, context: Context) -> None:
         )
 
 
-def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
+def _build_motion(parameters: TorqueDrive, context: Context) -> Any:
     """Build the motion of the mechanism between its stops, and of a motor beyond a play."""
     mechanics = context.mechanics
     motion = SingleDofMechanism(
@@ -274,7 +287,7 @@ def _build_motion(parameters: TorqueParameters, context: Context) -> Any:
 
 
 def _check_step(
-    parameters: TorqueParameters,
+    parameters: TorqueDrive,
     mechanics: Mechanics,
     motor: Motor | Winding | None,
     ends: tuple[float, float],
@@ -299,18 +312,6 @@ def _check_step(
             parameters.method,
             parameters.step,
         )
-
-
-def writer(parameters: TorqueParameters, context: Context, drive: TorqueDrive) -> Any:
-    """Build the writer of ~/motor; None if the motor is not published."""
-    if parameters.motor_encoder is None:
-        return None
-    from linkage_ros.stages.drives.motor_encoder import (
-        MotorEncoder,  # local import: only if published
-    )
-
-    name = f'{context.inputs_in_messages[0]}_motor'
-    return MotorEncoder(name, parameters.motor_encoder.counts, lambda: drive.motor)
 
 
 def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
@@ -383,7 +384,7 @@ def _without_winding(motion: Any) -> Any:
     return getattr(motion, 'moved', motion)
 
 
-class TorqueDrive(Drive):
+class TorqueCrank(Crank):
     """
     A mechanism moved by commanded efforts.
 
@@ -440,7 +441,7 @@ class TorqueDrive(Drive):
         self,
         mechanism: Any,
         start: Any,
-        use: TorqueParameters,
+        use: TorqueDrive,
         period: int,
         most: float = LARGEST,
         motor: Motor | Winding | None = None,

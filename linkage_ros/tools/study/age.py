@@ -28,7 +28,7 @@ from typing import Any
 
 from linkage_ros.description import HIGHEST_RATE, LOWEST_RATE, Scene
 from linkage_ros.messages import CrankSample, JointStateWriter, NANOSECONDS
-from linkage_ros.stages.drives import topic as topic_drive, TopicDrive, TopicParameters
+from linkage_ros.stages.drives import SampledCrank, TopicDrive
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Spread, time_in_turn
@@ -167,10 +167,8 @@ def measure_age_of_command(
     if not motion.sample_rate or (not scene.rate and not motion.samples):
         return None
     key = f'{scene_key(motion.scene_linkage, "drive")}.{name}'
-    if not isinstance(use, TopicParameters):
-        use = TopicParameters(
-            carry_forward=use.carry_forward, max_age=use.max_age, stamp=use.stamp
-        )
+    if not isinstance(use, TopicDrive):
+        use = TopicDrive(carry_forward=use.carry_forward, max_age=use.max_age, stamp=use.stamp)
     joints = _CommandSamples(motion, scene.rate or motion.sample_rate, horizon)
 
     def measure_setting(
@@ -219,7 +217,7 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     name, use = motion.scene_linkage.drive
     if name != 'topic' or motion.scene_linkage.dependent_joint:
         return Spread(0.0, 0.0, 0.0)
-    read, drive = topic_drive.reader(use, motion.context), TopicDrive(use, True)
+    read, drive = use.reader(motion.context), SampledCrank(use, True)
 
     def run() -> None:
         for _ in range(_BLOCK):
@@ -238,7 +236,7 @@ class _CommandSamples:
         self._horizon = round(horizon * NANOSECONDS)
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 
-    def measure_error(self, use: TopicParameters, factor: float) -> JointError | None:
+    def measure_error(self, use: TopicDrive, factor: float) -> JointError | None:
         """Return the error of a use, with ``factor`` times the samples; 0 for samples at once."""
         cranks: list[Crank | None] = []
         if self._motion.samples:
@@ -284,7 +282,7 @@ class _CommandSamples:
 
     def _crank_states(
         self,
-        use: TopicParameters,
+        use: TopicDrive,
         samples_before: Callable[[int], Iterator[tuple[int, int]]],
         ticks: Sequence[int],
     ) -> list[Crank | None]:
@@ -292,7 +290,7 @@ class _CommandSamples:
         inputs = self._motion.closure.linkage.inputs
         found: list[Crank | None] = []
         for tick in ticks:
-            drive = TopicDrive(use, True, inputs)
+            drive = SampledCrank(use, True, inputs)
             for stamp, come in samples_before(tick):
                 crank = cranks_at(self._motion, [stamp])[0]
                 if crank is not None:
@@ -312,7 +310,7 @@ def _rates_missing(scene: Scene) -> list[str]:
     return [f'{key}.velocity' for key in sorted(missing)]
 
 
-def _use_of(use: TopicParameters) -> str:
+def _use_of(use: TopicDrive) -> str:
     if not use.carry_forward:
         return 'held'
     return 'carried forward' + (' with its acceleration' if use.acceleration != 'zero' else '')

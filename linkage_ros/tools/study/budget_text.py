@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from math import floor, isfinite, log10
 from typing import Any, NamedTuple
 
-from linkage_ros.cli import Column, Table
+from linkage_ros.cli import Column, Quantity, Table
 from linkage_ros.tools.study.budget import Budget, Knob, Price, RecordingLoss, Setting
 from linkage_ros.tools.study.measuring import Spread
 
@@ -213,14 +213,30 @@ def _cost_text(budget: Budget, knob: Knob, setting: Setting) -> str:
     return f'{text} a tick, {share_text(change)} of a core'
 
 
+_NONE = Quantity(None, shown='–')
+
+
+def _error_cell(error: float) -> Quantity:
+    return Quantity(error if isfinite(error) else None, shown=error_text(error))
+
+
+def _price_cell(price: Price | None) -> Quantity:
+    time = None if price is None or price.is_noise else price.tick.middle
+    return Quantity(time, shown=price_text(price))
+
+
+def _core_cell(share: float | None) -> Quantity:
+    return _NONE if share is None else Quantity(share, shown=share_text(share))
+
+
 class Row(NamedTuple):
-    """A row of the table, as text: its cells, in the order of the columns."""
+    """A row of the table: its cells, in the order of the columns."""
 
     name: str
-    rms: str
-    worst: str
-    cost: str
-    core: str
+    rms: Quantity  # In [rad]
+    worst: Quantity
+    cost: Quantity  # Of a tick, in [µs]
+    core: Quantity
     cheaper: str = ''
     better: str = ''  # Or a sentence where there is no other setting
 
@@ -232,11 +248,14 @@ def rows_of(budget: Budget) -> list[Row]:
     rows += [_deliberate_row(knob) for knob in deliberate]
     if budget.recording:
         rows.append(_recording_row(budget.recording))
-    whole = budget.tick
-    rows.append(
-        Row('the whole tick', '–', '–', time_text(whole.tick), share_text(whole.core_share))
-    )
+    rows.append(Row('the whole tick', _NONE, _NONE, *_own_price(budget.tick)))
     return rows
+
+
+def _own_price(price: Price) -> tuple[Quantity, Quantity]:
+    """Return what a price takes of a tick and of a core, also within noise."""
+    time = Quantity(price.tick.middle, shown=time_text(price.tick))
+    return time, _core_cell(price.core_share)
 
 
 def _error_row(budget: Budget, knob: Knob) -> Row:
@@ -254,10 +273,10 @@ def _error_row(budget: Budget, knob: Knob) -> Row:
     )
     return Row(
         name,
-        error_text(own.error.rms),
-        error_text(own.error.worst),
-        price_text(own.price),
-        '–' if core is None else share_text(core),
+        _error_cell(own.error.rms),
+        _error_cell(own.error.worst),
+        _price_cell(own.price),
+        _core_cell(core),
         cheaper or '–',
         better or 'nothing is better',
     )
@@ -267,19 +286,18 @@ def _deliberate_row(knob: Knob) -> Row:
     own = knob.own_setting
     after = f', after {knob.after:g} s' if knob.after is not None else ''
     is_silent = not own.error.worst
+    rms, worst = (
+        _NONE if is_silent else _error_cell(error) for error in (own.error.rms, own.error.worst)
+    )
     return Row(
         f'on purpose: {knob.name}{after}',
-        '–' if is_silent else error_text(own.error.rms),
-        '–' if is_silent else error_text(own.error.worst),
-        price_text(own.price),
-        _core_text(own.price),
+        rms,
+        worst,
+        _price_cell(own.price),
+        _core_cell(None if own.price is None or own.price.is_noise else own.price.core_share),
         '–',
         knob.note or ('adds to the messages' if is_silent else 'what you asked for'),
     )
-
-
-def _core_text(price: Price | None) -> str:
-    return '–' if price is None or price.is_noise else share_text(price.core_share)
 
 
 def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
@@ -291,10 +309,9 @@ def _recording_row(losses: Sequence[RecordingLoss]) -> Row:
     lost = f'recording: a crash loses {seconds_text(own.seconds)} at worst'
     return Row(
         f'{lost}, and {own.dropped} messages found no room' if own.dropped else lost,
-        '–',
-        '–',
-        time_text(own.price.tick),
-        share_text(own.price.core_share),
+        _NONE,
+        _NONE,
+        *_own_price(own.price),
         *(
             f'{each.instruction} ({seconds_text(each.seconds)}, '
             f'{_more_text(each.price, own.price)})'
@@ -331,12 +348,12 @@ def closing_lines(budget: Budget) -> list[str]:
 
 
 def budget_table(budget: Budget) -> Table:
-    """Return the table of errors and what each setting costs, as text."""
+    """Return the table of errors and what each setting costs."""
     columns = (
         Column('error of the published joints', 'name'),
-        Column('>rms [rad]', 'rms'),
-        Column('>worst [rad]', 'worst'),
-        Column('>costs a tick [µs]', 'cost'),
+        Column('>rms [rad]', 'rms_rad'),
+        Column('>worst [rad]', 'worst_rad'),
+        Column('>costs a tick [µs]', 'cost_us'),
         Column(f'>core at {rate_text(budget.rate)}', 'core'),
         Column('cheaper', 'cheaper'),
         Column('better', 'better'),

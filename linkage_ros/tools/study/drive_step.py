@@ -29,7 +29,7 @@ from typing import Any
 from linkage_ros.dynamics import METHODS
 from linkage_ros.errors import DefinitionError
 from linkage_ros.messages import NANOSECONDS
-from linkage_ros.stages.drives import TorqueParameters
+from linkage_ros.stages.drives import TorqueDrive
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
@@ -80,7 +80,7 @@ def measure_drive_step(
     A LinkageError is raised if the input runs away, or stops at a toggle, before the horizon.
     """
     begun = process_time()
-    use: TorqueParameters = motion.scene_linkage.drive[1]
+    use: TorqueDrive = motion.scene_linkage.drive[1]
     ticks = tick_times(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = process_time() - begun
@@ -145,7 +145,7 @@ def exact_cranks(
     Where the drive itself stands in for it, its step is divided by up to ``finest``. A
     LinkageError is raised if the motion ends before the last time.
     """
-    use: TorqueParameters = motion.scene_linkage.drive[1]
+    use: TorqueDrive = motion.scene_linkage.drive[1]
     if _stands_in(use):
         one, other = (cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8))
         part = 3.0
@@ -156,7 +156,7 @@ def exact_cranks(
     return one, doubt and JointError(doubt.rms / part, doubt.worst / part)
 
 
-def _stands_in(use: TorqueParameters) -> bool:
+def _stands_in(use: TorqueDrive) -> bool:
     """Return whether the drive itself, with a short step, stands in for the exact motion."""
     wound = use.motor is not None and use.motor.inductance > 0.0
     return wound or find_spec('scipy') is None
@@ -168,7 +168,7 @@ def _integrate_exactly(
     from linkage_ros.tools.study import exact_drive  # local import: scipy is optional
 
     drive = build_drive(motion)
-    use: TorqueParameters = motion.scene_linkage.drive[1]
+    use: TorqueDrive = motion.scene_linkage.drive[1]
     delay = use.motor.delay if use.motor else 0.0
     changes: list[tuple[float, float | None]] = [(0.0, None)]
     for command in motion.commands:
@@ -205,7 +205,7 @@ def _measure_error(
     return JointError(max(error.rms, floor.rms), max(error.worst, floor.worst))
 
 
-def _other_settings(use: TorqueParameters, quick: bool) -> Iterator[tuple[str, float]]:
+def _other_settings(use: TorqueDrive, quick: bool) -> Iterator[tuple[str, float]]:
     """Yield other methods and steps, those that tell most first."""
     own = [(use.method, use.step * factor) for factor in (0.5, 2.0)]
     others = [(method, use.step) for method in METHODS if method != use.method]

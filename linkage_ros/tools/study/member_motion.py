@@ -23,7 +23,7 @@ from linkage_ros.description import SceneLinkage
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import EffortCommand, NANOSECONDS
-from linkage_ros.stages.drives import Context, CrankState, torque
+from linkage_ros.stages.drives import Context, CrankState, TorqueCrank, TorqueDrive
 
 BEGIN = NANOSECONDS
 """Time of the first tick, in [ns]."""
@@ -124,6 +124,7 @@ def _check_bounded(crank: CrankState, time: int, step: float) -> None:
         raise refuse_horizon(time * 1e-9, why)
 
 
-def build_drive(motion: LinkageMotion, **changes: Any) -> torque.TorqueDrive:
+def build_drive(motion: LinkageMotion, **changes: Any) -> TorqueCrank:
     """Return the torque drive at its start, with other parameters."""
-    return torque.build(replace(motion.scene_linkage.drive[1], **changes), motion.context)
+    drive: TorqueDrive = replace(motion.scene_linkage.drive[1], **changes)
+    return drive.build(motion.context)

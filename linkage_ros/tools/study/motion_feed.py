@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 from linkage_ros.description import Scene
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.stages.drives import TOPIC as TORQUE_TOPIC
+from linkage_ros.stages.drives import TorqueDrive
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.member_motion import BEGIN, Crank, LinkageMotion
 from linkage_ros.tools.study.prices import Feed, turn_crank, USUAL_RATE
@@ -26,7 +26,7 @@ def feed_of(motions: Sequence[LinkageMotion]) -> Feed:
         return turn_crank
 
     def feed_messages(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
-        if pipeline.topic == TORQUE_TOPIC:
+        if pipeline.topic == TorqueDrive.listens_to:
             return _commands_and_ticks(scene, motions)
         return (
             _samples_and_ticks(scene, motions) if pipeline.topic else turn_crank(scene, pipeline)

@@ -30,14 +30,8 @@ def budget_html(budget: Budget, answers: Sequence[NeedAnswer]) -> str:
     """
     data = {'answers': [{'error': each.error, 'text': each.text} for each in answers]}
     body = _page_body(budget, has_field=bool(answers))
-    return html_document(
-        f'Accuracy of {budget.scene}',
-        body,
-        data,
-        [(_HERE, 'page.css')],
-        [(_HERE, 'page.js')],
-        has_plots=False,
-    )
+    title = f'Accuracy of {budget.scene}'
+    return html_document(title, body, data, _HERE, ('page.css', 'page.js'), has_plots=False)
 
 
 def _page_body(budget: Budget, *, has_field: bool) -> Iterator[str]:
@@ -52,7 +46,6 @@ def _page_body(budget: Budget, *, has_field: bool) -> Iterator[str]:
         yield f'<figure><figcaption>Error against cost</figcaption>{picture}</figure>'
     title = 'Where the error comes from, and what each setting costs'
     yield from table_html(budget_table(budget)._replace(title=title))
-    yield '</figure>'
     yield from (f'<p class="note">{escape(line)}</p>' for line in closing_lines(budget))
     yield '</main><footer>'
     yield from facts_html(budget.machine)

@@ -17,7 +17,7 @@ from linkage_ros.bag import Bag, read_raw_metadata
 from linkage_ros.dynamics import LARGEST
 from linkage_ros.errors import BagError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, JointStateReader, Rejection
-from linkage_ros.stages.drives import topic as topic_drive, torque as torque_drive
+from linkage_ros.stages.drives import SampledCrank, TopicDrive
 from linkage_ros.tools.study.member_motion import Command, Crank, LinkageMotion
 
 
@@ -84,9 +84,9 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     name, use = motion.scene_linkage.drive
     read: Any = JointStateReader(motion.context.inputs_in_messages).read
     if name == 'topic':
-        read = topic_drive.reader(use, motion.context)
+        read = use.reader(motion.context)
     else:
-        use = topic_drive.TopicParameters(max_age=use.max_age)
+        use = TopicDrive(max_age=use.max_age)
     topic = topic or str(read_raw_metadata(bag).get('crank_topic') or '')
     of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
     received: dict[str, list[tuple[int, Any]]] = {}
@@ -96,7 +96,7 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
             if not isinstance(sample, Rejection):
                 received.setdefault(heard, []).append((log_time, sample))
     most = max(received.values(), key=len, default=[])
-    drive = topic_drive.TopicDrive(use, needs_rate=True, inputs=motion.closure.linkage.inputs)
+    drive = SampledCrank(use, needs_rate=True, inputs=motion.closure.linkage.inputs)
     found: list[_Sample] = []
     for log_time, sample in sorted(most, key=lambda one: one[0]):
         if drive.offer(sample, log_time) is None and drive.sample is not None:
@@ -125,7 +125,7 @@ def _evaluate_cubic(
 
 def follow_commands(motion: LinkageMotion, bag: Bag) -> LinkageMotion:
     """Return the motion of a torque drive by the commands of a bag, as they came; or by none."""
-    read = torque_drive.reader(motion.scene_linkage.drive[1], motion.context)
+    read = motion.scene_linkage.drive[1].reader(motion.context)
     topic = read_raw_metadata(bag).get('crank_topic')
     of_type = {each.name for each in bag.topics if each.type == JOINT_STATE_TYPE}
     heard: dict[str, list[Command]] = {}

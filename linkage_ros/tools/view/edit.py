@@ -21,7 +21,7 @@ from cmath import phase, rect
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import islice, product
-from math import copysign, floor, isfinite, log10, tau
+from math import copysign, floor, log10, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.description import FARTHEST, parse_yaml, written_linkage
@@ -122,7 +122,7 @@ def pin_of(error: LinkageError, text: str) -> str | None:
 
 def _shown_linkage(closure: Closure, given: Any) -> _ShownLinkage:
     count = len(closure.linkage.inputs)
-    inputs = _default_inputs(closure) if given is None else _read_numbers('inputs', given, count)
+    inputs = _default_inputs(closure) if given is None else read_numbers('inputs', given, count)
     position = closure.position(*inputs)
     if not position.status.has_pose:
         inputs = _default_inputs(closure)
@@ -152,10 +152,10 @@ def _move_pin(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange:
     """Move a pin in the world; all others stay where they are."""
     linkage = shown.closure.linkage
     pin = _checked_name('pin', edit['pin'], shown.pins)
-    to = complex(*_read_numbers('to', edit.get('to'), 2))
+    to = complex(*read_numbers('to', edit.get('to'), 2))
     snap = edit.get('snap') or 0.0
     if snap:
-        (snap,) = _read_numbers('snap', [snap], 1)
+        (snap,) = read_numbers('snap', [snap], 1)
         to = complex(*(snap * round(part / snap) for part in (to.real, to.imag)))
     for name, slider in linkage.sliders.items():
         if slider.point == pin and _is_line_fixed(linkage, name):
@@ -269,7 +269,7 @@ def _set_length(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange
     linkage = shown.closure.linkage
     link, points = _read_link(linkage, given)
     one, other = (_checked_name(key, given.get(key), points) for key in ('from', 'to'))
-    (length,) = _read_numbers('value', [given.get('value')], 1)
+    (length,) = read_numbers('value', [given.get('value')], 1)
     start, end = complex(*points[one]), complex(*points[other])
     if length <= 0.0 or start == end:
         raise LinkageError(
@@ -283,7 +283,7 @@ def _edit_place(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChange
     given = _read_mapping('place', edit)
     link, points = _read_link(shown.closure.linkage, given)
     point = _checked_name('point', given.get('point'), points)
-    x, y = _read_numbers('at', given.get('at'), 2)
+    x, y = read_numbers('at', given.get('at'), 2)
     return _place_point(shown, link, point, (x, y))
 
 
@@ -299,7 +299,7 @@ def _trace_point(shown: _ShownLinkage, edit: Mapping[str, Any]) -> _LinkageChang
     given = _read_mapping('trace', edit)
     linkage = shown.closure.linkage
     link, points = _read_link(linkage, given)
-    x, y = _read_numbers('at', given.get('at'), 2)
+    x, y = read_numbers('at', given.get('at'), 2)
     taken = {*links_by_point(linkage.links), *linkage.sliders, *linkage.links}
     free = (f'P{index or ""}' for index in range(len(taken) + 1))
     name = given.get('name', next(name for name in free if name not in taken))
@@ -444,17 +444,13 @@ def _checked_name(key: str, name: Any, names: Any) -> str:
     return name
 
 
-def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+def read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
+    """Return ``count`` numbers that a page has sent."""
     if (
         not isinstance(values, list | tuple)
         or len(values) != count
-        or not all(
-            isinstance(value, int | float)
-            and not isinstance(value, bool)
-            and isfinite(value)
-            and abs(value) <= FARTHEST
-            for value in values
-        )
+        or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in values)
     ):
-        raise LinkageError(key, f'{quote(values)} is not {count} numbers', 'send finite ones')
+        expected = 'a number' if count == 1 else f'{count} numbers'
+        raise LinkageError(key, f'{quote(values)} is not {expected}', 'send finite ones')
     return tuple(map(float, values))

@@ -24,8 +24,6 @@ import json
 from typing import Any, Protocol
 
 from aiohttp import web, WSMsgType
-from linkage_ros.kinematics import COLOURS, FACES, INK
-from linkage_ros.tools.view.page import SERVED_POLICY
 from linkage_ros.tools.view.pages import html_document
 from linkage_ros.tools.view.server import SERVER_KEY
 
@@ -73,13 +71,6 @@ _BODY = """
 """
 
 _HERE = 'linkage_ros.tools.view'
-_SCRIPTS = [
-    *(
-        ('linkage_ros.tools.view.pages', f'{name}.js')
-        for name in ('angles', 'curves', 'looks', 'picture')
-    ),
-    (_HERE, 'live.js'),
-]
 
 
 class Bridge(Protocol):
@@ -188,18 +179,6 @@ def _news_event(bridge: Bridge) -> Iterator[asyncio.Event]:
 def live_page(bridge: Bridge) -> str:
     """Return the page of a running node; a LinkageError if plotly is not installed."""
     body = [f'<h1 id="title">{escape(bridge.name)}</h1>', _BODY]
-    data = {
-        'mode': 'live',
-        'colours': COLOURS,
-        'faces': {**FACES, 'edge': INK},
-        'server': True,
-        'node': bridge.name,
-    }
-    return html_document(
-        f'{bridge.name}: linkage view',
-        body,
-        data,
-        [(_HERE, 'live.css')],
-        _SCRIPTS,
-        policy=SERVED_POLICY,
-    )
+    data = {'mode': 'live', 'server': True, 'node': bridge.name}
+    title = f'{bridge.name}: linkage view'
+    return html_document(title, body, data, _HERE, ('live.css', 'live.js'), is_served=True)

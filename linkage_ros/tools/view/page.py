@@ -15,19 +15,13 @@ from html import escape
 from typing import Any
 
 from linkage_ros.errors import escape_unprintable
-from linkage_ros.kinematics import COLOURS, FACES, INK
-from linkage_ros.tools.view.pages import html_document, POLICY
-
-SERVED_POLICY = POLICY.replace(
-    "script-src 'unsafe-inline'",
-    # The program of the linkage; and the server that has sent this page.
-    "script-src 'unsafe-inline' 'unsafe-eval'; connect-src ws://127.0.0.1:* ws://localhost:*",
-).replace('img-src data:', 'img-src data: blob:')
-"""Content policy of a page that asks the server which has sent it."""
+from linkage_ros.tools.view.pages import html_document
 
 _PACKAGE = 'linkage_ros.tools.view'
-_SCRIPTS = ('linkage', 'board', 'hand', 'talk', 'edits', 'over_input', 'view')
-_SHARED = ('angles', 'curves', 'looks', 'picture')
+_FILES = (
+    'view.css', 'linkage.js', 'board.js', 'hand.js', 'talk.js', 'edits.js', 'over_input.js',
+    'view.js',
+)  # fmt: skip
 
 _DOWNLOADS = {
     'svg': 'drawing, SVG',
@@ -73,19 +67,14 @@ def page_html(
     data = {
         'mode': mode,
         'model': model,
-        'colours': COLOURS,
-        'faces': {**FACES, 'edge': INK},
         'server': mode != 'still',
         'can_save': can_save,
         'scene': scene,
         'node': node,
     }
     title = escape_unprintable(node or model['name'])
-    scripts = [('linkage_ros.tools.view.pages', f'{name}.js') for name in _SHARED]
-    scripts += [(_PACKAGE, f'{name}.js') for name in _SCRIPTS]
-    styles = [(_PACKAGE, 'view.css')]
     body = _page_body(title, mode, can_save)
-    return html_document(title, body, data, styles, scripts, policy=SERVED_POLICY)
+    return html_document(title, body, data, _PACKAGE, _FILES, is_served=True)
 
 
 def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:

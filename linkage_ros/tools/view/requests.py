@@ -22,7 +22,7 @@ from functools import lru_cache, partial
 import json
 from typing import Any, NamedTuple, NoReturn
 
-from linkage_ros.description import FARTHEST, parse_yaml, read_closure
+from linkage_ros.description import parse_yaml, read_closure
 from linkage_ros.errors import (
     did_you_mean,
     escape_unprintable,
@@ -34,7 +34,7 @@ from linkage_ros.errors import (
 )
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import linkage_names, shipped_path
-from linkage_ros.tools.view.edit import edit_text, pin_of
+from linkage_ros.tools.view.edit import edit_text, pin_of, read_numbers
 from linkage_ros.tools.view.exports import export_linkage
 from linkage_ros.tools.view.model import build_model, compute_pose, ViewState
 from linkage_ros.tools.view.sensors import SceneFiles, Sensors
@@ -176,7 +176,7 @@ class _RequestFields(NamedTuple):
     @property
     def size(self) -> float:
         """Return half the width of the bars that are shown, in [m]; 0 if not given."""
-        (size,) = _read_numbers('size', [self.content.get('size', 0.0)], 1)
+        (size,) = read_numbers('size', [self.content.get('size', 0.0)], 1)
         return max(0.0, size)
 
     @property
@@ -184,9 +184,9 @@ class _RequestFields(NamedTuple):
         """Return the linkage."""
         return closure_of(self.text, self.name)
 
-    def read_numbers(self, key: str, count: int) -> tuple[float, ...]:
+    def read_list(self, key: str, count: int) -> tuple[float, ...]:
         """Return a list of ``count`` numbers."""
-        return _read_numbers(key, self.content.get(key), count)
+        return read_numbers(key, self.content.get(key), count)
 
 
 def _answer_model(fields: _RequestFields) -> dict[str, Any]:
@@ -222,14 +222,14 @@ def _answer_save(fields: _RequestFields) -> dict[str, Any]:
     if fields.name != fields.opened:
         reason = f'{quote(fields.name)} is not the file with which this page was opened'
         raise LinkageError('save', reason, 'download the linkage')
-    read_closure(parse_yaml(encode_text(fields.text, fields.name), fields.name), fields.name)
+    closure_of(fields.text, fields.name)
     return {}
 
 
 def _answer_export(fields: _RequestFields) -> dict[str, Any]:
     closure = fields.closure
     given = fields.content.get('inputs')
-    inputs = None if given is None else fields.read_numbers('inputs', len(closure.linkage.inputs))
+    inputs = None if given is None else fields.read_list('inputs', len(closure.linkage.inputs))
     found = export_linkage(
         str(fields.content.get('kind')), closure, fields.text, fields.name, inputs
     )
@@ -242,19 +242,17 @@ def _answer_poses(fields: _RequestFields) -> dict[str, Any]:
         raise _invalid_value('inputs', poses, f'a list of at most {_MOST_POSES} lists of numbers')
     count = len(closure.linkage.inputs)
     return {
-        'poses': [
-            compute_pose(closure, _read_numbers('inputs', inputs, count)) for inputs in poses
-        ]
+        'poses': [compute_pose(closure, read_numbers('inputs', inputs, count)) for inputs in poses]
     }
 
 
 def _answer_read(fields: _RequestFields) -> dict[str, Any]:
     sensors = fields.sensors(fields.text if 'text' in fields.content else None)
-    (t,) = _read_numbers('t', [fields.content.get('t')], 1)
+    (t,) = read_numbers('t', [fields.content.get('t')], 1)
     return sensors.read(
         t,
-        fields.read_numbers('inputs', sensors.count),
-        fields.read_numbers('rates', sensors.count),
+        fields.read_list('inputs', sensors.count),
+        fields.read_list('rates', sensors.count),
     )
 
 
@@ -321,16 +319,6 @@ def _find_pin(error: LinkageError, content: Mapping[str, Any]) -> str | None:
 
 def _compact_json(answer: Any) -> str:
     return json.dumps(answer, allow_nan=False, separators=(',', ':'))
-
-
-def _read_numbers(key: str, values: Any, count: int) -> tuple[float, ...]:
-    if (
-        not isinstance(values, list)
-        or len(values) != count
-        or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in values)
-    ):
-        raise _invalid_value(key, values, 'a number' if count == 1 else f'{count} numbers')
-    return tuple(map(float, values))
 
 
 def _invalid_value(key: str, value: Any, expected: str) -> LinkageError:

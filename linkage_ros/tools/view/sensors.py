@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.description import parse_scene, SCENE_FILE, SceneLinkage
 from linkage_ros.kinematics import Closure
-from linkage_ros.stages.drives import TopicDrive, TopicParameters
+from linkage_ros.stages.drives import SampledCrank, TopicDrive
 from linkage_ros.stages.effects import ForceEffect, SensorReading
 from linkage_ros.tick import LinkagePipeline
 from linkage_ros.tools.view.report import link_poses
@@ -94,7 +94,7 @@ class Sensors:
             share = (time - since) / (t - since) if t > since else 1.0
             angles = tuple(a + share * (b - a) for a, b in zip(before, inputs, strict=True))
             now = round(time * _NANOSECONDS)
-            assert isinstance(line.drive, TopicDrive)
+            assert isinstance(line.drive, SampledCrank)
             line.drive.sample = now, angles, tuple(rates), (0.0,) * self.count
             self._reading = line.interpret(now).reading
         return self._readings_content(inputs)
@@ -132,5 +132,5 @@ def _driven_by_hand(scene_linkage: SceneLinkage) -> SceneLinkage:
             name: given for name, given in effects.items() if not isinstance(given, ForceEffect)
         }
         loads = None
-    drive = 'topic', TopicParameters()
+    drive = 'topic', TopicDrive()
     return replace(scene_linkage, drive=drive, effects=effects, loads=loads)

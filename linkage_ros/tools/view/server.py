@@ -29,6 +29,7 @@ from typing import Any
 
 from aiohttp import web
 from linkage_ros.errors import LinkageError
+from linkage_ros.tools.view.pages import SERVED_POLICY
 from linkage_ros.tools.view.requests import defect_error, LARGEST
 
 HOST = '127.0.0.1'
@@ -224,11 +225,8 @@ class Server:
 
     async def _add_headers(self, _request: web.Request, response: web.StreamResponse) -> None:
         sockets = ' '.join(f'ws://{host}' for host in self._hosts)
-        policy = (
-            "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; "
-            f"style-src 'unsafe-inline'; img-src data: blob:; connect-src {sockets}; "
-            "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-        )
+        policy = SERVED_POLICY.replace('ws://127.0.0.1:* ws://localhost:*', sockets)
+        policy += "; frame-ancestors 'none'"
         response.headers['Content-Security-Policy'] = policy
         response.headers['X-Content-Type-Options'] = 'nosniff'
         response.headers['X-Frame-Options'] = 'DENY'

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib import import_module
 from itertools import islice
 from math import isfinite
 from typing import NamedTuple
@@ -321,14 +320,14 @@ def _refuse_scene(scene: Scene) -> None:
                 f'faults.{name}', 'sets the clock, which the importer keeps', 'leave it out'
             )
     for scene_linkage in scene.linkages:
-        drive, _ = scene_linkage.drive
+        drive, parameters = scene_linkage.drive
         if drive == 'bag':
             raise scene_linkage.content.error(
                 'drive.bag',
                 'the bag does not travel with the scene',
                 'name another drive; topic takes the crank as an input',
             )
-        topic = getattr(import_module(DRIVES[drive]), 'TOPIC', '')
+        topic = parameters.listens_to
         if topic and drive not in _INPUT_FIELDS:
             raise scene_linkage.content.error(
                 f'drive.{drive}',

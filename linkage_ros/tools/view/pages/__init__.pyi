@@ -10,7 +10,7 @@ from linkage_ros.tools.view.pages.document import (
     facts_html as facts_html,
     html_document as html_document,
     plotting_library as plotting_library,
-    POLICY as POLICY,
+    SERVED_POLICY as SERVED_POLICY,
     table_html as table_html,
 )
 from linkage_ros.tools.view.pages.markdown import (

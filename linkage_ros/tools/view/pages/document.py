@@ -15,24 +15,31 @@ Its content policy forbids the browser all requests, whatever the page holds.
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
-from importlib.resources import files
+from importlib import resources
 import json
 from typing import Any
 
 from linkage_ros.cli import Table
 from linkage_ros.errors import check_installed, escape_unprintable
+from linkage_ros.kinematics import COLOURS, FACES, INK
 
-POLICY = (
+_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
     "base-uri 'none'; form-action 'none'"
 )
 
-_HERE = 'linkage_ros.tools.view.pages'
+SERVED_POLICY = _POLICY.replace(
+    "script-src 'unsafe-inline'",
+    # The program of the linkage; and the server that has sent this page.
+    "script-src 'unsafe-inline' 'unsafe-eval'; connect-src ws://127.0.0.1:* ws://localhost:*",
+).replace('img-src data:', 'img-src data: blob:')
+"""Content policy of a page that asks the server which has sent it."""
 
-Parts = Sequence[tuple[str, str]]
-"""Files of one page: each with its package and its name."""
+_HERE = 'linkage_ros.tools.view.pages'
+_DRAWING = ('angles.js', 'curves.js', 'looks.js', 'picture.js')
+"""Scripts of all pages that draw a linkage and plots."""
 
 _LONG = 28
 """Length from which the text of a cell may be broken into lines."""
@@ -41,21 +48,27 @@ _LONG = 28
 def html_document(
     title: str,
     body: Iterable[str],
-    data: Any,
-    styles: Parts,
-    scripts: Parts,
+    data: Mapping[str, Any],
+    package: str,
+    files: Sequence[str],
     *,
-    policy: str = POLICY,
+    is_served: bool = False,
     has_plots: bool = True,
 ) -> str:
     """
     Return a page with a title, lines of HTML, and data for its script as JSON without NaN.
 
-    ``styles`` and ``scripts`` are its files beside the ones that all pages share, in their order.
-    The content policy of a page with a server must allow requests to it. With ``has_plots`` Plotly
-    is part of the page; a LinkageError is raised if it is not installed.
+    ``files`` are its styles and scripts in a package, beside the ones that all pages share, in
+    their order. The content policy of a page ``is_served`` allows requests to its server. With
+    ``has_plots`` Plotly, the scripts that draw and their colours are part of the page; a
+    LinkageError is raised if Plotly is not installed.
     """
     plotting = [f'<script>{_within_script(plotting_library())}</script>'] if has_plots else []
+    if has_plots:
+        data = {'colours': COLOURS, 'faces': {**FACES, 'edge': INK}, **data}
+    shared = ['page.css', 'page.js', *(_DRAWING if has_plots else ())]
+    parts = [*((_HERE, name) for name in shared), *((package, name) for name in files)]
+    policy = SERVED_POLICY if is_served else _POLICY
     return '\n'.join(
         [
             '<!doctype html>',
@@ -68,14 +81,14 @@ def html_document(
             # Without an icon, a browser asks the server for one.
             '<link rel="icon" href="data:,">',
             f'<title>{escape(escape_unprintable(title))}</title>',
-            f'<style>\n{_join_files("page.css", styles)}</style>',
+            f'<style>\n{_join_files(parts, ".css")}</style>',
             '</head>',
             '<body>',
             '<button type="button" id="scheme" class="no-print" hidden></button>',
             _clean_lines('\n'.join(body)),
             f'<script type="application/json" id="data">{_script_json(data)}</script>',
             *plotting,
-            f'<script>\n{_join_files("page.js", scripts)}</script>',
+            f'<script>\n{_join_files(parts, ".js")}</script>',
             '</body>',
             '</html>',
             '',
@@ -96,10 +109,10 @@ def plotting_library() -> str:
     return str(get_plotlyjs())
 
 
-def _join_files(name: str, parts: Parts) -> str:
-    """Return the file that all pages share, followed by this page's."""
-    texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
-    return '\n'.join(file.read_text('utf-8') for file in texts)
+def _join_files(parts: Sequence[tuple[str, str]], kind: str) -> str:
+    """Return the files of a kind, each with its package, as one text."""
+    found = (resources.files(package) / name for package, name in parts if name.endswith(kind))
+    return '\n'.join(file.read_text('utf-8') for file in found)
 
 
 def _script_json(data: Any) -> str:
@@ -130,7 +143,7 @@ def _within_script(text: str) -> str:
 
 def table_html(table: Table) -> Iterator[str]:
     """
-    Yield a table within a figure, which the caller closes; columns of numbers align to the right.
+    Yield a table within a figure; columns of numbers align to the right.
 
     If all headings are empty, none is written.
     """
@@ -144,7 +157,7 @@ def table_html(table: Table) -> Iterator[str]:
     yield '<tbody>'
     for row in table.rows:
         yield f'<tr>{"".join(map(_body_cell, row, numbers))}</tr>'
-    yield '</tbody></table></div>'
+    yield '</tbody></table></div></figure>'
 
 
 def facts_html(facts: Iterable[tuple[str, str]]) -> Iterator[str]:

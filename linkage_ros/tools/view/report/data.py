@@ -32,11 +32,8 @@ from typing import Any, NamedTuple
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
     Closure,
-    COLOURS,
-    FACES,
     frames_of_links,
     GROUND,
-    INK,
     prepare_view,
     separate_blocks,
     usual_inputs,
@@ -203,8 +200,6 @@ def page_data(run: ReportedRun, wrapped: bool) -> dict[str, Any]:
         'since': since / 1e9,
         'until': until / 1e9,
         'wrapped': wrapped,
-        'colours': COLOURS,
-        'faces': {**FACES, 'edge': INK},
         'curves': [_curves_json(curves) for curves in run.curves],
         'plots': time_plots(run),
         'frames': _frames_json(frames) if frames is not None else None,

@@ -50,14 +50,7 @@ _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 """Upper bound of the HTML around each cell, in [bytes]."""
 
 _HERE = 'linkage_ros.tools.view.report'
-_STYLES = [(_HERE, 'report.css')]
-_SCRIPTS = [
-    *(
-        ('linkage_ros.tools.view.pages', f'{name}.js')
-        for name in ('angles', 'curves', 'looks', 'picture')
-    ),
-    *((_HERE, f'{name}.js') for name in ('over_time', 'over_others', 'plots', 'report')),
-]
+_FILES = ('report.css', 'over_time.js', 'over_others.js', 'plots.js', 'report.js')
 
 _LONGEST_FACT = 400
 """Maximum number of characters of a fact or a warning."""
@@ -103,10 +96,9 @@ def _run_table_html(table: Table) -> Iterator[str]:
     if table.folded:
         yield f'<details><summary>{escape(table.title)}</summary>'
         yield from table_html(table._replace(title=''))
-        yield '</figure></details>'
+        yield '</details>'
     else:
         yield from table_html(table)
-        yield '</figure>'
 
 
 def run_tables(run: ReportedRun) -> Iterator[Table]:
@@ -178,7 +170,7 @@ def run_html(run: ReportedRun, header: ReportHeader) -> str:
     """
     data = page_data(run, header.wrapped)
     title = shorten_text(header.title)
-    page = html_document(title, _page_body(run, header, data), data, _STYLES, _SCRIPTS)
+    page = html_document(title, _page_body(run, header, data), data, _HERE, _FILES)
     # The limits of the parts add up to less, but names in a scene have no limit.
     if len(page.encode('utf-8', 'backslashreplace')) > PAGE_BYTES:
         bound = f'{PAGE_BYTES // 1_000_000} MB'
