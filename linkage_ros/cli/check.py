@@ -38,7 +38,6 @@ from linkage_ros.kinematics import (
     is_iterated,
     Iterated,
     Linkage,
-    links_of,
     sides_at,
     SpaceLinkage,
     Status,
@@ -370,6 +369,7 @@ def _four_bars_table(closure: Closure) -> Table:
 
 def transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
     """Return the extreme transmission angles over the range, by group."""
+
     def angle(value: float | None, units: DisplayUnits) -> str:
         return '' if value is None else units.format_angle(value, 2)
 

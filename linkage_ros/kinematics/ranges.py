@@ -43,6 +43,9 @@ _POINT = 1e-9
 _ROUNDED = 1e-9
 """A margin farther from zero than this has a certain sign."""
 
+_FLAT = 1e-12
+"""A margin that changes less between samples, relative to itself, is constant there."""
+
 _CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 _SAME = 1e-9
@@ -288,6 +291,8 @@ def _turning_points(
     for i, here in enumerate(margins):
         # At an end it may cross zero before the first sample inside.
         before, after = max(i - 1, 0), min(i + 1, last)
+        if abs(margins[before] - here) + abs(margins[after] - here) < _FLAT * abs(here):
+            continue
         if 0.0 < here <= min(margins[before], margins[after]) and here < inf:
             yield golden_section(margin, values[before], values[after])[1]
         elif 0.0 > here >= max(margins[before], margins[after]):

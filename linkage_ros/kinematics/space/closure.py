@@ -28,12 +28,15 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
 )
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
-from linkage_ros.kinematics.sweep_analysis import worst_residual
+from linkage_ros.kinematics.sweep_analysis import grid_positions
 
 Quaternion = tuple[float, float, float, float]
 
 _MET = 1e-4
 """Largest gap of a redundant equation, relative to the size: CAD rounds."""
+
+_STATES = 64
+"""Number of states over the inputs in which redundant equations are checked."""
 
 
 class SpaceClosure(StepwiseClosure):
@@ -239,8 +242,12 @@ def check_pose(closure: SpaceClosure) -> None:
         )
     if not closure.freedom.redundant:
         return
-    found = worst_residual(closure)
-    gap, inputs = (closure.residual(position), pose) if found is None else found[:2]
+    each = max(2, int(_STATES ** (1.0 / len(pose))))
+    gap, inputs = max(
+        (closure.residual(found), at)
+        for at, found in ((pose, position), *grid_positions(closure, each))
+        if found.status.has_pose
+    )
     if gap > _MET * size_of(closure.linkage):
         count, places = closure.freedom.redundant, ', '.join(f'{value:.4g}' for value in inputs)
         raise DefinitionError(

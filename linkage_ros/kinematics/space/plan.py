@@ -621,7 +621,9 @@ class SpacePlan:
 
 
 def _unit(vector: Vector) -> Vector:
-    return _clean(scale(1.0 / length(vector), vector))
+    size = hypot(*vector)
+    x, y, z = (one / size for one in vector)
+    return _clean((x, y, z))
 
 
 def _clean(vector: Vector) -> Vector:

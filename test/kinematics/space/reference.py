@@ -135,7 +135,8 @@ def angle_to_meet(
     return hinge_angle(place, beside, rod, sign)
 
 
-def size_between(one: Sequence[Any], other: Sequence[Any]) -> mpf:
-    """Return a distance."""
-    between = less(one, other)
-    return mp.sqrt(dot(between, between))
+def exact_distance(one: Sequence[float], other: Sequence[float]) -> mpf:
+    """Return a distance of two places."""
+    with mp.workdps(DIGITS):
+        between = less([mpf(part) for part in one], [mpf(part) for part in other])
+        return mp.sqrt(dot(between, between))

@@ -18,9 +18,9 @@ import pytest
 
 from .reference import (
     angle_to_meet,
+    exact_distance,
     motion_of,
     moved,
-    size_between,
     turned_about,
 )
 from ..reference import Worst
@@ -193,11 +193,14 @@ def test_random_rssr_linkages_are_as_exact_as_their_numbers():
 
         def angle(numbers, t, sign=sign):
             a, b, at, axis, to_at, to_axis = (numbers[3 * k : 3 * k + 3] for k in range(6))
-            q, w, change = numbers[18:]
+            rod, q, w, change = numbers[18:]
             now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
-            return angle_to_meet(b, to_at, to_axis, now, size_between(a, b), sign)
+            return angle_to_meet(b, to_at, to_axis, now, rod, sign)
 
-        truth = motion_of(angle, [n for place in places for n in place] + state)
+        # The length of the rod is a number of its own, which is rounded wherever it comes from. If
+        # κ took it for a function of the ends, it would be 0 at the pose even next to a toggle.
+        rod = exact_distance(*places[:2])
+        truth = motion_of(angle, [*(n for place in places for n in place), rod, *state])
         case = (linkage, state)
         worst.note('rocker', truth[0].half_turn_error_of(found[0]), LIMIT, case)
         worst.note('rate', truth[1].error_of(found[1]), LIMIT, case)
@@ -229,10 +232,11 @@ def test_an_ankle_driven_by_its_joints_is_as_exact_as_its_numbers():
                     for n in range(2)
                 )
                 now = turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
-                return angle_to_meet(b, at3, axis3, now, size_between(b, c), sign)
+                return angle_to_meet(b, at3, axis3, now, numbers[30], sign)
 
             numbers = [n for place in places for n in place]
-            truth = motion_of(angle, [*numbers, *inputs, *rates, *changes])
+            rod = exact_distance(*places[:2])
+            truth = motion_of(angle, [*numbers, *inputs, *rates, *changes, rod])
             case = (motor, inputs)
             worst.note('angle', truth[0].half_turn_error_of(position.joints[k]), LIMIT, case)
             worst.note('rate', truth[1].error_of(velocity.joints[k]), LIMIT, case)
@@ -309,4 +313,4 @@ def test_a_jacobian_in_the_plane_too():
     columns = [closure.velocity(position, *rates).joints for rates in ((1.0, 0.0), (0.0, 1.0))]
     assert closure.jacobian(position).T.tolist() == [list(column) for column in columns]
     with pytest.raises(ValueError, match='has none'):
-        closure.jacobian(closure.position(0.0, pi))
+        closure.jacobian(closure.position(pi, 0.0))
