@@ -140,7 +140,12 @@ def scene_keys() -> str:
 
 def linkage_keys() -> str:
     """Return the keys of linkage files."""
-    return _keys(linkage_schema())
+    return _keys({**linkage_schema(), **linkage_schema()['else']})
+
+
+def spatial_keys() -> str:
+    """Return the keys of files of spatial linkages."""
+    return _keys({**linkage_schema(), **linkage_schema()['then']})
 
 
 def _keys(whole: Mapping[str, Any]) -> str:
@@ -224,6 +229,7 @@ MADE: Mapping[str, Callable[[], str]] = {
     'faults': lambda: parameters('fault'),
     'scene keys': scene_keys,
     'linkage keys': linkage_keys,
+    'spatial linkage keys': spatial_keys,
 }
 """The parts that a page can request, by name."""
 

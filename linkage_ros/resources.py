@@ -40,9 +40,18 @@ def shipped_path(name: str) -> Path:
     raise FileError(f'config/{name}', '', 'is not installed', 'install linkage_ros again')
 
 
+SPATIAL = 'linkages/space'
+"""Folder of the spatial linkages, under ``config/``."""
+
+
 def linkage_names() -> list[str]:
-    """Return the names of the linkages that come with the package."""
+    """Return the names of the planar linkages that come with the package."""
     return _yaml_names('linkages')
+
+
+def spatial_linkage_names() -> list[str]:
+    """Return the names of the spatial linkages that come with the package."""
+    return _yaml_names(SPATIAL)
 
 
 def scene_names() -> list[str]:
@@ -58,7 +67,8 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
     shipped scene. Of several ``folders`` under ``config/`` the first that has the name decides.
     FileError if there is no such file or name; TypeError if ``named`` cannot be a path.
     """
-    known = {name: folder for folder in reversed(folders) for name in _yaml_names(folder)}
+    searched = (*folders, SPATIAL) if 'linkages' in folders else folders
+    known = {name: folder for folder in reversed(searched) for name in _yaml_names(folder)}
     try:
         path = Path(named)
     except TypeError:
@@ -82,6 +92,8 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
 
 def linkage_of_scene(name: str, folder: Path) -> Path:
     """Return the path of a linkage that a scene in a folder names: a shipped one, or a file."""
+    if name in spatial_linkage_names():
+        return shipped_path(f'{SPATIAL}/{name}.yaml')
     return shipped_path(f'linkages/{name}.yaml') if name in linkage_names() else folder / name
 
 

@@ -45,7 +45,7 @@ from linkage_ros.cli.arguments import finite_or_none
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, escape_unprintable, list_names
-from linkage_ros.kinematics import four_bars
+from linkage_ros.kinematics import Closure, four_bars
 from linkage_ros.replay import recorded_scene, WorstResiduals
 from linkage_ros.signals import heed_signals, StoppedError
 
@@ -279,11 +279,10 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
             'time_ns': place.time,
             'inputs': list(place.inputs),
         }
+    closure = worst.closure
+    bars = four_bars(closure.structure) if isinstance(closure, Closure) else []
     return {
-        'four_bars': [
-            {'kind': bar.kind.name, 'lengths_m': list(bar.lengths)}
-            for bar in four_bars(worst.closure.structure)
-        ],
+        'four_bars': [{'kind': bar.kind.name, 'lengths_m': list(bar.lengths)} for bar in bars],
         'states': worst.states,
         'toggles': worst.toggles,
         'limited': worst.limited,
@@ -305,7 +304,7 @@ def _linkage_json(scene_linkage: SceneLinkage) -> dict[str, Any]:
     linkage = scene_linkage.linkage
     return {
         'name': scene_linkage.name,
-        'links': len(linkage.links),
+        'links': len(linkage.link_names),
         'inputs': [
             {'joint': name, 'unit': given.unit}
             for name, given in zip(scene_linkage.input_names, linkage.inputs, strict=True)

@@ -24,7 +24,7 @@ from typing import Any
 from linkage_ros.cli.arguments import LINKAGES
 from linkage_ros.cli.main import COMMANDS, find_command, Parser, parser_of
 from linkage_ros.errors import check_installed
-from linkage_ros.resources import linkage_names, scene_names
+from linkage_ros.resources import linkage_names, scene_names, spatial_linkage_names
 
 EXAMPLE = 'linkage completion bash'
 
@@ -71,9 +71,9 @@ def complete() -> None:
             ('BAG', 'CSV', 'FOLDER', 'OUTPUT', 'URDF'), files
         )
         completers |= {
-            'FILE': _names_or(yaml_files, linkage_names),
-            'SCENE': _names_or(yaml_files, scene_names, linkage_names),
-            'NAME': _names_or(None, scene_names, linkage_names),
+            'FILE': _names_or(yaml_files, linkage_names, spatial_linkage_names),
+            'SCENE': _names_or(yaml_files, scene_names, linkage_names, spatial_linkage_names),
+            'NAME': _names_or(None, scene_names, linkage_names, spatial_linkage_names),
         }
         for action in typed._actions:  # noqa: SLF001 (argparse has no other way)
             if action.metavar in completers:

@@ -25,7 +25,14 @@ from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.description import atomic_write, check_output_name
 from linkage_ros.errors import FileError
-from linkage_ros.resources import linkage_names, named_file, scene_names, shipped_path
+from linkage_ros.resources import (
+    linkage_names,
+    named_file,
+    scene_names,
+    shipped_path,
+    SPATIAL,
+    spatial_linkage_names,
+)
 
 EXAMPLE = 'linkage gallery worn_press -o my_press.yaml'
 
@@ -70,15 +77,19 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _gallery_table(folder: str) -> Table:
-    names = {'linkages': linkage_names, 'scenes': scene_names}[folder]()
-    rows = [(name, first_sentence(shipped_path(f'{folder}/{name}.yaml'))) for name in names]
+    names = dict.fromkeys({'linkages': linkage_names, 'scenes': scene_names}[folder](), folder)
+    if folder == 'linkages':
+        names |= dict.fromkeys(spatial_linkage_names(), SPATIAL)
+    rows = [
+        (name, first_sentence(shipped_path(f'{of}/{name}.yaml'))) for name, of in names.items()
+    ]
     return Table('', (Column(folder, 'name'), Column('', 'description')), rows, folder)
 
 
 def _shipped_file(name: str, folders: tuple[str, ...]) -> Path:
     """Return a file of the gallery; a path is none, even of a file that exists."""
     file = named_file(name, *folders)
-    if file.parent.parent != shipped_path(''):
+    if not file.is_relative_to(shipped_path('')):
         raise FileError(name, '', 'is not in the gallery', 'linkage gallery lists its names')
     return file
 

@@ -29,10 +29,7 @@ from linkage_ros.description.linkage_file import (
     read_linkage as read_linkage,
     written_linkage as written_linkage,
 )
-from linkage_ros.description.linkage_grammar import (
-    FARTHEST as FARTHEST,
-    linkage_schema as linkage_schema,
-)
+from linkage_ros.description.linkage_grammar import FARTHEST as FARTHEST
 from linkage_ros.description.linkage_writer import (
     content_of as content_of,
     linkage_text as linkage_text,
@@ -109,7 +106,7 @@ from linkage_ros.description.space_file import (
     is_spatial as is_spatial,
     read_space_closure as read_space_closure,
 )
-from linkage_ros.description.space_grammar import space_schema as space_schema
+from linkage_ros.description.space_grammar import linkage_schema as linkage_schema
 from linkage_ros.description.tables import (
     block_rows as block_rows,
     check_kind as check_kind,

@@ -15,7 +15,7 @@ import re
 from typing import NamedTuple
 
 _ELEMENT = re.compile(r'\s*(?:<[?!][^>]*>\s*|<!--.*?-->\s*)*<([A-Za-z][\w.-]*)', re.DOTALL)
-_LINKAGE_KEY = re.compile(r'^(?:links|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
+_LINKAGE_KEY = re.compile(r'^(?:links|points|four_bar|inverted_slider_crank)\s*:', re.MULTILINE)
 _SCENE_KEY = re.compile(r'^(?:linkages?|drive|effects)\s*:', re.MULTILINE)
 _CONTROL = re.compile(rb'[\0-\x08\x0e-\x1a\x1c-\x1f]')
 _READ = 4096

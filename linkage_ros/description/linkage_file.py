@@ -41,9 +41,10 @@ from linkage_ros.kinematics import (
     GROUND,
     Input,
     Linkage,
+    PLANAR_ONLY,
     RevoluteJoint,
     SlideJoint,
-    StepwiseClosure,
+    SpaceClosure,
     without_drawn_pose,
 )
 from linkage_ros.resources import linkage_names, named_file
@@ -104,9 +105,12 @@ def read_linkage(content: Section) -> Linkage:
     return read_closure(content).linkage
 
 
-def read_any_closure(content: Section, name: str = '') -> StepwiseClosure:
+def read_any_closure(
+    content: Section, name: str = '', *, publish_inputs: bool = False
+) -> Closure | SpaceClosure:
     """Read a planar or a spatial linkage; errors as in `read_closure`."""
-    return (read_space_closure if is_spatial(content) else read_closure)(content, name)
+    read = read_space_closure if is_spatial(content) else read_closure
+    return read(content, name, publish_inputs=publish_inputs)
 
 
 def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
@@ -135,8 +139,7 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
     if is_spatial(content):
-        remedy = 'take a planar linkage; linkage check and linkage solve take spatial ones'
-        raise content.error('points', 'make this linkage spatial', remedy)
+        raise content.error('points', 'make it a spatial linkage', PLANAR_ONLY)
     content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))
     for shorthand, keys in SHORTHANDS.items():
         if shorthand in content:

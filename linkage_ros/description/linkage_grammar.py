@@ -18,7 +18,6 @@ from math import inf
 from typing import Any
 
 from linkage_ros.description.grammar import (
-    DIALECT,
     LENGTH_UNIT,
     LimitPair,
     ListOf,
@@ -447,8 +446,8 @@ def ratio_in_si(ratio: Ratio, unit: str | None, driving: str | None, units: Unit
     return replace(ratio, ratio=found)
 
 
-def linkage_schema() -> Schema:
-    """Return the schema of a linkage file."""
+def planar_schema() -> Schema:
+    """Return the schema of a planar linkage file."""
     whole = parameters_schema(LINKAGE)
     del whole['required']  # in the rule: a shorthand needs none of them
-    return {'$schema': DIALECT, 'title': 'Linkage', **whole}
+    return whole

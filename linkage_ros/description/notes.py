@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.kinematics import Linkage, links_by_point, RevoluteJoint
+from linkage_ros.kinematics import Linkage, links_by_point, RevoluteJoint, SpaceLinkage
 
 if TYPE_CHECKING:
     from linkage_ros.description.scene import Scene, SceneLinkage
@@ -45,7 +45,9 @@ def scene_notes(scene: Scene) -> Iterator[FileError]:
         yield from map(scene_linkage.content.locate_error, _linkage_notes(scene_linkage))
 
 
-def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator[DefinitionError]:
+def linkage_notes(
+    linkage: Linkage | SpaceLinkage, units: Units, rate: float = 0.0
+) -> Iterator[DefinitionError]:
     """Yield the notes on a linkage of a file in some units, which ticks at a rate in [Hz]."""
     turning = {given.joint: not given.slider for given in linkage.inputs} | {
         name: isinstance(joint, RevoluteJoint) for name, joint in linkage.joints.items()
@@ -54,8 +56,9 @@ def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator
         ends = [abs(end) for end in (limits.low, limits.high) if isfinite(end)]
         if units.angle == 'radians' and turning[name] and max(ends, default=0.0) > tau:
             driven = name in (given.joint for given in linkage.inputs)
+            key = 'input.limits' if driven else f'joints.{name}.limits'
             yield DefinitionError(
-                'input.limits' if driven else f'joints.{name}.limits',
+                f'hinges.{name}.limits' if isinstance(linkage, SpaceLinkage) else key,
                 f'{max(ends):g} rad is more than a turn',
                 'if it is in degrees, write angles: degrees',
             )
@@ -78,8 +81,15 @@ def linkage_notes(linkage: Linkage, units: Units, rate: float = 0.0) -> Iterator
         )
 
 
-def _link_lengths(linkage: Linkage) -> dict[str, float]:
+def _link_lengths(linkage: Linkage | SpaceLinkage) -> dict[str, float]:
     """Return for each link the greatest distance between its pins, in [m]."""
+    if isinstance(linkage, SpaceLinkage):
+        places = linkage.points
+        return {
+            link: max(dist(places[one], places[other]) for one, other in combinations(points, 2))
+            for link, points in linkage.links.items()
+            if len(points) > 1
+        }
     pins = {name for name, links in links_by_point(linkage.links).items() if len(links) > 1}
     lengths = {}
     for link, points in linkage.links.items():

@@ -18,7 +18,7 @@ from linkage_ros.bag import COMPRESSIONS, Storage
 from linkage_ros.description.parameters import choice, number, Parts, whole_number
 from linkage_ros.description.section import Section
 from linkage_ros.dynamics import Loads
-from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint
+from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint, SpaceLinkage
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultEntry
@@ -118,7 +118,8 @@ class SceneLinkage:
     """A linkage of a scene, with its drive and its effects."""
 
     name: str  # Name of the linkage; '' if it is the only one of the scene
-    # The linkage, and its closure. Published input joints come first among its joints.
+    # The linkage, and its closure. Published input joints come first among its joints. In space
+    # they are a SpaceLinkage and its closure, which have all that such a scene may call for.
     linkage: Linkage
     closure: Closure = field(compare=False, repr=False)
     drive: tuple[str, Any]  # Name and parameters of the drive
@@ -225,23 +226,32 @@ class Scene:
         return tuple(dict.fromkeys(named))
 
 
-def parts_of(linkage: Linkage) -> Parts:
+def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     """Return the parts of a linkage that parameters can name, by kind."""
+    links = linkage.link_names
     points = [point for carried in linkage.links.values() for point in carried]
+    if isinstance(linkage, SpaceLinkage):
+        return {**_joints_of(linkage), 'link': links[1:], 'body': links, 'point': ()}
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {point: None for point in points if points.count(point) > 1}
     return {
+        **_joints_of(linkage),
+        'pin': (*pins, *linkage.sliders),
+        'link': tuple(link for link in links if link != GROUND),
+        'body': links,
+        'slider': tuple(linkage.sliders),
+        'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
+    }
+
+
+def _joints_of(linkage: Linkage | SpaceLinkage) -> dict[str, tuple[str, ...]]:
+    return {
         'joint': tuple(linkage.joints),
         'input': tuple(given.joint for given in linkage.inputs),
         'any_joint': tuple(dict.fromkeys([*(i.joint for i in linkage.inputs), *linkage.joints])),
-        'pin': (*pins, *linkage.sliders),
-        'link': tuple(link for link in linkage.links if link != GROUND),
-        'body': tuple(linkage.links),
         'slide': (
             *(given.joint for given in linkage.inputs if given.slider),
             *(name for name, joint in linkage.joints.items() if isinstance(joint, SlideJoint)),
         ),
-        'slider': tuple(linkage.sliders),
-        'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
     }

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING
 from zlib import crc32
 
-from linkage_ros.description.linkage_file import looks_like_linkage, read_closure
+from linkage_ros.description.linkage_file import looks_like_linkage, read_any_closure
 from linkage_ros.description.parameters import Parts
 from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
 from linkage_ros.description.scene_grammar import (
@@ -33,7 +33,7 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
-from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _stand_in(
     )
 
     try:
-        closure = read_closure(content, publish_inputs=True)
+        closure: Any = read_any_closure(content, publish_inputs=True)
         text = scene_text_for(closure, LINKAGE_FILE).encode()
     except DefinitionError as error:
         raise content.locate_error(error) from None
@@ -313,7 +313,7 @@ def _read_scene_linkage(
     own: Section,
     scene: Section,
     source: _SceneSource,
-    closure: Closure | None = None,
+    closure: Any = None,
 ) -> SceneLinkage:
     def section_with(key: str) -> Section:
         return own if key in own else scene
@@ -326,9 +326,11 @@ def _read_scene_linkage(
     if published is None:
         published = drive != 'topic' or any(each.without_inputs for each in types.values())
     if closure is None:
-        closure = read_closure(linkage_content, publish_inputs=published)
+        closure = read_any_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
     _refuse_effects(effects, types, drive, published)
+    if isinstance(linkage, SpaceLinkage):
+        _refuse_in_space(section_with, effects, types, drive)
     kinds = {bool(given.slider) for given in linkage.inputs}
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
@@ -358,6 +360,27 @@ def _refuse_effects(
             raise effects.error(name, *effect.without_inputs)
         if drive in effect.refused_drives:
             raise effects.error(name, *effect.refused_drives[drive])
+
+
+def _refuse_in_space(
+    section_with: Callable[[str], Section],
+    effects: Section,
+    types: Mapping[str, type[Effect]],
+    drive: str,
+) -> None:
+    """Refuse what only planar linkages have."""
+    reason, remedy = 'is for planar linkages', 'leave it out'
+    for name, effect in types.items():
+        if effect.is_planar or effect.needs_forces:
+            raise effects.error(name, reason, remedy)
+    drives = section_with('drive')
+    if drive == 'torque':
+        raise drives.error('drive.torque', reason, 'drive it by topic or at a given motion')
+    if drive == 'topic' and 'joint' in drives.section('drive').section('topic'):
+        raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
+    for key in ('loads', 'robot_description'):
+        if key in section_with(key):
+            raise section_with(key).error(key, reason, remedy)
 
 
 def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:

@@ -19,6 +19,7 @@ from linkage_ros.description.linkage_grammar import (
     LIMITS,
     MOST_LINKS,
     Moves,
+    planar_schema,
     RATIO,
     split_limits,
     UNITS,
@@ -185,6 +186,16 @@ SPACE = Keys(
 )  # fmt: skip
 
 
-def space_schema() -> Schema:
-    """Return the schema of a spatial linkage file."""
-    return {'$schema': DIALECT, 'title': 'Spatial linkage', **parameters_schema(SPACE)}
+def linkage_schema() -> Schema:
+    """Return the schema of a linkage file, which is spatial if it has points of its own."""
+    planar, spatial = planar_schema(), parameters_schema(SPACE)
+    parts = planar.pop('$defs', {}) | spatial.pop('$defs', {})
+    return {
+        '$schema': DIALECT,
+        'title': 'Linkage',
+        'type': 'object',
+        '$defs': parts,
+        'if': {'required': ['points']},
+        'then': spatial,
+        'else': planar,
+    }

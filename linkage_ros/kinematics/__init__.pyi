@@ -33,6 +33,10 @@ from linkage_ros.kinematics.batch import (
     Complex as Complex,
     Mask as Mask,
 )
+from linkage_ros.kinematics.checks import (
+    check_planar as check_planar,
+    PLANAR_ONLY as PLANAR_ONLY,
+)
 from linkage_ros.kinematics.closure import Closure as Closure
 from linkage_ros.kinematics.crank_branches import CrankBranch as CrankBranch
 from linkage_ros.kinematics.curves import (

@@ -61,17 +61,20 @@ def sweep_range(input_sweep: InputSweep, interval: InputRange) -> RangeSweep:
     """Move a linkage through a range."""
     closure: Any = input_sweep.closure
     linkage = closure.linkage
-    carriers = traced_carriers(linkage)
+    planar = isinstance(linkage, Linkage)
+    carriers = traced_carriers(linkage) if planar else {}
     x: list[float] = []
     values: list[tuple[float, ...]] = []
     paths: dict[str, list[complex]] = {point: [] for point in carriers}
-    slides: dict[str, list[float]] = {name: [] for name in linkage.sliders}
+    slides: dict[str, list[float]] = {name: [] for name in linkage.sliders} if planar else {}
     for value in sample_inputs(interval):
         position = input_sweep.position_at(value)
         if not position.joints:
             continue
         x.append(value)
         values.append(position.joints)
+        if not planar:
+            continue
         points = closure.points(position)
         for point, path in paths.items():
             path.append(points[carriers[point], point])

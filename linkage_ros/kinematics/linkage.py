@@ -256,6 +256,11 @@ class Linkage:
     nominal: Linkage | None = field(default=None, compare=False, repr=False)
 
     @property
+    def link_names(self) -> tuple[str, ...]:
+        """Return all links."""
+        return tuple(self.links)
+
+    @property
     def driven_joints(self) -> tuple[Input, ...]:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
         followers = (Input.from_joint(name, self.joints[name]) for name in self.ratios)

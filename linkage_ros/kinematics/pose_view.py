@@ -15,6 +15,7 @@ from math import degrees, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.checks import check_planar
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.curves import RangeSweep, sweep_range
 from linkage_ros.kinematics.linkage import GROUND
@@ -48,6 +49,7 @@ def prepare_view(
 
     By default these cover the whole range. A LinkageError says that a pose does not close.
     """
+    check_planar(closure.name, closure.linkage)
     position = _close_loops(closure, inputs)
     input_sweep = InputSweep(closure, inputs)
     value = inputs[0]

@@ -128,7 +128,7 @@ class BrokenLink(Fault):
 
     def mechanism(self, switch: Switch, context: Context) -> Callable[[Position], Position] | None:
         """Build a function that removes the pose; None if the link is not in this linkage."""
-        if self.link not in [context.prefix + link for link in context.closure.linkage.links]:
+        if self.link not in [context.prefix + link for link in context.closure.linkage.link_names]:
             return None
 
         def break_link(position: Position) -> Position:

@@ -77,6 +77,8 @@ class Effect(ABC):
         Effects that are named together with it.
     needs_forces
         Whether masses, loads and friction matter to it.
+    is_planar
+        Whether it knows planar linkages only.
     suppresses_ticks
         Whether it may suppress the message of a tick.
     runs_in_gaps
@@ -99,6 +101,7 @@ class Effect(ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     publishes_with: ClassVar[tuple[str, ...]] = ()
     needs_forces: ClassVar[bool] = False
+    is_planar: ClassVar[bool] = False
     suppresses_ticks: ClassVar[bool] = False
     runs_in_gaps: ClassVar[bool] = False
     without_inputs: ClassVar[tuple[str, ...]] = ()
@@ -125,6 +128,7 @@ class LinkageEffect(Effect):
 
     __slots__ = ()
     place: ClassVar[str] = 'in the place of the linkage that is drawn'
+    is_planar: ClassVar[bool] = True
 
     @abstractmethod
     def alter(self, linkage: Linkage, random: Random) -> Linkage:
@@ -176,6 +180,7 @@ class ForceEffect(Effect):
 
     __slots__ = ()
     place: ClassVar[str] = 'in the forces'
+    is_planar: ClassVar[bool] = True
 
     @property
     @abstractmethod

@@ -73,6 +73,7 @@ class MarkersEffect(MessageEffect):
         most=0.5 * pi,
     )
 
+    is_planar = True
     topic = '~/markers'
     message = 'visualization_msgs/msg/MarkerArray'
 

@@ -39,6 +39,7 @@ from linkage_ros.kinematics import (
     InputSweep,
     Linkage,
     RevoluteJoint,
+    SpaceClosure,
     sweep_range,
 )
 from linkage_ros.messages import JointStateReader, NANOSECONDS, Rejection
@@ -213,7 +214,8 @@ def crank_curves(
     which a curve begins anew, as after lost ticks.
     """
     driven = linkage.inputs[0]
-    input_sweep = InputSweep(Closure(linkage), cranks[0])
+    closure = Closure(linkage) if isinstance(linkage, Linkage) else SpaceClosure(linkage)
+    input_sweep = InputSweep(closure, cranks[0])
     about = (each for each in input_sweep.ranges if _is_within(cranks[0][0], each))
     interval = next(about, input_sweep.widest_range)
     ideal = sweep_range(input_sweep, interval).joints if interval else ()

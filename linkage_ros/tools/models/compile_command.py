@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.cli import add_file, add_output
-from linkage_ros.description import atomic_write, linkage_content, read_closure
+from linkage_ros.description import atomic_write, linkage_content, read_any_closure
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     language = LANGUAGES[output.suffix.lower()]
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
-    closure = read_closure(content)
+    closure = read_any_closure(content)
     in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(
         closure,

@@ -39,6 +39,7 @@ from linkage_ros.cli import (
 )
 from linkage_ros.description import atomic_write, load_scene, Scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
+from linkage_ros.kinematics import check_planar
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
 from linkage_ros.tools.study.budget_text import (
     budget_json,
@@ -203,14 +204,15 @@ def _load_source(arguments: argparse.Namespace, stop: Event) -> _StudySource:
     """Return the scene of a file, or of a bag with its motion."""
     path = Path(arguments.scene)
     is_bag = path.suffix == '.mcap' or any(path.glob('*.mcap')) if path.exists() else False
-    if not is_bag:
-        return _StudySource(
-            load_scene(arguments.scene, arguments.set), arguments.like, is_bag=False
-        )
-    if arguments.like:
+    if is_bag and arguments.like:
         raise LinkageError('--like', 'the bag itself has the motion', 'leave one of them out')
-    scene = scene_of(open_bag(path, stop), trust_effects=False, settings=arguments.set)
-    return _StudySource(scene, arguments.scene, is_bag=True)
+    if is_bag:
+        scene = scene_of(open_bag(path, stop), trust_effects=False, settings=arguments.set)
+    else:
+        scene = load_scene(arguments.scene, arguments.set)
+    for each in scene.linkages:
+        check_planar(arguments.scene, each.linkage)
+    return _StudySource(scene, arguments.scene if is_bag else arguments.like, is_bag=is_bag)
 
 
 def _write_files(

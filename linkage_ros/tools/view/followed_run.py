@@ -23,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from linkage_ros.bag import read_run_metadata, RunMetadata
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.kinematics import Closure, GROUND
+from linkage_ros.kinematics import check_planar, Closure, GROUND
 from linkage_ros.messages import CrankSample, MalformedError
 from linkage_ros.replay import read_announced, recorded_scene
 from linkage_ros.tools.view.model import model_of
@@ -119,6 +119,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         announced = read_announced(message, topic)
         scene, account = recorded_scene(announced), read_run_metadata(announced)
         shown = scene.linkages[0]
+        check_planar(scene.name, shown.linkage)
         closure = Closure(shown.linkage)
         model = model_of(closure, scene.name)
     except (ValueError, ArithmeticError, MalformedError) as error:

@@ -34,6 +34,7 @@ from linkage_ros.errors import (
     LinkageError,
     missing_packages_reported,
 )
+from linkage_ros.kinematics import check_planar
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.signals import heed_signals
 from linkage_ros.tools.view.report import Window
@@ -105,6 +106,8 @@ def _read_linkage(named: str) -> _NamedLinkage:
         read_closure(content, file.stem)
         return _NamedLinkage(file.stem, file, data, None)
     scene = load_scene(file)
+    for each in scene.linkages:
+        check_planar(scene.name, each.linkage)
     path = Path(scene.linkages[0].linkage_content.file)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}

@@ -13,6 +13,7 @@ from random import Random
 
 import linkage_ros as lr
 from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
+from linkage_ros.resources import spatial_linkage_names
 import numpy as np
 import pytest
 
@@ -26,13 +27,14 @@ from .reference import (
 from ..reference import Worst
 
 FOLDER = Path(__file__).parent / 'linkages'
-NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))
+NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.yaml'))]
 LIMIT = 4.0
 """In u·κ."""
 
 
 def closure_of(name):
-    return lr.load(FOLDER / f'{name}.yaml')
+    own = FOLDER / f'{name}.yaml'
+    return lr.load(own if own.is_file() else name)
 
 
 def states_of(closure, count, reach=0.3):
@@ -263,7 +265,7 @@ def test_a_delta_there_and_back_is_where_it_was():
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
 def test_a_universal_joint_turns_as_in_the_books(angle):
     """tan(out) = tan(in)·cos β if the fork of the input lies in the plane of the shafts."""
-    closure = closure_of('hooke')
+    closure = closure_of('hooke_joint')
     position = closure.position(angle)
     # In the pose the pin of the input is across that plane: in = 90° of the formula.
     expected = atan2(cos(radians(30)) * sin(angle), cos(angle))

@@ -17,9 +17,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from math import hypot, inf, isfinite, tau
+from math import dist, inf, isfinite, tau
 import textwrap
 from typing import Any, ClassVar, NamedTuple
 
@@ -27,10 +27,12 @@ from linkage_ros import __version__
 from linkage_ros.kinematics import (
     Bound,
     Closure,
+    Linkage,
     RevoluteJoint,
     ROUNDING,
     SHRINK,
     SMALLEST,
+    SpaceLinkage,
     StartTable,
     Status,
 )
@@ -439,11 +441,11 @@ def _used_constants(roots: Sequence[Any]) -> Iterator[float]:
 def _length_names(closure: Closure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
     named: dict[float, set[str]] = defaultdict(set)
-    for link, points in closure.linkage.links.items():
-        for (one, (x, y)), (other, (u, v)) in combinations(points.items(), 2):
-            named[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
+    for link, points in _places_of(closure.linkage).items():
+        for (one, start), (other, end) in combinations(points.items(), 2):
+            named[dist(start, end) / closure.scale].add(f'{link}_{one}_{other}')
         for point, place in points.items():
-            for axis, value in zip('xy', place, strict=True):
+            for axis, value in zip('xyz', place, strict=False):
                 named[value / closure.scale].add(f'{link}_{point}_{axis}')
     # A value that several lengths share gets the name of none.
     names = {value: names.pop() for value, names in named.items() if len(names) == 1}
@@ -455,11 +457,20 @@ def _length_names(closure: Closure) -> dict[float, str]:
     }
 
 
+def _places_of(linkage: Linkage | SpaceLinkage) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
+    """Return the points of each link, in its frame; of a spatial linkage in the pose."""
+    if isinstance(linkage, SpaceLinkage):
+        places = linkage.points
+        return {link: {name: places[name] for name in of} for link, of in linkage.links.items()}
+    return linkage.links
+
+
 def _head_lines(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage = closure.linkage
-    yield f'{comment_text(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
+    kind = 'spatial' if isinstance(linkage, SpaceLinkage) else 'planar'
+    yield f'{comment_text(subject.name)}: a {kind} linkage, written by linkage_ros {__version__}'
     yield f'from {comment_text(subject.file)}. Change that file, and compile it again.'
     yield ''
     yield f'The function {function} takes:'
@@ -487,9 +498,13 @@ def _head_lines(subject: Subject, function: str) -> Iterator[str]:
     else:
         yield 'The linkage file names no limits of joints.'
     yield ''
-    yield 'The links have these points, in their own frames, in [m]:'
-    for link, points in linkage.links.items():
-        text = ', '.join(f'{comment_text(p)} ({x:.9g}, {y:.9g})' for p, (x, y) in points.items())
+    where = 'in the pose' if kind == 'spatial' else 'in their own frames'
+    yield f'The links have these points, {where}, in [m]:'
+    for link, points in _places_of(linkage).items():
+        text = ', '.join(
+            f'{comment_text(p)} ({", ".join(f"{part:.9g}" for part in place)})'
+            for p, place in points.items()
+        )
         yield from textwrap.wrap(
             f'  {comment_text(link)}: {text}', WIDTH - 4, subsequent_indent='      ',
             break_on_hyphens=False,

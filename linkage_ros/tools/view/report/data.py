@@ -332,7 +332,12 @@ def _drawing_of(closure: Closure, space: int) -> tuple[dict[str, Any] | None, in
 
 
 def _linkage_json(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
-    found = link_poses(linkage.closure, linkage.prefix, frames.values, linkage.inputs)
+    closure: Any = linkage.closure
+    if isinstance(closure, Closure):
+        found = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
+    else:
+        count = len(frames.times)
+        found = Poses((), np.empty((count, 0, 3)), np.full(count, np.nan), '')
     return {
         'name': linkage.name,
         'inputs': linkage.inputs,

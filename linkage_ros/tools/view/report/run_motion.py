@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Curve, prepare_view, unwrap_angles, usual_inputs
+from linkage_ros.kinematics import check_planar, Curve, prepare_view, unwrap_angles, usual_inputs
 from linkage_ros.tools.drawing import AnimatedMotion, count_of
 from linkage_ros.tools.view.report.data import link_poses
 from linkage_ros.tools.view.report.decimation import Numbers
@@ -33,6 +33,7 @@ def find_run_motion(run: ReportedRun, name: str, seconds: float | None) -> Anima
     if not run.linkages or run.frames is None:
         raise LinkageError(name, 'has no scene to animate', 'name a bag of a linkage_node')
     linkage, frames = run.linkages[0], run.frames
+    check_planar(name, linkage.closure.linkage)
     part = (frames.times >= run.window.since) & (frames.times <= run.window.until)
     if not part.any():
         reason = 'holds no joint states in this part'
