@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 from linkage_ros.cli import add_file, add_output
 from linkage_ros.description import atomic_write, linkage_content, read_any_closure
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     language = LANGUAGES[output.suffix.lower()]
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
-    closure = read_any_closure(content)
+    closure: Any = read_any_closure(content)
     in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(
         closure,

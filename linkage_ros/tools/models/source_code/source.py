@@ -468,7 +468,7 @@ def _places_of(linkage: Linkage | SpaceLinkage) -> Mapping[str, Mapping[str, tup
 def _head_lines(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
-    linkage = closure.linkage
+    linkage: Any = closure.linkage
     kind = 'spatial' if isinstance(linkage, SpaceLinkage) else 'planar'
     yield f'{comment_text(subject.name)}: a {kind} linkage, written by linkage_ros {__version__}'
     yield f'from {comment_text(subject.file)}. Change that file, and compile it again.'
