@@ -41,8 +41,19 @@ def read_space_closure(
         check_pose(closure)
         check_limits(closure)
     except DefinitionError as error:
-        raise content.locate_error(error) from None
+        where = _own_key(content, error.where)
+        raise content.locate_error(DefinitionError(where, error.reason, error.remedy)) from None
     return closure
+
+
+def _own_key(content: Section, where: str) -> str:
+    """Return a key of a planar file, as checks of both name it, as a spatial file has it."""
+    section, _, part = where.partition('.')
+    if section == 'joints' and part:
+        name = part.partition('.')[0]
+        kind = next(of for of in ('hinges', 'slides', 'struts') if name in _names(content, of))
+        return f'{kind}.{part}' if kind != 'struts' else f'{kind}.{name}'
+    return {'pose': 'points', 'input': 'input'}.get(section, where)
 
 
 def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:

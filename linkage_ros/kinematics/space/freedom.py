@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, list_names
+from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import SpaceLinkage
@@ -121,11 +121,23 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
 def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> None:
     """Refuse a linkage that its inputs do not move, or that its steps do not find."""
     count = len(linkage.driven)
-    given = f'{count} input{"s" * (count != 1)} for {freedom.mobility} degrees of freedom'
+    degrees = f'degree{"s" * (freedom.mobility != 1)} of freedom'
+    given = f'{count} input{"s" * (count != 1)} for {freedom.mobility} {degrees}'
     if freedom.free:
+        # At a toggle equations are redundant that are needed elsewhere.
+        away = 'draw a pose that is no toggle, ' if freedom.redundant else ''
+        stay = 'stay' if len(freedom.free) > 1 else 'stays'
         raise DefinitionError(
-            'input', f'{given}: {list_names(freedom.free)} stay free',
-            'drive another joint, or hold these links',
+            'input', f'{given}: {list_names(freedom.free)} {stay} free',
+            f'{away}drive another joint, or hold what is free',
+        )  # fmt: skip
+    for name in linkage.driven:
+        if name in linkage.between and _is_in_no_loop(linkage, name):
+            raise DefinitionError('input', f'{quote(name)} is in no loop', 'leave its link out')
+    if freedom.dependent and not freedom.mobility:
+        raise DefinitionError(
+            'input', f'{given}: the linkage is over-constrained, and cannot move',
+            'let a hinge be a ball, or correct the axes and the places',
         )  # fmt: skip
     if freedom.dependent:
         raise DefinitionError(
@@ -140,6 +152,18 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             f'{list_names(unknown or plan.lost)} close only together, and no step finds them',
             'drive other joints, for example those that are published',
         )
+
+
+def _is_in_no_loop(linkage: SpaceLinkage, name: str) -> bool:
+    """Return whether nothing but a joint leads from its child to its parent."""
+    joint, reached = linkage.between[name], {linkage.between[name].child}
+    ways = [{one.parent, one.child} for one in linkage.between.values() if one is not joint]
+    for point in (*linkage.points, *linkage.struts):
+        ends = linkage.struts.get(point, (point,))
+        ways.append({link for link, of in linkage.links.items() if not set(ends).isdisjoint(of)})
+    for _ in linkage.link_names:
+        reached.update(*(way for way in ways if not way.isdisjoint(reached)))
+    return joint.parent not in reached
 
 
 def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[str]) -> bool:

@@ -192,10 +192,16 @@ def _check_held(linkage: SpaceLinkage) -> None:
     for link, points in linkage.links.items():
         if link in ends or link == GROUND:
             continue
+        places = [linkage.points[point] for point in points]
+        for number, place in enumerate(places):
+            if place in places[:number]:
+                one, other = points[places.index(place)], points[number]
+                reason = f'{quote(one)} and {quote(other)} are in one place'
+                raise DefinitionError(f'links.{link}', reason, 'name points apart')
         if sum(carried[point] > 1 for point in points) < 2:
             raise DefinitionError(
                 f'links.{link}',
-                'is free: at most one ball holds it',
+                'is held by one ball at most, and free',
                 f'add the hinge of {quote(link)}, or name its points on the links that hold it',
             )
     for name, (one, other) in linkage.struts.items():
