@@ -38,6 +38,7 @@ from linkage_ros.kinematics import (
     is_iterated,
     Iterated,
     Linkage,
+    links_of,
     sides_at,
     SpaceLinkage,
     Status,
@@ -406,13 +407,19 @@ def _extremes_table(
         columns += [end, Column(end.heading and 'at', f'{where}.inputs', unit, places)]
     rows = [
         (
-            *(number + 1, closure.links_of_group(number)),
+            *(number + 1, _links_of(closure, number)),
             *(finite_or_none(curve.lowest.value), list(curve.lowest.at)),
             *(finite_or_none(curve.highest.value), list(curve.highest.at)),
         )
         for number, curve in found.items()
     ]
     return Table(title, columns, rows, key)
+
+
+def _links_of(closure: StepwiseClosure, number: int) -> list[str]:
+    if isinstance(closure, Closure):
+        return [*links_of(closure.structure.groups[number])]
+    return closure.links_of_group(number)
 
 
 def _branches_table(closure: Closure) -> Table:
