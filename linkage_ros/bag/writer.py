@@ -120,6 +120,7 @@ class BagWriter:
         self._ended_files: list[BagSummary] = []
         self._files_to_remove: list[Path] = []  # files to remove that still exist
         self._due = 0.0
+        self._has_news = False  # Whether messages on the disk are not in the metadata yet
         self._checked = 0  # size of the file at the last check of free space [bytes]
         self._summary: BagSummary | None = None
         # Whether it failed for lack of space, so that `resume` may continue.
@@ -187,7 +188,8 @@ class BagWriter:
         if self._failure:
             raise self._failure
         try:
-            if self._file.flush() and time.monotonic() >= self._due:
+            self._has_news |= self._file.flush()
+            if self._has_news and time.monotonic() >= self._due:
                 self._try_to_renew(self._summarize())
             self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
@@ -349,6 +351,7 @@ class BagWriter:
         """Write the messages on the disk by now into the metadata."""
         begin = time.monotonic()
         write_metadata(summary, custom_data(self._unfinished_metadata, summary, None))
+        self._has_news = False
         end = time.monotonic()
         # With many files the metadata are long, and must not keep a slow disk busy.
         self._due = end + max(_RENEWAL, 20.0 * (end - begin))

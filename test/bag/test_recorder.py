@@ -298,6 +298,26 @@ def test_while_a_bag_is_recorded_its_metadata_says_so_and_counts_what_is_safe(
     assert UNFINISHED not in information()['custom_data']
 
 
+def test_metadata_that_were_renewed_too_early_are_renewed_without_another_message(
+    tmp_path, topics, messages, monkeypatch
+):
+    def count():
+        text = (tmp_path / 'run' / 'metadata.yaml').read_text()
+        return yaml.safe_load(text)['rosbag2_bagfile_information']['message_count']
+
+    now = 0.0
+    monkeypatch.setattr('linkage_ros.bag.writer.time.monotonic', lambda: now)
+    writer = BagWriter(tmp_path / 'run', topics)
+    counts = []
+    for now, written in ((0.0, 1), (0.1, 2), (0.9, 0), (1.0, 1), (1.1, 0), (1.8, 0)):
+        for message in messages[:written]:
+            writer.write(*message)
+        writer.flush()
+        counts.append(count())
+    writer.close()
+    assert counts == [0, 0, 3, 3, 3, 4]
+
+
 def test_what_waits_for_long_is_flushed_in_between(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.02)
     recorder.offer(*messages[0])
