@@ -23,7 +23,7 @@ from linkage_ros.cli.arguments import add_file, add_radians, DisplayUnits, finit
 from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, facts_table, Quantity, Table, UNIT
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
-from linkage_ros.description import is_spatial, linkage_content, linkage_notes, read_closure
+from linkage_ros.description import linkage_content, linkage_notes, read_any_closure
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
     closes_in_two_ways,
@@ -40,6 +40,7 @@ from linkage_ros.kinematics import (
     Linkage,
     links_of,
     sides_at,
+    SpaceClosure,
     SpaceLinkage,
     Status,
     StepwiseClosure,
@@ -82,16 +83,17 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; an invalid file raises before this returns."""
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file)
-    if is_spatial(content):
-        from linkage_ros.cli.check_space import check_space  # local import: few ask for it
-
-        return check_space(content, file.stem, arguments)
-    closure = read_closure(content, file.stem)
+    closure = read_any_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
     units = arguments.angles.of_file(content.units)
     with show_progress('parts examined') as advance:
-        described, tables = describe_linkage(closure, advance)
+        if isinstance(closure, Closure):
+            described, tables = describe_linkage(closure, advance)
+        elif arguments.branches:
+            raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
+        else:
+            described, tables = _describe_space(closure)
         if arguments.branches:
             tables.append(_branches_table(closure))
             described |= tables_json(tables[-1:])
@@ -115,15 +117,15 @@ def describe_linkage(
     ]
     numbered = [(number, *one) for number, one in enumerate(groups, 1)]
     tables = [
-        Table('Solved in this order', ORDER, numbered, 'groups'),
+        Table('Solved in this order', _ORDER, numbered, 'groups'),
         _four_bars_table(closure),
     ]
     account = _structure_json(closure) | {'groups': [one._asdict() for one in groups]}
     account |= tables_json(tables[1:])
     # Most of the time goes by here.
     parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
-        *(examine_reach, examine_residual, _other_assemblies),
-        *(transmission_table, _conditioning_table),
+        *(_examine_reach, _examine_residual, _other_assemblies),
+        *(_transmission_table, _conditioning_table),
     )
     for index, part in enumerate(parts):
         advance(index, len(parts))
@@ -153,12 +155,12 @@ def _structure_json(closure: Closure) -> dict[str, Any]:
             | {key: getattr(given, key) or None for key in ('slider', 'parent', 'child')}
             for given in linkage.inputs
         ],
-        'limits': limits_json(linkage),
+        'limits': _limits_json(linkage),
         'unwrapped': _counts_turns(closure),
     }
 
 
-def limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
+def _limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
     """Return the limits of the joints that have any, in SI units."""
     units = {name: joint.unit for name, joint in linkage.joints.items()}
     units |= {given.joint: given.unit for given in linkage.inputs}
@@ -196,7 +198,7 @@ def _counts_turns(closure: Closure) -> bool:
     return is_iterated(closure) or any(number == 1 for number in crossed)
 
 
-def examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
+def _examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
     """Return ranges and singular inputs; None if they depend on several inputs."""
     if sweep is None:
         return {'ranges': None, 'singular_inputs': None}
@@ -229,7 +231,7 @@ def _is_reached(sweep: InputSweep, value: float) -> bool:
     return not sweep.closure.bounds or any(sweep.range_about(value + turn) for turn in turns)
 
 
-def examine_residual(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+def _examine_residual(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
     """Return the worst residual; None if the loops close nowhere on a grid."""
     found = worst_residual(closure)
     if found is None:
@@ -311,6 +313,33 @@ def _assembly_text(dyad: Dyad, side: str) -> str:
     return f'slider {closing_name(dyad)}: pin {pin} {side} of {first.name}'
 
 
+def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]:
+    """Return the description of a spatial linkage as JSON holds it, and its tables."""
+    linkage, freedom = closure.linkage, closure.freedom
+    sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
+    rows = [(number, *group) for number, group in enumerate(closure.groups, 1)]
+    tables = [
+        Table('Solved in this order', _ORDER, rows, 'groups'),
+        _transmission_table(closure, sweep),
+    ]
+    return {
+        'moving_links': len(linkage.link_names) - 1,
+        'hinges': len(linkage.hinges),
+        'slides': len(linkage.slides),
+        'balls': closure.ball_count,
+        'struts': len(linkage.struts),
+        'degrees_of_freedom': freedom.mobility,
+        'redundant_equations': freedom.redundant,
+        'spinning_rods': list(closure.idle),
+        'unwrapped': False,
+        'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
+        'limits': _limits_json(linkage),
+        **_examine_reach(closure, sweep),
+        **_examine_residual(closure, sweep),
+        **tables_json(tables),
+    }, tables
+
+
 # The same as tables.
 
 
@@ -327,7 +356,7 @@ def _margin_text(margin: float, units: DisplayUnits) -> str:
 
 
 _GROUP, _LINKS = Column('>', 'group'), Column('links', 'links', form=_join)
-ORDER = (
+_ORDER = (
     Column('>', 'number'),
     Column('group', 'kind'),
     _LINKS,
@@ -348,10 +377,11 @@ def _linkage_tables(
     account: Mapping[str, Any], tables: Sequence[Table], units: DisplayUnits
 ) -> Iterator[Table]:
     """Yield the tables that describe a linkage."""
-    yield facts_table(account['file'], _linkage_facts(account, units))
+    facts = _linkage_facts if 'loops' in account else _spatial_facts
+    yield facts_table(account['file'], facts(account, units))
     yield tables[0]
     input_units = [given['unit'] for given in account['inputs']]
-    for group in account['other_assemblies']:
+    for group in account.get('other_assemblies', ()):
         yield _assemblies_table(group, input_units, units)
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 
@@ -368,7 +398,7 @@ def _four_bars_table(closure: Closure) -> Table:
     return Table(title, _FOUR_BAR, rows, 'four_bars')
 
 
-def transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
+def _transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
     """Return the extreme transmission angles over the range, by group."""
 
     def angle(value: float | None, units: DisplayUnits) -> str:
@@ -462,10 +492,27 @@ def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
             else f'angle of {given["child"]} to {given["parent"]}'
         )
         yield 'input', f'{given["joint"]}: {driven}'
-    yield from reach_facts(account, units)
+    yield from _reach_facts(account, units)
 
 
-def reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
+def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
+    yield 'moving links', str(account['moving_links'])
+    kinds = ('hinges', 'slides', 'balls', 'struts')
+    yield 'joints', ', '.join(f'{account[kind]} {kind}' for kind in kinds if account[kind])
+    yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
+    if account['spinning_rods']:
+        yield 'rods that may spin', ', '.join(account['spinning_rods'])
+    for given in account['inputs']:
+        turns = given['unit'] == 'rad'
+        unit = 'angle' if turns else f'length [{units.length}]'
+        yield 'input', f'{given["joint"]}: {unit}'
+    if account['redundant_equations']:
+        met = 'equations, met within the worst residual'
+        yield 'redundant', f'{account["redundant_equations"]} {met}'
+    yield from _reach_facts(account, units)
+
+
+def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     """Yield the limits, the range, its singular places and the worst residual."""
     for limits in account['limits']:
         yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'

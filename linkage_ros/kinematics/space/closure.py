@@ -21,7 +21,7 @@ from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
-    Frame,
+    SpaceFrame,
     length,
     minus,
     scale,
@@ -209,7 +209,7 @@ class SpaceClosure(StepwiseClosure):
         return max(errors)
 
     def _carried_place(self, position: Position, link: str, point: str) -> Vector:
-        frame: Frame = position.state.pins[self._plan.frames[link]]
+        frame: SpaceFrame = position.state.pins[self._plan.frames[link]]
         return frame.place(self._plan.pose_frames[link].locate(self._plan.places[point]))
 
     def _check_pose(self, what: str, position: Position) -> None:

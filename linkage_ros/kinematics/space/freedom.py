@@ -69,7 +69,7 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
             )
             along: Array = plan.scale * between / np.linalg.norm(between)
             return np.asarray(along @ (at_other - at_one))
-        joint = linkage.between[name]
+        joint = linkage.pair_joints[name]
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         if name in linkage.hinges:
             return np.asarray(axis @ (spin(joint.child) - spin(joint.parent)))
@@ -77,7 +77,7 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         moving = velocity(joint.child, at) - velocity(joint.parent, at)
         return np.asarray(plan.scale * axis @ moving)
 
-    for name, joint in linkage.between.items():
+    for name, joint in linkage.pair_joints.items():
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         across = np.eye(3) - np.outer(axis, axis)
         turning = spin(joint.child) - spin(joint.parent)
@@ -86,7 +86,7 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         moving = velocity(joint.child, at) - velocity(joint.parent, at)
         hinge = name in linkage.hinges
         rows += [across @ turning, moving] if hinge else [turning, across @ moving]
-    needed = 5 * len(linkage.between)
+    needed = 5 * len(linkage.pair_joints)
     for point, links_at in plan.carriers.items():
         if point not in linkage.points:
             continue
@@ -132,7 +132,7 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             f'{away}drive another joint, or hold what is free',
         )  # fmt: skip
     for name in linkage.driven:
-        if name in linkage.between and _is_in_no_loop(linkage, name):
+        if name in linkage.pair_joints and _is_in_no_loop(linkage, name):
             raise DefinitionError('input', f'{quote(name)} is in no loop', 'leave its link out')
     if freedom.dependent and not freedom.mobility:
         raise DefinitionError(
@@ -156,8 +156,8 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
 
 def _is_in_no_loop(linkage: SpaceLinkage, name: str) -> bool:
     """Return whether nothing but a joint leads from its child to its parent."""
-    joint, reached = linkage.between[name], {linkage.between[name].child}
-    ways = [{one.parent, one.child} for one in linkage.between.values() if one is not joint]
+    joint, reached = linkage.pair_joints[name], {linkage.pair_joints[name].child}
+    ways = [{one.parent, one.child} for one in linkage.pair_joints.values() if one is not joint]
     for point in (*linkage.points, *linkage.struts):
         ends = linkage.struts.get(point, (point,))
         ways.append({link for link, of in linkage.links.items() if not set(ends).isdisjoint(of)})

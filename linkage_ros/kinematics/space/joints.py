@@ -17,23 +17,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.kinematics.arithmetic import cos, sin
-from linkage_ros.kinematics.space.vectors import cross, Frame, minus, Motion, plus, scale, Vector
+from linkage_ros.kinematics.space.vectors import cross, SpaceFrame, minus, Twist, plus, scale, Vector
 from linkage_ros.kinematics.step import LinkState
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class LowerPair:
     """A joint on a link whose frame is ``pins[parent]``; the seat is in that frame."""
 
     parent: int
-    seat: Frame
+    seat: SpaceFrame
 
-    def base(self, solved: LinkState) -> Frame:
+    def base(self, solved: LinkState) -> SpaceFrame:
         """Return the frame of the child where the joint is 0."""
         on, seat = solved.pins[self.parent], self.seat
-        return Frame(on.turn(seat.x), on.turn(seat.y), on.turn(seat.z), on.place(seat.origin))
+        return SpaceFrame(on.turn(seat.x), on.turn(seat.y), on.turn(seat.z), on.place(seat.origin))
 
-    def child_frame(self, base: Frame, value: float) -> Frame:
+    def child_frame(self, base: SpaceFrame, value: float) -> SpaceFrame:
         """Return the frame of the child at a value of the joint."""
         raise NotImplementedError
 
@@ -42,73 +42,73 @@ class Joint:
         raise NotImplementedError
 
     def motion(
-        self, solved: LinkState, velocities: LinkState, frame: Frame, rate: float
-    ) -> Motion:
+        self, solved: LinkState, velocities: LinkState, frame: SpaceFrame, rate: float
+    ) -> Twist:
         """Return the motion of the child, whose frame is given, at a rate of the joint."""
         on = velocities.pins[self.parent]
         arm = minus(frame.origin, solved.pins[self.parent].origin)
-        return self._add_rate(Motion(on.spin, on.velocity(arm)), frame.z, rate)
+        return self._add_rate(Twist(on.spin, on.velocity(arm)), frame.z, rate)
 
     def change(
         self,
         solved: LinkState,
         velocities: LinkState,
         accelerations: LinkState,
-        frame: Frame,
+        frame: SpaceFrame,
         rate: float,
         acceleration: float,
-    ) -> Motion:
+    ) -> Twist:
         """Return the derivative of the motion of the child."""
         on, change = velocities.pins[self.parent], accelerations.pins[self.parent]
         arm = minus(frame.origin, solved.pins[self.parent].origin)
-        carried = Motion(change.spin, on.acceleration(change, arm))
+        carried = Twist(change.spin, on.acceleration(change, arm))
         turned = self._turned_rate(cross(on.spin, scale(rate, frame.z)))
-        carried = Motion(plus(carried.spin, turned.spin), plus(carried.origin, turned.origin))
+        carried = Twist(plus(carried.spin, turned.spin), plus(carried.origin, turned.origin))
         return self._add_rate(carried, frame.z, acceleration)
 
-    def _add_rate(self, motion: Motion, axis: Vector, rate: float) -> Motion:
+    def _add_rate(self, motion: Twist, axis: Vector, rate: float) -> Twist:
         raise NotImplementedError
 
-    def _turned_rate(self, change: Vector) -> Motion:
+    def _turned_rate(self, change: Vector) -> Twist:
         """Return what the parent's turning adds: ``change`` is that of the rate's vector."""
         raise NotImplementedError
 
 
-class Hinge(Joint):
+class HingePair(LowerPair):
     """A joint that turns the child, by an angle in [rad]."""
 
     __slots__ = ()
 
-    def child_frame(self, base: Frame, value: float) -> Frame:
+    def child_frame(self, base: SpaceFrame, value: float) -> SpaceFrame:
         x, y, z, origin = base
         c, s = cos(value), sin(value)
-        return Frame(plus(scale(c, x), scale(s, y)), minus(scale(c, y), scale(s, x)), z, origin)
+        return SpaceFrame(plus(scale(c, x), scale(s, y)), minus(scale(c, y), scale(s, x)), z, origin)
 
     def slope(self, axis: Vector, arm: Vector) -> Vector:
         return cross(axis, arm)
 
-    def _add_rate(self, motion: Motion, axis: Vector, rate: float) -> Motion:
-        return Motion(plus(motion.spin, scale(rate, axis)), motion.origin)
+    def _add_rate(self, motion: Twist, axis: Vector, rate: float) -> Twist:
+        return Twist(plus(motion.spin, scale(rate, axis)), motion.origin)
 
-    def _turned_rate(self, change: Vector) -> Motion:
-        return Motion(change, (0.0, 0.0, 0.0))
+    def _turned_rate(self, change: Vector) -> Twist:
+        return Twist(change, (0.0, 0.0, 0.0))
 
 
-class Slide(Joint):
+class SlidePair(LowerPair):
     """A joint that moves the child along, by a length."""
 
     __slots__ = ()
 
-    def child_frame(self, base: Frame, value: float) -> Frame:
+    def child_frame(self, base: SpaceFrame, value: float) -> SpaceFrame:
         x, y, z, origin = base
-        return Frame(x, y, z, plus(origin, scale(value, z)))
+        return SpaceFrame(x, y, z, plus(origin, scale(value, z)))
 
     def slope(self, axis: Vector, arm: Vector) -> Vector:
         return axis
 
-    def _add_rate(self, motion: Motion, axis: Vector, rate: float) -> Motion:
-        return Motion(motion.spin, plus(motion.origin, scale(rate, axis)))
+    def _add_rate(self, motion: Twist, axis: Vector, rate: float) -> Twist:
+        return Twist(motion.spin, plus(motion.origin, scale(rate, axis)))
 
-    def _turned_rate(self, change: Vector) -> Motion:
+    def _turned_rate(self, change: Vector) -> Twist:
         # Twice: the axis turns, and the arm of the child's origin grows.
-        return Motion((0.0, 0.0, 0.0), scale(2.0, change))
+        return Twist((0.0, 0.0, 0.0), scale(2.0, change))

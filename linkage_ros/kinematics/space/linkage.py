@@ -99,14 +99,14 @@ class SpaceLinkage:
     traced: tuple[str, ...] = ()
 
     @cached_property
-    def between(self) -> dict[str, SpatialJoint]:
+    def pair_joints(self) -> dict[str, SpatialJoint]:
         """Return the hinges and slides by name."""
         return {**self.hinges, **self.slides}
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
         """Return all links, the ground first."""
-        ends = (end for joint in self.between.values() for end in (joint.parent, joint.child))
+        ends = (end for joint in self.pair_joints.values() for end in (joint.parent, joint.child))
         return tuple(dict.fromkeys((GROUND, *self.links, *ends)))
 
     @cached_property
@@ -141,12 +141,12 @@ class SpaceLinkage:
         if name in self.struts:
             one, other = self.struts[name]
             return dist(self.points[one], self.points[other])
-        return self.between[name].value
+        return self.pair_joints[name].value
 
     def _as_input(self, name: str) -> Input:
         if name in self.struts:
             return Input(name, slider=name)
-        joint = self.between[name]
+        joint = self.pair_joints[name]
         slider = name if name in self.slides else ''
         return Input(name, joint.parent, joint.child, slider, joint.limits)
 
@@ -188,7 +188,7 @@ def check_space_linkage(linkage: SpaceLinkage) -> None:
 def _check_held(linkage: SpaceLinkage) -> None:
     """Refuse a link that a single ball holds, and a point that nothing carries."""
     carried = Counter(point for points in linkage.links.values() for point in points)
-    ends = {end for joint in linkage.between.values() for end in (joint.parent, joint.child)}
+    ends = {end for joint in linkage.pair_joints.values() for end in (joint.parent, joint.child)}
     for link, points in linkage.links.items():
         if link in ends or link == GROUND:
             continue
@@ -214,7 +214,7 @@ def _check_held(linkage: SpaceLinkage) -> None:
 
 def _check_driven(linkage: SpaceLinkage) -> None:
     """Refuse inputs, published joints and ratios that name no joint."""
-    names = (*linkage.between, *linkage.struts)
+    names = (*linkage.pair_joints, *linkage.struts)
     for key, chosen in (('input', linkage.driven), ('joints', linkage.published)):
         for name in chosen:
             _check_name(key, name, 'joint', names)
@@ -224,7 +224,7 @@ def _check_driven(linkage: SpaceLinkage) -> None:
         raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
     for name, ratio in linkage.ratios.items():
         key = f'ratios.{name}'
-        _check_name(key, name, 'hinge or slide', linkage.between)
+        _check_name(key, name, 'hinge or slide', linkage.pair_joints)
         _check_name(f'{key}.of', ratio.of, 'joint', names)
         if name in linkage.driven:
             reason = f'{quote(name)} is an input, which follows no joint'

@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
-from linkage_ros.kinematics.space.joints import Hinge, Joint, Slide
+from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.steps import (
     AimedHinge,
@@ -54,7 +54,7 @@ from linkage_ros.kinematics.space.steps import (
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
-    Frame,
+    SpaceFrame,
     GROUND_FRAME,
     length,
     minus,
@@ -110,7 +110,7 @@ class SpacePlan:
         }
         self.frames: dict[str, int] = {}
         """Indices, among the pins, of the frames of links that are known."""
-        self.pose_frames: dict[str, Frame] = {GROUND: GROUND_FRAME}
+        self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
         self.placed_by: dict[str, str] = {}
@@ -144,7 +144,7 @@ class SpacePlan:
         for link, points in linkage.links.items():
             for point in points:
                 self._carry(point, link)
-        for name, joint in linkage.between.items():
+        for name, joint in linkage.pair_joints.items():
             self._axes[name] = _unit(joint.axis)
             if name in linkage.slides:
                 continue
@@ -196,7 +196,7 @@ class SpacePlan:
     @property
     def rods(self) -> list[str]:
         """Return the links of points on one line that no joint holds: they may spin."""
-        joints = self._linkage.between.values()
+        joints = self._linkage.pair_joints.values()
         held = {end for joint in joints for end in (joint.parent, joint.child)}
         return [
             link
@@ -232,9 +232,9 @@ class SpacePlan:
         """Add the next step; False if there is none."""
         return (
             any(map(self._follow, self._linkage.ratios))
-            or any(map(self._give, self._linkage.between))
-            or any(map(self._aim, self._linkage.between))
-            or any(map(self._close, self._linkage.between))
+            or any(map(self._give, self._linkage.pair_joints))
+            or any(map(self._aim, self._linkage.pair_joints))
+            or any(map(self._close, self._linkage.pair_joints))
             or any(map(self._frame, self._unknown_links()))
             or any(map(self._place_point, self.carriers))
             or any(map(self._translate, self._unknown_links()))
@@ -244,7 +244,7 @@ class SpacePlan:
 
     def _ends(self, name: str) -> tuple[str, str] | None:
         """Return the known and the unknown link of a joint; None if there are not one of each."""
-        joint = self._linkage.between[name]
+        joint = self._linkage.pair_joints[name]
         ends = sorted((joint.parent, joint.child), key=lambda link: link not in self.frames)
         known, unknown = ends
         if known in self.frames and unknown not in self.frames:
@@ -253,7 +253,7 @@ class SpacePlan:
 
     def _axis_to(self, name: str, child: str) -> Vector:
         """Return the axis of a joint, reversed if the child is its parent in the file."""
-        joint = self._linkage.between[name]
+        joint = self._linkage.pair_joints[name]
         return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
 
     def _value(self, name: str) -> float:
@@ -266,7 +266,7 @@ class SpacePlan:
 
     def _make_joint(
         self, name: str, parent: str, child: str, toward: Vector | None = None
-    ) -> tuple[Joint, Frame]:
+    ) -> tuple[LowerPair, SpaceFrame]:
         """Return a joint on a known link, and the frame of its child in the pose."""
         z = self._axis_to(name, child)
         if name in self._linkage.hinges:
@@ -280,16 +280,16 @@ class SpacePlan:
             ways = (x, y, scale(-1.0, x), scale(-1.0, y))
             x = max(ways, key=lambda way: dot(way, arm))
         # The seat does not turn with the joint: the child turns or moves from it by the value.
-        kind = Slide if self._slides(name) else Hinge
+        kind = SlidePair if self._slides(name) else HingePair
         origin = minus(at, scale(self._value(name), z)) if self._slides(name) else at
-        base = Frame(x, cross(z, x), z, origin)
+        base = SpaceFrame(x, cross(z, x), z, origin)
         on = self.pose_frames[parent]
         x, y, z = (_clean(on.resolve(axis)) for axis in base[:3])
-        seat = Frame(x, y, z, on.locate(base.origin))
+        seat = SpaceFrame(x, y, z, on.locate(base.origin))
         joint = kind(self.frames[parent], seat)
         return joint, joint.child_frame(base, self._value(name))
 
-    def _set_frame(self, link: str, frame: Frame, by: str = '') -> int:
+    def _set_frame(self, link: str, frame: SpaceFrame, by: str = '') -> int:
         """Keep the frame of a link that the next step appends; return its index."""
         self.frames[link], self.pose_frames[link] = self._pin_count, frame
         self.placed_by[link] = by
@@ -334,7 +334,7 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         slides, axis = self._slides(name), self._axis_to(name, ends[1])
-        at = self._linkage.between[name].at
+        at = self._linkage.pair_joints[name].at
         for point in filter(self._is_known, self.carried[ends[1]]):
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             if not slides and length(cross(axis, arm)) < _SQUARE * length(arm):
@@ -346,7 +346,7 @@ class SpacePlan:
             place = frame.locate(self.places[point])
             index = self._set_frame(ends[1], frame, name)
             self._new_coordinate(name)
-            if isinstance(joint, Hinge):
+            if isinstance(joint, HingePair):
                 direction = self._direction(joint, frame, place, name, point)
                 self._add(AimedHinge(joint, direction, to, index), coordinates=1, pins=1)
             else:
@@ -357,7 +357,7 @@ class SpacePlan:
         return False
 
     def _direction(
-        self, joint: Hinge, frame: Frame, place: Vector, name: str, point: str, angle: float = 0.0
+        self, joint: HingePair, frame: SpaceFrame, place: Vector, name: str, point: str, angle: float = 0.0
     ) -> float:
         """Return the direction of a carried point at 0, with the turns of the pose."""
         base = self._pose_base(joint)
@@ -366,7 +366,7 @@ class SpacePlan:
         found = atan2(y, x) - direction + angle
         return direction + tau * round((found - self._value(name)) / tau)
 
-    def _pose_base(self, joint: Joint) -> Frame:
+    def _pose_base(self, joint: LowerPair) -> SpaceFrame:
         link = next(link for link, index in self.frames.items() if index == joint.parent)
         state = LinkState([], [])
         state.pins.extend([None] * joint.parent + [self.pose_frames[link]])
@@ -392,7 +392,7 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         best, choice = _SQUARE, None
-        axis, at = self._axis_to(name, ends[1]), self._linkage.between[name].at
+        axis, at = self._axis_to(name, ends[1]), self._linkage.pair_joints[name].at
         for point in self.carried[ends[1]]:
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             slope = axis if self._slides(name) else cross(axis, arm)
@@ -409,7 +409,7 @@ class SpacePlan:
         place = _clean(frame.locate(self.places[point]))
         index = self._set_frame(ends[1], frame, name)
         self._new_coordinate(name)
-        if isinstance(joint, Hinge):
+        if isinstance(joint, HingePair):
             radius = hypot(place[0], place[1])
             plain = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
             # Where 0 lies among the whole turns follows from the value in the pose.
@@ -538,7 +538,7 @@ class SpacePlan:
 
     def _add_resolved(self, names: tuple[str, ...], root: str, point: int, place: Vector) -> None:
         """Measure the slides that lead from a link to a point."""
-        on, chain = self.pose_frames[root], self._linkage.between
+        on, chain = self.pose_frames[root], self._linkage.pair_joints
         link, axes = root, []
         for name in names:
             joint = chain[name]
@@ -557,9 +557,9 @@ class SpacePlan:
 
     def measure_joint(self, name: str) -> Any:
         """Return the step that measures a hinge between known links."""
-        spatial: SpatialJoint = self._linkage.between[name]
+        spatial: SpatialJoint = self._linkage.pair_joints[name]
         joint, frame = self._make_joint(name, spatial.parent, spatial.child)
-        assert isinstance(joint, Hinge)
+        assert isinstance(joint, HingePair)
         # The x axis of the seat, turned with the child.
         mark = _clean(self.pose_frames[spatial.child].resolve(frame.x))
         return MeasuredHinge(joint, mark, self.frames[spatial.child])
@@ -583,7 +583,7 @@ class SpacePlan:
                 step = MeasuredStrut((one, other), self.coordinates[name])
                 self._add(step, coordinates=1)
             else:
-                joint = linkage.between[name]
+                joint = linkage.pair_joints[name]
                 if joint.parent not in self.frames or joint.child not in self.frames:
                     self.lost.append(name)
                     continue

@@ -27,17 +27,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt
-from linkage_ros.kinematics.space.joints import Hinge, Joint
+from linkage_ros.kinematics.space.joints import HingePair, LowerPair
 from linkage_ros.kinematics.space.vectors import (
     add,
     cross,
     dot,
-    Frame,
+    SpaceFrame,
     GROUND_FRAME,
     hypotenuse,
     length,
     minus,
-    Motion,
+    Twist,
     plus,
     scale,
     STILL,
@@ -147,7 +147,7 @@ class GroundStep(LinearStep):
 class GivenJoint:
     """A joint whose value is known; its child is placed."""
 
-    joint: Joint
+    joint: LowerPair
     coordinate: int  # Index of its value among the coordinates
     child: int  # Index of the child's frame among the pins
 
@@ -244,7 +244,7 @@ class ShiftedPoint:
         """Append its acceleration."""
         offset = solved.pins[self.link].turn(self.offset)
         motion, change = velocities.pins[self.link], accelerations.pins[self.link]
-        turning = Motion(motion.spin, ZERO).acceleration(Motion(change.spin, ZERO), offset)
+        turning = Twist(motion.spin, ZERO).acceleration(Twist(change.spin, ZERO), offset)
         accelerations.pins.append(plus(accelerations.pins[self.beside], turning))
 
 
@@ -252,7 +252,7 @@ class ShiftedPoint:
 class ClosedJoint:
     """A joint whose child carries a point at a known distance from a known point."""
 
-    joint: Joint
+    joint: LowerPair
     place: Vector  # The carried point in the frame of the child
     to: int  # Index of the known point among the pins
     rod: Rod
@@ -263,7 +263,7 @@ class ClosedJoint:
         """Append the joint and the frame of the child."""
         raise NotImplementedError
 
-    def _append(self, solved: LinkState, base: Frame, value: float) -> None:
+    def _append(self, solved: LinkState, base: SpaceFrame, value: float) -> None:
         solved.coordinates.append(value)
         solved.pins.append(self.joint.child_frame(base, value))
 
@@ -305,7 +305,7 @@ class ClosedJoint:
             self.joint.change(solved, velocities, accelerations, frame, rate, change)
         )
 
-    def _rod_vector(self, solved: LinkState, frame: Frame, arm: Vector) -> Vector:
+    def _rod_vector(self, solved: LinkState, frame: SpaceFrame, arm: Vector) -> Vector:
         return minus(plus(frame.origin, arm), solved.pins[self.to])
 
     def transmission_angle(self, pose: ClosedPose) -> float:
@@ -371,7 +371,7 @@ class ClosedSlide(ClosedJoint):
 class AimedHinge:
     """A hinge whose child carries a point that is known already."""
 
-    joint: Hinge
+    joint: HingePair
     direction: float  # Of the point where the hinge is 0, in [rad]; with whole turns
     to: int
     child: int
@@ -529,7 +529,7 @@ class FramedLink:
     def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
         """Append the motion."""
         start, one, other = self._edges(velocities)
-        velocities.pins.append(Motion(self._spin(solved, one, other), start))
+        velocities.pins.append(Twist(self._spin(solved, one, other), start))
 
     def accelerations(
         self,
@@ -544,7 +544,7 @@ class FramedLink:
         spin = velocities.pins[self.link].spin
         _, first, second = self._edges(velocities)
         one, other = minus(one, cross(spin, first)), minus(other, cross(spin, second))
-        accelerations.pins.append(Motion(self._spin(solved, one, other), start))
+        accelerations.pins.append(Twist(self._spin(solved, one, other), start))
 
     def _edges(self, state: LinkState) -> tuple[Vector, Vector, Vector]:
         start, one, other = (state.pins[index] for index in self.points)
@@ -561,19 +561,19 @@ class FramedLink:
         return scale(1.0 / dot(normal, normal), spin)
 
 
-def frame_of(origin: Vector, one: Vector, other: Vector) -> Frame:
+def frame_of(origin: Vector, one: Vector, other: Vector) -> SpaceFrame:
     """Return the frame with x along an edge, and y on the side of another."""
     x = scale(1.0 / length(one), one)
     up = cross(x, other)
     z = scale(1.0 / length(up), up)
-    return Frame(x, cross(z, x), z, origin)
+    return SpaceFrame(x, cross(z, x), z, origin)
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredHinge:
     """A hinge between two links whose frames are known."""
 
-    joint: Hinge
+    joint: HingePair
     mark: Vector  # The vector of the child that is the x axis of the seat where the hinge is 0
     child: int
 
@@ -655,13 +655,13 @@ class MeasuredStrut:
 
     def close(self, solved: LinkState) -> StepPose:
         """Append the length."""
-        solved.coordinates.append(length(self._between(solved)))
+        solved.coordinates.append(length(self._strut_vector(solved)))
         return PLACED
 
     def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
         """Append the rate."""
         size = solved.coordinates[self.coordinate]
-        rate = dot(self._between(solved), self._between(velocities)) / size
+        rate = dot(self._strut_vector(solved), self._strut_vector(velocities)) / size
         velocities.coordinates.append(rate)
 
     def accelerations(
@@ -673,12 +673,12 @@ class MeasuredStrut:
         accelerations: LinkState,
     ) -> None:
         """Append the acceleration: what turns across the strut adds v²/L."""
-        between, slip = self._between(solved), self._between(velocities)
+        between, slip = self._strut_vector(solved), self._strut_vector(velocities)
         size = solved.coordinates[self.coordinate]
         across = scale(1.0 / size, cross(between, slip))
-        pull = dot(between, self._between(accelerations))
+        pull = dot(between, self._strut_vector(accelerations))
         accelerations.coordinates.append(add(pull, dot(across, across)) / size)
 
-    def _between(self, state: LinkState) -> Vector:
+    def _strut_vector(self, state: LinkState) -> Vector:
         one, other = (state.pins[index] for index in self.points)
         return minus(other, one)

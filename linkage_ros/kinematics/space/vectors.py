@@ -22,7 +22,7 @@ Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-class Frame(NamedTuple):
+class SpaceFrame(NamedTuple):
     """The axes and the origin of a link, in the frame of the ground."""
 
     x: Vector
@@ -48,10 +48,10 @@ class Frame(NamedTuple):
         return self.resolve(minus(point, self.origin))
 
 
-GROUND_FRAME = Frame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), ZERO)
+GROUND_FRAME = SpaceFrame((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), ZERO)
 
 
-class Motion(NamedTuple):
+class Twist(NamedTuple):
     """The spin of a link and the velocity of its origin; or their derivatives."""
 
     spin: Vector
@@ -61,12 +61,12 @@ class Motion(NamedTuple):
         """Return the velocity of a point, by its arm from the origin."""
         return plus(self.origin, cross(self.spin, arm))
 
-    def acceleration(self, change: Motion, arm: Vector) -> Vector:
+    def acceleration(self, change: Twist, arm: Vector) -> Vector:
         """Return the acceleration of a point, if ``change`` is the derivative of the motion."""
         return plus(change.velocity(arm), cross(self.spin, cross(self.spin, arm)))
 
 
-STILL = Motion(ZERO, ZERO)
+STILL = Twist(ZERO, ZERO)
 
 
 def is_zero(number: float) -> bool:

@@ -11,7 +11,7 @@ from math import atan2, cos, dist, hypot, pi, sin, sqrt
 from random import Random
 
 from linkage_ros.kinematics import Status
-from linkage_ros.kinematics.space.joints import Hinge, Slide
+from linkage_ros.kinematics.space.joints import HingePair, SlidePair
 from linkage_ros.kinematics.space.steps import ClosedHinge, ClosedSlide, Rod, ThreeDistances
 from linkage_ros.kinematics.space.vectors import GROUND_FRAME, STILL
 from linkage_ros.kinematics.step import LinkState
@@ -66,7 +66,7 @@ def test_a_hinge_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
         else:
             rod = sqrt(d * d + r * r - 2.0 * r * d * cos(apart) + height * height)
         step = ClosedHinge(
-            Hinge(0, GROUND_FRAME), tuple(place), 1, Rod(rod), float(sign), 2, r,
+            HingePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), float(sign), 2, r,
             atan2(place[1], place[0]),
         )  # fmt: skip
         case = (place, to, rod)
@@ -89,7 +89,7 @@ def test_a_slide_closed_by_a_rod_is_as_exact_as_its_numbers(near, sign):
         place, to, velocity, change = (_point(random) for _ in range(4))
         distance = hypot(to[0] - place[0], to[1] - place[1])
         rod = distance * (1.0 + apart)
-        step = ClosedSlide(Slide(0, GROUND_FRAME), tuple(place), 1, Rod(rod), float(sign), 2)
+        step = ClosedSlide(SlidePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), float(sign), 2)
         case = (place, to, rod)
         pose, states = _run(step, [to], [velocity], [change])
         assert pose.status is Status.CLOSED, case
@@ -145,12 +145,12 @@ def test_status_and_gap_are_right_on_both_sides_of_a_toggle(apart):
         for rod, gap in (
             (low * (1.0 + apart), -low * apart), (high * (1.0 - apart), -high * apart)
         ):  # fmt: skip
-            hinge = ClosedHinge(Hinge(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2, r, 0.0)
+            hinge = ClosedHinge(HingePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2, r, 0.0)
             pose, _ = _run(hinge, [to], [(0.0, 0.0, 0.0)], [(0.0, 0.0, 0.0)])
             _check_status(pose, gap, rod)
         distance = hypot(to[0] - place[0], to[1] - place[1])
         rod = distance * (1.0 + apart)
-        slide = ClosedSlide(Slide(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2)
+        slide = ClosedSlide(SlidePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2)
         pose, _ = _run(slide, [to], [(0.0, 0.0, 0.0)], [(0.0, 0.0, 0.0)])
         _check_status(pose, -distance * apart, rod)
 
