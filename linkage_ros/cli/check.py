@@ -90,13 +90,13 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     with show_progress('parts examined') as advance:
         if isinstance(closure, Closure):
             described, tables = describe_linkage(closure, advance)
+            if arguments.branches:
+                tables.append(_branches_table(closure))
+                described |= tables_json(tables[-1:])
         elif arguments.branches:
             raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
         else:
             described, tables = _describe_space(closure)
-        if arguments.branches:
-            tables.append(_branches_table(closure))
-            described |= tables_json(tables[-1:])
     account = {'file': arguments.file, **described}
     show_result(Result(account, [*_linkage_tables(account, tables, units)]), arguments, units)
     return 0
@@ -498,7 +498,8 @@ def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
 def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     yield 'moving links', str(account['moving_links'])
     kinds = ('hinges', 'slides', 'balls', 'struts')
-    yield 'joints', ', '.join(f'{account[kind]} {kind}' for kind in kinds if account[kind])
+    counts = [(account[kind], kind) for kind in kinds if account[kind]]
+    yield 'joints', ', '.join(f'{n} {kind[:-1] if n == 1 else kind}' for n, kind in counts)
     yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
     if account['spinning_rods']:
         yield 'rods that may spin', ', '.join(account['spinning_rods'])

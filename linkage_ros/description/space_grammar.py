@@ -193,7 +193,6 @@ def linkage_schema() -> Schema:
     return {
         '$schema': DIALECT,
         'title': 'Linkage',
-        'type': 'object',
         '$defs': parts,
         'if': {'required': ['points']},
         'then': spatial,

@@ -11,24 +11,27 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import dist, sqrt
+from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.space.freedom import check_freedom, find_freedom, Freedom
 from linkage_ros.kinematics.space.linkage import check_space_linkage, size_of, SpaceLinkage
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
-    SpaceFrame,
     length,
     minus,
     scale,
+    SpaceFrame,
     Vector,
 )
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 from linkage_ros.kinematics.sweep_analysis import grid_positions
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.space.freedom import Freedom
 
 Quaternion = tuple[float, float, float, float]
 
@@ -73,6 +76,11 @@ class SpaceClosure(StepwiseClosure):
         self.turns_with = {}
         self._plan = plan = SpacePlan(linkage)
         self._set_linkage(linkage, name, plan.scale)
+        from linkage_ros.kinematics.space.freedom import (
+            check_freedom,  # local import: it loads numpy
+            find_freedom,  # local import: it loads numpy
+        )
+
         self.freedom: Freedom = find_freedom(linkage, plan)
         check_freedom(linkage, plan, self.freedom)
         self.groups = plan.groups

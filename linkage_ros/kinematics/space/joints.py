@@ -17,7 +17,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.kinematics.arithmetic import cos, sin
-from linkage_ros.kinematics.space.vectors import cross, SpaceFrame, minus, Twist, plus, scale, Vector
+from linkage_ros.kinematics.space.vectors import (
+    cross,
+    minus,
+    plus,
+    scale,
+    SpaceFrame,
+    Twist,
+    Vector,
+)
 from linkage_ros.kinematics.step import LinkState
 
 
@@ -82,7 +90,9 @@ class HingePair(LowerPair):
     def child_frame(self, base: SpaceFrame, value: float) -> SpaceFrame:
         x, y, z, origin = base
         c, s = cos(value), sin(value)
-        return SpaceFrame(plus(scale(c, x), scale(s, y)), minus(scale(c, y), scale(s, x)), z, origin)
+        return SpaceFrame(
+            plus(scale(c, x), scale(s, y)), minus(scale(c, y), scale(s, x)), z, origin
+        )
 
     def slope(self, axis: Vector, arm: Vector) -> Vector:
         return cross(axis, arm)

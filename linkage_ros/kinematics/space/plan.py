@@ -26,11 +26,12 @@ The pose gives the sign of each closed step.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import DefinitionError, list_names, quote
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
@@ -48,18 +49,17 @@ from linkage_ros.kinematics.space.steps import (
     MeasuredStrut,
     ResolvedSlides,
     Rod,
-    ShiftedPoint,
     ThreeDistances,
 )
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
-    SpaceFrame,
     GROUND_FRAME,
     length,
     minus,
     plus,
     scale,
+    SpaceFrame,
     Vector,
     ZERO,
 )
@@ -113,14 +113,11 @@ class SpacePlan:
         self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
-        self.placed_by: dict[str, str] = {}
-        """For each link the joint that places it, if one does."""
-        self._coordinate_count = 1 + len(linkage.driven)
-        self._pin_count = 0
         self._collect_points()
-        self._add(GroundStep(), pins=1)
+        self._state = LinkState([0.0, *map(self._value, linkage.driven)], [])
+        """The pose as the steps so far find it."""
         self.frames[GROUND] = 0
-        self.step_groups[0] = 0
+        self._add(GroundStep())
         while self._find_next():
             pass
         unknown = self._unknown_links()
@@ -183,11 +180,18 @@ class SpacePlan:
         self.carriers[point].append(link)
         self.carried[link].append(point)
 
-    def _add(self, step: Any, coordinates: int = 0, pins: int = 0) -> None:
+    def _add(self, step: Any) -> None:
+        if not step.close(self._state).status.has_pose:
+            raise DefinitionError(
+                'points', 'the linkage is at a toggle in the pose', 'draw another pose'
+            )
         self.steps.append(step)
         self.step_groups.append(len(self.groups))
-        self._coordinate_count += coordinates
-        self._pin_count += pins
+
+    @property
+    def _next_pin(self) -> int:
+        """Return the index of the pin that the next step appends."""
+        return len(self._state.pins)
 
     def axis_of(self, name: str) -> Vector:
         """Return the direction of a joint in the pose."""
@@ -224,8 +228,8 @@ class SpacePlan:
         if point not in self.points:
             link = next(link for link in self.carriers[point] if link in self.frames)
             place = _clean(self.pose_frames[link].locate(self.places[point]))
-            self.points[point] = self._pin_count
-            self._add(CarriedPoint(self.frames[link], place, self._pin_count), pins=1)
+            self.points[point] = self._next_pin
+            self._add(CarriedPoint(self.frames[link], place, self._next_pin))
         return self.points[point]
 
     def _find_next(self) -> bool:
@@ -289,11 +293,10 @@ class SpacePlan:
         joint = kind(self.frames[parent], seat)
         return joint, joint.child_frame(base, self._value(name))
 
-    def _set_frame(self, link: str, frame: SpaceFrame, by: str = '') -> int:
+    def _set_frame(self, link: str, frame: SpaceFrame) -> int:
         """Keep the frame of a link that the next step appends; return its index."""
-        self.frames[link], self.pose_frames[link] = self._pin_count, frame
-        self.placed_by[link] = by
-        return self._pin_count
+        self.frames[link], self.pose_frames[link] = self._next_pin, frame
+        return self._next_pin
 
     def _give(self, name: str) -> bool:
         """Place the link of a joint whose value is known."""
@@ -301,8 +304,8 @@ class SpacePlan:
         if ends is None or name not in self.coordinates:
             return False
         joint, frame = self._make_joint(name, *ends)
-        index = self._set_frame(ends[1], frame, name)
-        self._add(GivenJoint(joint, self.coordinates[name], index), pins=1)
+        index = self._set_frame(ends[1], frame)
+        self._add(GivenJoint(joint, self.coordinates[name], index))
         kind = 'input' if name in self._linkage.driven else 'joint'
         self._end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
         return True
@@ -312,9 +315,6 @@ class SpacePlan:
     ) -> None:
         self.groups.append(SpaceGroup(kind, links, method, assembly))
 
-    def _new_coordinate(self, name: str) -> None:
-        self.coordinates[name] = self._coordinate_count
-
     def _follow(self, name: str) -> bool:
         """Give a joint that follows a known one its value."""
         ratio = self._linkage.ratios[name]
@@ -322,9 +322,9 @@ class SpacePlan:
             return False
         own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
         of = self.coordinates[ratio.of]
-        self._new_coordinate(name)
+        self.coordinates[name] = len(self._state.coordinates)
         factor, offset = ratio.ratio * other / own, ratio.offset / own
-        self._add(FollowerJoint(name, of, 0, 0.0, factor, offset), coordinates=1)
+        self._add(FollowerJoint(name, of, 0, 0.0, factor, offset))
         self._end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
         return True
 
@@ -344,33 +344,23 @@ class SpacePlan:
             to = self._point_index(point)
             joint, frame = self._make_joint(name, *ends, self.places[point])
             place = frame.locate(self.places[point])
-            index = self._set_frame(ends[1], frame, name)
-            self._new_coordinate(name)
+            index = self._set_frame(ends[1], frame)
+            self.coordinates[name] = len(self._state.coordinates)
             if isinstance(joint, HingePair):
-                direction = self._direction(joint, frame, place, name, point)
-                self._add(AimedHinge(joint, direction, to, index), coordinates=1, pins=1)
+                x, y, _ = joint.base(self._state).locate(self.places[point])
+                direction = self._direction(place, atan2(y, x), name)
+                self._add(AimedHinge(joint, direction, to, index))
             else:
                 self._add_resolved((name,), ends[0], to, self.places[point])
-                self._add(GivenJoint(joint, self.coordinates[name], index), pins=1)
+                self._add(GivenJoint(joint, self.coordinates[name], index))
             self._end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
             return True
         return False
 
-    def _direction(
-        self, joint: HingePair, frame: SpaceFrame, place: Vector, name: str, point: str, angle: float = 0.0
-    ) -> float:
-        """Return the direction of a carried point at 0, with the turns of the pose."""
-        base = self._pose_base(joint)
-        x, y, _ = base.locate(self.places[point])
+    def _direction(self, place: Vector, found: float, name: str) -> float:
+        """Return the direction of a place, with the turns of the pose; it gives `found` with 0."""
         direction = atan2(place[1], place[0])
-        found = atan2(y, x) - direction + angle
-        return direction + tau * round((found - self._value(name)) / tau)
-
-    def _pose_base(self, joint: LowerPair) -> SpaceFrame:
-        link = next(link for link, index in self.frames.items() if index == joint.parent)
-        state = LinkState([], [])
-        state.pins.extend([None] * joint.parent + [self.pose_frames[link]])
-        return joint.base(state)
+        return direction + tau * round((found - direction - self._value(name)) / tau)
 
     def _distances(self, point: str) -> Iterator[_Pair]:
         """Yield the known points at known distances from a point."""
@@ -407,39 +397,23 @@ class SpacePlan:
         to = self._point_index(known)
         joint, frame = self._make_joint(name, *ends, self.places[known])
         place = _clean(frame.locate(self.places[point]))
-        index = self._set_frame(ends[1], frame, name)
-        self._new_coordinate(name)
+        index = self._set_frame(ends[1], frame)
+        self.coordinates[name] = len(self._state.coordinates)
         if isinstance(joint, HingePair):
             radius = hypot(place[0], place[1])
-            plain = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
+            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
             # Where 0 lies among the whole turns follows from the value in the pose.
-            found = self._closed_value(plain, known, point)
-            direction = atan2(place[1], place[0])
-            direction += tau * round((found - direction - self._value(name)) / tau)
-            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, direction)
+            trial = LinkState([*self._state.coordinates], [*self._state.pins])
+            if step.close(trial).status.has_pose:
+                found = trial.coordinates[-1]
+                step = replace(step, direction=self._direction(place, found, name))
         else:
             step = ClosedSlide(joint, place, to, bar, sign, index)
-        self._add(step, coordinates=1, pins=1)
+        self._add(step)
         side = '+' if sign > 0.0 else '-'
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
         self._end_group('closed', (ends[1],), method, f'{side}, as in the pose')
         return True
-
-    def _closed_value(self, step: ClosedHinge, known: str, point: str) -> float:
-        """Return the value of a closed hinge in the pose, if its direction is 0."""
-        state = LinkState([0.0] * self._coordinate_count, [ZERO] * self._pin_count)
-        for strut in self._linkage.struts:
-            if strut in self.coordinates:
-                state.coordinates[self.coordinates[strut]] = self._value(strut)
-        for link, index in self.frames.items():
-            if index < self._pin_count:
-                state.pins[index] = self.pose_frames[link]
-        state.pins[step.to] = self.places[known]
-        if not step.close(state).status.has_pose:
-            raise DefinitionError(
-                'points', f'{quote(point)} is at a toggle in the pose', 'draw another pose'
-            )
-        return state.coordinates[-1]
 
     # Links and points
 
@@ -452,7 +426,7 @@ class SpacePlan:
             if length(cross(one, other)) > 1e-3 * length(one) * length(other):
                 indices = tuple(map(self._point_index, names))
                 index = self._set_frame(link, frame_of(start, one, other))
-                self._add(FramedLink((indices[0], indices[1], indices[2]), index), pins=1)
+                self._add(FramedLink((indices[0], indices[1], indices[2]), index))
                 self._end_group('framed', (link,), f'by points {list_names(names)}')
                 return True
         return False
@@ -486,15 +460,18 @@ class SpacePlan:
                 if shifts and length(shifts[pair][1]):
                     root, offset = shifts[pair]
                     offset = _clean(self.pose_frames[root].resolve(offset))
-                    self._add(ShiftedPoint(to[-1], self.frames[root], offset), pins=1)
-                    to[-1] = self._pin_count - 1
+                    self._add(CarriedPoint(self.frames[root], offset, self._next_pin, to[-1]))
+                    to[-1] = self._next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
             lengths = tuple(pair.rod for pair in three)
-            self.points[point] = self._pin_count
+            self.points[point] = self._next_pin
             step = ThreeDistances(
-                (to[0], to[1], to[2]), (lengths[0], lengths[1], lengths[2]), sign, self._pin_count
+                (to[0], to[1], to[2]),
+                (lengths[0], lengths[1], lengths[2]),
+                sign,
+                self._next_pin,
             )
-            self._add(step, pins=1)
+            self._add(step)
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'
@@ -547,15 +524,15 @@ class SpacePlan:
         start = place
         for name, axis in zip(names, axes, strict=True):
             start = minus(start, scale(self._value(name), axis))
-            self._new_coordinate(name)
-            self._coordinate_count += 1
+        first = len(self._state.coordinates)
+        self.coordinates |= {name: first + number for number, name in enumerate(names)}
         duals = _dual_basis(axes)
         directions = tuple(_clean(on.resolve(dual)) for dual in duals)
         self._add(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
 
     # What is published
 
-    def measure_joint(self, name: str) -> Any:
+    def _measure_hinge(self, name: str) -> Any:
         """Return the step that measures a hinge between known links."""
         spatial: SpatialJoint = self._linkage.pair_joints[name]
         joint, frame = self._make_joint(name, spatial.parent, spatial.child)
@@ -579,9 +556,9 @@ class SpacePlan:
                     self.lost.append(name)
                     continue
                 one, other = map(self._point_index, ends)
-                self._new_coordinate(name)
+                self.coordinates[name] = len(self._state.coordinates)
                 step = MeasuredStrut((one, other), self.coordinates[name])
-                self._add(step, coordinates=1)
+                self._add(step)
             else:
                 joint = linkage.pair_joints[name]
                 if joint.parent not in self.frames or joint.child not in self.frames:
@@ -590,8 +567,8 @@ class SpacePlan:
                 if self._slides(name):
                     self._measure_slide(name, joint)
                 else:
-                    self._new_coordinate(name)
-                    self._add(self.measure_joint(name), coordinates=1)
+                    self.coordinates[name] = len(self._state.coordinates)
+                    self._add(self._measure_hinge(name))
             self._end_group('measured', (), name)
         for point in linkage.traced:
             if self._is_known(self.same[point]):
@@ -601,9 +578,9 @@ class SpacePlan:
     def _measure_slide(self, name: str, joint: SpatialJoint) -> None:
         child = joint.child
         place = self.places[self.carried[child][0]] if self.carried[child] else ZERO
-        point = self._pin_count
+        point = self._next_pin
         local = self.pose_frames[child].locate(place)
-        self._add(CarriedPoint(self.frames[child], local, point), pins=1)
+        self._add(CarriedPoint(self.frames[child], local, point))
         self._add_resolved((name,), joint.parent, point, place)
 
     @property

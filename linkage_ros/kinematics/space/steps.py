@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair
@@ -32,16 +32,16 @@ from linkage_ros.kinematics.space.vectors import (
     add,
     cross,
     dot,
-    SpaceFrame,
     GROUND_FRAME,
     hypotenuse,
     length,
     minus,
-    Twist,
     plus,
     scale,
+    SpaceFrame,
     STILL,
     subtract,
+    Twist,
     Vector,
     ZERO,
 )
@@ -65,12 +65,12 @@ class Rod(NamedTuple):
             return 0.0
         return self.length(solved) * velocities.coordinates[self.strut]
 
-    def bend(self, solved: LinkState, velocities: LinkState, accelerations: LinkState) -> float:
+    def bend(self, solved: LinkState, velocities: LinkState, changes: LinkState) -> float:
         """Return its second derivative."""
         if not self.strut:
             return 0.0
         rate = velocities.coordinates[self.strut]
-        return rate * rate + self.length(solved) * accelerations.coordinates[self.strut]
+        return rate * rate + self.length(solved) * changes.coordinates[self.strut]
 
 
 class ClosedPose(NamedTuple):
@@ -164,88 +164,48 @@ class GivenJoint:
         velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the derivative of the motion."""
         rate = velocities.coordinates[self.coordinate]
-        change = accelerations.coordinates[self.coordinate]
+        change = changes.coordinates[self.coordinate]
         frame = solved.pins[self.child]
-        accelerations.pins.append(
-            self.joint.change(solved, velocities, accelerations, frame, rate, change)
-        )
+        changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
 
 
 @dataclass(frozen=True, slots=True)
 class CarriedPoint:
-    """A point of a link, at a place in its frame."""
+    """A point at a place in the frame of a link; or beside another point, which it turns with."""
 
     link: int
     place: Vector
     point: int  # Index of the point among the pins
+    beside: int = 0  # Index of the other point; 0 for the origin of the link
 
     def close(self, solved: LinkState) -> StepPose:
         """Append the point."""
-        solved.pins.append(solved.pins[self.link].place(self.place))
+        solved.pins.append(self._base_of(solved).place(self.place))
         return PLACED
 
     def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
         """Append its velocity."""
-        velocities.pins.append(velocities.pins[self.link].velocity(self._arm(solved)))
+        velocities.pins.append(self._base_of(velocities).velocity(self._arm(solved)))
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append its acceleration."""
-        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
-        accelerations.pins.append(motion.acceleration(change, self._arm(solved)))
+        twist, change = self._base_of(velocities), self._base_of(changes)
+        changes.pins.append(twist.acceleration(change, self._arm(solved)))
+
+    def _base_of(self, state: LinkState) -> Any:
+        """Return the frame or the twist of the link, at the point that it starts from."""
+        of = state.pins[self.link]
+        return of._replace(origin=state.pins[self.beside]) if self.beside else of
 
     def _arm(self, solved: LinkState) -> Vector:
-        return minus(solved.pins[self.point], solved.pins[self.link].origin)
-
-
-@dataclass(frozen=True, slots=True)
-class ShiftedPoint:
-    """A point beside another, by a constant offset in the frame of a link."""
-
-    beside: int
-    link: int
-    offset: Vector
-
-    def close(self, solved: LinkState) -> StepPose:
-        """Append the point."""
-        offset = solved.pins[self.link].turn(self.offset)
-        solved.pins.append(plus(solved.pins[self.beside], offset))
-        return PLACED
-
-    def rates(self, _pose: StepPose, solved: LinkState, velocities: LinkState) -> None:
-        """Append its velocity."""
-        offset = solved.pins[self.link].turn(self.offset)
-        swept = cross(velocities.pins[self.link].spin, offset)
-        velocities.pins.append(plus(velocities.pins[self.beside], swept))
-
-    def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
-    ) -> None:
-        """Append its acceleration."""
-        offset = solved.pins[self.link].turn(self.offset)
-        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
-        turning = Twist(motion.spin, ZERO).acceleration(Twist(change.spin, ZERO), offset)
-        accelerations.pins.append(plus(accelerations.pins[self.beside], turning))
+        start = solved.pins[self.beside] if self.beside else solved.pins[self.link].origin
+        return minus(solved.pins[self.point], start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,25 +245,18 @@ class ClosedJoint:
         return ClosedRates(rate, arm, slope, plus(slip, scale(rate, slope)))
 
     def accelerations(
-        self,
-        pose: ClosedPose,
-        rates: ClosedRates,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, pose: Any, rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇²."""
         frame, motion = solved.pins[self.child], velocities.pins[self.child]
         rate, arm, _, slip = rates
-        before = self.joint.change(solved, velocities, accelerations, frame, rate, 0.0)
-        pull = minus(motion.acceleration(before, arm), accelerations.pins[self.to])
-        bend = subtract(self.rod.bend(solved, velocities, accelerations), dot(slip, slip))
+        before = self.joint.change(solved, velocities, changes, frame, rate, 0.0)
+        pull = minus(motion.acceleration(before, arm), changes.pins[self.to])
+        bend = subtract(self.rod.bend(solved, velocities, changes), dot(slip, slip))
         rod = self._rod_vector(solved, frame, arm)
         change = subtract(bend, dot(rod, pull)) / pose.lever
-        accelerations.coordinates.append(change)
-        accelerations.pins.append(
-            self.joint.change(solved, velocities, accelerations, frame, rate, change)
-        )
+        changes.coordinates.append(change)
+        changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
 
     def _rod_vector(self, solved: LinkState, frame: SpaceFrame, arm: Vector) -> Vector:
         return minus(plus(frame.origin, arm), solved.pins[self.to])
@@ -398,24 +351,17 @@ class AimedHinge:
         return slope
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        slope: Vector,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, slope: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the accelerations."""
         frame, motion = solved.pins[self.child], velocities.pins[self.child]
         arm = minus(solved.pins[self.to], frame.origin)
-        rate = velocities.coordinates[len(accelerations.coordinates)]
-        before = self.joint.change(solved, velocities, accelerations, frame, rate, 0.0)
-        pull = minus(accelerations.pins[self.to], motion.acceleration(before, arm))
+        rate = velocities.coordinates[len(changes.coordinates)]
+        before = self.joint.change(solved, velocities, changes, frame, rate, 0.0)
+        pull = minus(changes.pins[self.to], motion.acceleration(before, arm))
         change = dot(slope, pull) / dot(slope, slope)
-        accelerations.coordinates.append(change)
-        accelerations.pins.append(
-            self.joint.change(solved, velocities, accelerations, frame, rate, change)
-        )
+        changes.coordinates.append(change)
+        changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
 
 
 @dataclass(frozen=True, slots=True)
@@ -427,8 +373,8 @@ class ThreeDistances:
     of ((P1 − P0) × (P2 − P0))·(X − P0).
     """
 
-    to: tuple[int, int, int]
-    rods: tuple[Rod, Rod, Rod]
+    to: tuple[int, ...]
+    rods: tuple[Rod, ...]
     sign: float
     point: int
 
@@ -476,21 +422,16 @@ class ThreeDistances:
         velocities.pins.append(_solve_three(rods, sides, pose.lever))
 
     def accelerations(
-        self,
-        pose: ClosedPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the acceleration: (X − Pᵢ)·(Ẍ − P̈ᵢ) + |Ẋ − Ṗᵢ|² = L·L̈ + L̇² for each rod."""
         rods = self._rod_vectors(solved)
         sides = []
         for vector, index, rod in zip(rods, self.to, self.rods, strict=True):
             slip = minus(velocities.pins[self.point], velocities.pins[index])
-            bend = subtract(rod.bend(solved, velocities, accelerations), dot(slip, slip))
-            sides.append(add(dot(vector, accelerations.pins[index]), bend))
-        accelerations.pins.append(_solve_three(rods, sides, pose.lever))
+            bend = subtract(rod.bend(solved, velocities, changes), dot(slip, slip))
+            sides.append(add(dot(vector, changes.pins[index]), bend))
+        changes.pins.append(_solve_three(rods, sides, pose.lever))
 
     def _rod_vectors(self, solved: LinkState) -> list[Vector]:
         return [minus(solved.pins[self.point], solved.pins[index]) for index in self.to]
@@ -532,19 +473,14 @@ class FramedLink:
         velocities.pins.append(Twist(self._spin(solved, one, other), start))
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the derivative of the motion."""
-        start, one, other = self._edges(accelerations)
+        start, one, other = self._edges(changes)
         spin = velocities.pins[self.link].spin
         _, first, second = self._edges(velocities)
         one, other = minus(one, cross(spin, first)), minus(other, cross(spin, second))
-        accelerations.pins.append(Twist(self._spin(solved, one, other), start))
+        changes.pins.append(Twist(self._spin(solved, one, other), start))
 
     def _edges(self, state: LinkState) -> tuple[Vector, Vector, Vector]:
         start, one, other = (state.pins[index] for index in self.points)
@@ -589,14 +525,14 @@ class MeasuredHinge:
 
     def accelerations(
         self,
-        _pose: StepPose,
-        _rates: None,
+        _pose: Any,
+        _rates: Any,
         solved: LinkState,
         _velocities: LinkState,
-        accelerations: LinkState,
+        changes: LinkState,
     ) -> None:
         """Append the acceleration: the axis turns with both links, which adds nothing."""
-        self._append_difference(solved, accelerations)
+        self._append_difference(solved, changes)
 
     def _append_difference(self, solved: LinkState, state: LinkState) -> None:
         axis = solved.pins[self.joint.parent].turn(self.joint.seat.z)
@@ -627,19 +563,14 @@ class ResolvedSlides:
         return slip
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        slip: Vector,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, slip: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the accelerations."""
         arm = minus(solved.pins[self.point], solved.pins[self.link].origin)
-        motion, change = velocities.pins[self.link], accelerations.pins[self.link]
-        pull = minus(accelerations.pins[self.point], motion.acceleration(change, arm))
+        motion, change = velocities.pins[self.link], changes.pins[self.link]
+        pull = minus(changes.pins[self.point], motion.acceleration(change, arm))
         pull = minus(pull, scale(2.0, cross(motion.spin, slip)))
-        self._append_resolved(solved, accelerations, pull)
+        self._append_resolved(solved, changes, pull)
 
     def _append_resolved(self, solved: LinkState, state: LinkState, vector: Vector) -> None:
         turned = solved.pins[self.link].resolve(vector)
@@ -665,19 +596,14 @@ class MeasuredStrut:
         velocities.coordinates.append(rate)
 
     def accelerations(
-        self,
-        _pose: StepPose,
-        _rates: None,
-        solved: LinkState,
-        velocities: LinkState,
-        accelerations: LinkState,
+        self, _pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
         """Append the acceleration: what turns across the strut adds v²/L."""
         between, slip = self._strut_vector(solved), self._strut_vector(velocities)
         size = solved.coordinates[self.coordinate]
         across = scale(1.0 / size, cross(between, slip))
-        pull = dot(between, self._strut_vector(accelerations))
-        accelerations.coordinates.append(add(pull, dot(across, across)) / size)
+        pull = dot(between, self._strut_vector(changes))
+        changes.coordinates.append(add(pull, dot(across, across)) / size)
 
     def _strut_vector(self, state: LinkState) -> Vector:
         one, other = (state.pins[index] for index in self.points)

@@ -12,9 +12,15 @@ from random import Random
 
 from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
-from linkage_ros.kinematics.space.steps import ClosedHinge, ClosedSlide, Rod, ThreeDistances
-from linkage_ros.kinematics.space.vectors import GROUND_FRAME, STILL
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.space.steps import (
+    ClosedHinge,
+    ClosedSlide,
+    GROUND_FRAME,
+    LinkState,
+    Rod,
+    STILL,
+    ThreeDistances,
+)
 import pytest
 
 from .reference import hinge_angle, motion_of, moved, slide_length, three_spheres
@@ -145,7 +151,9 @@ def test_status_and_gap_are_right_on_both_sides_of_a_toggle(apart):
         for rod, gap in (
             (low * (1.0 + apart), -low * apart), (high * (1.0 - apart), -high * apart)
         ):  # fmt: skip
-            hinge = ClosedHinge(HingePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2, r, 0.0)
+            hinge = ClosedHinge(
+                HingePair(0, GROUND_FRAME), tuple(place), 1, Rod(rod), 1.0, 2, r, 0.0
+            )
             pose, _ = _run(hinge, [to], [(0.0, 0.0, 0.0)], [(0.0, 0.0, 0.0)])
             _check_status(pose, gap, rod)
         distance = hypot(to[0] - place[0], to[1] - place[1])
