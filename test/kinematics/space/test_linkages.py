@@ -11,25 +11,15 @@ from math import atan2, cos, dist, pi, radians, remainder, sin, tan, tau
 from pathlib import Path
 from random import Random
 
+from campaigns.space_reference import moved
 import linkage_ros as lr
-from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
+from linkage_ros.kinematics import Status
 from linkage_ros.resources import spatial_linkage_names
 import numpy as np
 import pytest
 
-from .reference import (
-    angle_to_meet,
-    exact_distance,
-    motion_of,
-    moved,
-    turned_about,
-)
-from ..reference import Worst
-
 FOLDER = Path(__file__).parent / 'linkages'
 NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.yaml'))]
-LIMIT = 4.0
-"""In u·κ."""
 
 
 def closure_of(name):
@@ -149,107 +139,6 @@ def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
     one = [compiled(*inputs, *rates, *changes).values for inputs, rates, changes in states]
     for order, values in enumerate(batch[1:]):
         assert pytest.approx(np.array([each[order] for each in one]), abs=1e-9) == values.T
-
-
-def random_rssr(random):
-    """Return a crank and a rocker about skew axes, with a rod between them."""
-
-    def vector(reach=1.0):
-        return tuple(random.uniform(-reach, reach) for _ in range(3))
-
-    return SpaceLinkage(
-        points={'A': vector(0.4), 'B': vector()},
-        links={'crank': ('A',), 'rod': ('A', 'B'), 'rocker': ('B',)},
-        hinges={
-            'crank': SpatialJoint('ground', 'crank', vector(), vector(0.1)),
-            'rocker': SpatialJoint('ground', 'rocker', vector(), vector()),
-        },
-        slides={},
-        struts={},
-        driven=('crank',),
-        published=('rocker',),
-    )
-
-
-def test_random_rssr_linkages_are_as_exact_as_their_numbers():
-    random, worst, closed = Random('rssr'), Worst(), 0
-    while closed < 50:
-        linkage = random_rssr(random)
-        try:
-            closure = SpaceClosure(linkage)
-        except lr.LinkageError:
-            continue  # It is drawn at a toggle.
-        state = [random.uniform(-1.0, 1.0) for _ in range(3)]
-        position = closure.position(state[0])
-        if not position.status.has_rates:
-            continue
-        closed += 1
-        velocity = closure.velocity(position, state[1])
-        found = (
-            position.joints[0], velocity.joints[0],
-            closure.acceleration(position, velocity, state[2]).joints[0],
-        )  # fmt: skip
-        crank, rocker = linkage.hinges.values()
-        places = (*linkage.points.values(), crank.at, crank.axis, rocker.at, rocker.axis)
-        sign = 1 if closure.steps[-1].sign > 0.0 else -1
-
-        def angle(numbers, t, sign=sign):
-            a, b, at, axis, to_at, to_axis = (numbers[3 * k : 3 * k + 3] for k in range(6))
-            rod, q, w, change = numbers[18:]
-            now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
-            return angle_to_meet(b, to_at, to_axis, now, rod, sign)
-
-        # The length of the rod is a number of its own, which is rounded wherever it comes from. If
-        # κ took it for a function of the ends, it would be 0 at the pose even next to a toggle.
-        rod = exact_distance(*places[:2])
-        truth = motion_of(angle, [*(n for place in places for n in place), rod, *state])
-        case = (linkage, state)
-        worst.note('rocker', truth[0].half_turn_error_of(found[0]), LIMIT, case)
-        worst.note('rate', truth[1].error_of(found[1]), LIMIT, case)
-        worst.note('acceleration', truth[2].error_of(found[2]), LIMIT, case)
-    worst.check()
-
-
-def test_an_ankle_driven_by_its_joints_is_as_exact_as_its_numbers():
-    closure, worst = closure_of('ankle'), Worst()
-    linkage = closure.linkage
-    for inputs, rates, changes in states_of(closure, 20, 0.5):
-        position = closure.position(*inputs)
-        velocity = closure.velocity(position, *rates)
-        acceleration = closure.acceleration(position, velocity, *changes)
-        for k, (motor, bar, foot) in enumerate((('m1', 'b1', 'c1'), ('m2', 'b2', 'c2'))):
-            names = ('pitch', 'roll', motor)
-            hinges = [linkage.hinges[name] for name in names]
-            places = [linkage.points[bar], linkage.points[foot]]
-            places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
-
-            sign = closure_sign(closure, motor)
-
-            def angle(numbers, t, sign=sign):
-                b, c, at1, axis1, at2, axis2, at3, axis3 = (
-                    numbers[3 * n : 3 * n + 3] for n in range(8)
-                )
-                pitch, roll = (
-                    numbers[24 + n] + numbers[26 + n] * t + numbers[28 + n] * t * t / 2
-                    for n in range(2)
-                )
-                now = turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
-                return angle_to_meet(b, at3, axis3, now, numbers[30], sign)
-
-            numbers = [n for place in places for n in place]
-            rod = exact_distance(*places[:2])
-            truth = motion_of(angle, [*numbers, *inputs, *rates, *changes, rod])
-            case = (motor, inputs)
-            worst.note('angle', truth[0].half_turn_error_of(position.joints[k]), LIMIT, case)
-            worst.note('rate', truth[1].error_of(velocity.joints[k]), LIMIT, case)
-            worst.note('acceleration', truth[2].error_of(acceleration.joints[k]), LIMIT, case)
-    worst.check()
-
-
-def closure_sign(closure, joint):
-    """Return the sign of the step that closes a joint, as the check of a file names it."""
-    (group,) = (one for one in closure.groups if one.method.startswith(f'{joint},'))
-    return 1 if group.assembly.startswith('+') else -1
 
 
 def test_a_delta_there_and_back_is_where_it_was():

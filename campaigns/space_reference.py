@@ -17,9 +17,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from ..reference import Quantity
-
 DIGITS = 80
+_UNIT_ROUNDOFF = mpf(2) ** -53
 _STEP = mpf(10) ** -25
 
 Row = list[mpf]
@@ -76,13 +75,17 @@ def three_spheres(ends: Sequence[Row], rods: Sequence[Any], sign: int) -> Row:
     return [s + f + sign * height * n for s, f, n in zip(start, foot, normal, strict=True)]
 
 
-def motion_of(
-    function: Callable[[Sequence[Any], Any], Any], given: Sequence[float]
-) -> list[Quantity]:
+def errors_of(
+    function: Callable[[Sequence[Any], Any], Any],
+    given: Sequence[float],
+    found: Sequence[float],
+    floor: Any = None,
+) -> list[float]:
     """
-    Return a value, its rate and its acceleration at the time 0, each with its κ.
+    Return the errors of a value, its rate and its acceleration at the time 0, in u·κ.
 
-    ``function`` takes the given numbers and the time.
+    ``function`` takes the given numbers and the time. With a ``floor`` the value is an angle
+    modulo 2π, which counts as the floor at least.
     """
     with mp.workdps(DIGITS):
         exact = [mpf(number) for number in given]
@@ -95,15 +98,22 @@ def motion_of(
                 (after - 2 * now + before) / _STEP**2,
             ]
 
-        found = orders(exact)
-        kappa = [abs(value) for value in found]
+        values = orders(exact)
+        kappa = [abs(value) for value in values]
+        off = [mpf(one) - value for one, value in zip(found, values, strict=True)]
+        if floor is not None:
+            kappa[0] = max(kappa[0], floor)
+            off[0] -= 2 * mp.pi * mp.nint(off[0] / (2 * mp.pi))
         for k, number in enumerate(exact):
             if number:
                 beside = list(exact)
                 beside[k] = number * (1 + mpf(10) ** -15)
                 for order, value in enumerate(orders(beside)):
-                    kappa[order] += abs(value - found[order]) * mpf(10) ** 15
-        return [Quantity(value, float(k)) for value, k in zip(found, kappa, strict=True)]
+                    kappa[order] += abs(value - values[order]) * mpf(10) ** 15
+        return [
+            float(abs(error) / (_UNIT_ROUNDOFF * size)) if error else 0.0
+            for error, size in zip(off, kappa, strict=True)
+        ]
 
 
 def turn(vector: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:

@@ -1,0 +1,307 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+``python -m campaigns.space``: errors of spatial linkages, step by step and as a whole.
+
+Random steps, far from toggles and down to 1e-9 from one, and whole linkages are compared with
+closed forms of 80 digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from functools import partial
+from math import atan2, cos, dist, hypot, pi, sin, sqrt
+from random import Random
+import sys
+from typing import Any, NamedTuple
+
+from bench import ROOT
+from bench.report import Table
+from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
+from campaigns.space_reference import (
+    angle_to_meet,
+    errors_of,
+    exact_distance,
+    hinge_angle,
+    moved,
+    slide_length,
+    three_spheres,
+    turned_about,
+)
+from linkage_ros.description import load
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
+from linkage_ros.kinematics.space.joints import HingePair, SlidePair
+from linkage_ros.kinematics.space.steps import (
+    ClosedHinge,
+    ClosedSlide,
+    GROUND_FRAME,
+    LinkState,
+    Rod,
+    STILL,
+    ThreeDistances,
+)
+
+LIMIT = 4.0
+"""In u·κ."""
+
+PAGE = Page(
+    ROOT / 'docs' / 'accuracy' / 'space.md',
+    'How exact spatial linkages are',
+    """
+Made by `python -m campaigns.space --write`, a part of `make accuracy`.
+
+Errors are given in units of u·κ, as in [campaign.md](campaign.md). For a step κ goes over all that
+it starts from: places, distances, velocities and accelerations. For a linkage it goes over all
+places and axes, the length of each rod, which is a number of its own, the inputs, their rates and
+their accelerations; a published angle counts as π at least. The reference has 80 digits; its rates
+and accelerations are differences along the motion. *near*: 1e-9 to 1e-3 from a toggle. The limit
+is 4.
+""",
+)
+
+ORDERS = ('position', 'rate', 'acceleration')
+
+
+class Case(NamedTuple):
+    """A case: its greatest errors in position, rate and acceleration, and what it was."""
+
+    errors: Sequence[float]
+    given: object
+
+
+def _place(random: Random) -> list[float]:
+    return [random.uniform(-1.0, 1.0) for _ in range(3)]
+
+
+def _distance(random: Random, near: bool) -> float:
+    """Return a distance from a toggle: of angles, or of a length relative to it."""
+    return 10.0 ** random.uniform(-9.0, -3.0) if near else random.uniform(0.05, pi - 0.05)
+
+
+def _states_after(
+    step: Any, ends: Sequence[Any], velocities: Sequence[Any], changes: Sequence[Any]
+) -> tuple[LinkState, ...]:
+    """Return the three states after a step that starts from points."""
+    solved = LinkState([0.0], [GROUND_FRAME, *map(tuple, ends)])
+    rates = LinkState([0.0], [STILL, *map(tuple, velocities)])
+    accelerations = LinkState([0.0], [STILL, *map(tuple, changes)])
+    pose = step.close(solved)
+    assert pose.status is Status.CLOSED, step
+    step.accelerations(pose, step.rates(pose, solved, rates), solved, rates, accelerations)
+    return solved, rates, accelerations
+
+
+def hinge_case(random: Random, near: bool = False) -> Case:
+    """Return a hinge closed by a rod."""
+    place, to, velocity, change = (_place(random) for _ in range(4))
+    sign = random.choice((-1, 1))
+    r, d, height = hypot(*place[:2]), hypot(*to[:2]), to[2] - place[2]
+    apart = _distance(random, near)
+    if near:
+        low, high = hypot(height, d - r), hypot(height, d + r)
+        rod = random.choice((low * (1.0 + apart), high * (1.0 - apart)))
+    else:
+        rod = sqrt(d * d + r * r - 2.0 * r * d * cos(apart) + height * height)
+    direction = atan2(place[1], place[0])
+    pair = HingePair(0, GROUND_FRAME)
+    step = ClosedHinge(pair, (*place,), 1, Rod(rod), float(sign), 2, r, direction)  # type: ignore[arg-type]
+    found = [one.coordinates[1] for one in _states_after(step, [to], [velocity], [change])]
+    errors = errors_of(
+        lambda n, t: hinge_angle(n[:3], moved(n[3:6], n[7:10], n[10:], t), n[6], sign),
+        [*place, *to, rod, *velocity, *change],
+        found,
+        floor=0,
+    )
+    return Case(errors, (sign, place, to, rod))
+
+
+def slide_case(random: Random, near: bool = False) -> Case:
+    """Return a slide closed by a rod."""
+    place, to, velocity, change = (_place(random) for _ in range(4))
+    sign = random.choice((-1, 1))
+    rod = hypot(to[0] - place[0], to[1] - place[1]) * (1.0 + _distance(random, near))
+    pair = SlidePair(0, GROUND_FRAME)
+    step = ClosedSlide(pair, (*place,), 1, Rod(rod), float(sign), 2)  # type: ignore[arg-type]
+    found = [one.coordinates[1] for one in _states_after(step, [to], [velocity], [change])]
+    errors = errors_of(
+        lambda n, t: slide_length(n[:3], moved(n[3:6], n[7:10], n[10:], t), n[6], sign),
+        [*place, *to, rod, *velocity, *change],
+        found,
+    )
+    return Case(errors, (sign, place, to, rod))
+
+
+def three_distances_case(random: Random, near: bool = False) -> Case:
+    """Return a point above the plane of three others, near it for a toggle."""
+    ends, velocities, changes = ([_place(random) for _ in range(3)] for _ in range(3))
+    sign, apart = random.choice((-1, 1)), _distance(random, near)
+    a, b = random.uniform(-1.0, 1.5), random.uniform(-1.0, 1.5)
+    x, y = ([q - p for p, q in zip(ends[0], end, strict=True)] for end in ends[1:])
+    n = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+    up = sign * (sqrt(2.0 * apart) if near else sin(apart)) / hypot(*n)
+    place = [p + a * u + b * v + up * w for p, u, v, w in zip(ends[0], x, y, n, strict=True)]
+    rods = [dist(place, end) for end in ends]
+    step = ThreeDistances((1, 2, 3), tuple(map(Rod, rods)), float(sign), 4)
+    states = _states_after(step, ends, velocities, changes)
+    flat = [n for rows in (ends, [rods], velocities, changes) for row in rows for n in row]
+    errors = []
+    for axis in range(3):
+
+        def coordinate(n: Sequence[Any], t: Any, axis: int = axis) -> Any:
+            places, velocities, changes = (
+                [n[first + k : first + k + 3] for k in (0, 3, 6)] for first in (0, 12, 21)
+            )
+            now = [moved(*each, t) for each in zip(places, velocities, changes, strict=True)]
+            return three_spheres(now, n[9:12], sign)[axis]
+
+        errors.append(errors_of(coordinate, flat, [state.pins[4][axis] for state in states]))
+    return Case([max(each) for each in zip(*errors, strict=True)], (sign, ends, rods))
+
+
+def random_rssr(random: Random) -> SpaceLinkage:
+    """Return a crank and a rocker about skew axes, with a rod between them."""
+
+    def vector(reach: float = 1.0) -> Any:
+        return tuple(random.uniform(-reach, reach) for _ in range(3))
+
+    return SpaceLinkage(
+        points={'A': vector(0.4), 'B': vector()},
+        links={'crank': ('A',), 'rod': ('A', 'B'), 'rocker': ('B',)},
+        hinges={
+            'crank': SpatialJoint('ground', 'crank', vector(), vector(0.1)),
+            'rocker': SpatialJoint('ground', 'rocker', vector(), vector()),
+        },
+        slides={},
+        struts={},
+        driven=('crank',),
+        published=('rocker',),
+    )
+
+
+def rssr_case(random: Random) -> Case:
+    """Return a random RSSR in a random state."""
+    while True:
+        linkage = random_rssr(random)
+        state = [random.uniform(-1.0, 1.0) for _ in range(3)]
+        try:
+            closure = SpaceClosure(linkage)
+        except LinkageError:
+            continue  # It is drawn at a toggle.
+        if closure.position(state[0]).status.has_rates:
+            break
+    crank, rocker = linkage.hinges.values()
+    places = (*linkage.points.values(), crank.at, crank.axis, rocker.at, rocker.axis)
+    sign = sign_of(closure, 'rocker')
+
+    def angle(numbers: Sequence[Any], t: Any) -> Any:
+        a, b, at, axis, to_at, to_axis = (numbers[3 * k : 3 * k + 3] for k in range(6))
+        rod, q, w, change = numbers[18:]
+        now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
+        return angle_to_meet(b, to_at, to_axis, now, rod, sign)
+
+    # The length of the rod is a number of its own, which is rounded wherever it comes from. If κ
+    # took it for a function of the ends, it would be 0 at the pose even next to a toggle.
+    numbers = [*(n for place in places for n in place), exact_distance(*places[:2]), *state]
+    (found,) = joint_orders(closure, *([number] for number in state))
+    return Case(errors_of(angle, numbers, found, floor=pi), (linkage, state))
+
+
+_ANKLE = {'m1': ('b1', 'c1'), 'm2': ('b2', 'c2')}
+"""For each motor the points of its bar and of the foot."""
+
+
+def ankle_case(random: Random, closure: Any = None) -> Case:
+    """Return the shipped ankle in a random state; each motor is a closed form of both joints."""
+    closure = closure or load(ROOT / 'config' / 'linkages' / 'space' / 'ankle.yaml')
+    linkage: SpaceLinkage = closure.linkage
+    while True:
+        states = [[random.uniform(-reach, reach) for _ in range(2)] for reach in (0.5, 1.0, 1.0)]
+        if closure.position(*states[0]).status.has_rates:
+            break
+    errors = []
+    for motor, orders in zip(_ANKLE, joint_orders(closure, *states), strict=True):
+        bar, foot = _ANKLE[motor]
+        hinges = [linkage.hinges[name] for name in ('pitch', 'roll', motor)]
+        places = [linkage.points[bar], linkage.points[foot]]
+        places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
+        sign = sign_of(closure, motor)
+
+        def angle(numbers: Sequence[Any], t: Any, sign: int = sign) -> Any:
+            b, c, at1, axis1, at2, axis2, at3, axis3 = (
+                numbers[3 * n : 3 * n + 3] for n in range(8)
+            )
+            pitch, roll = (
+                numbers[25 + n] + numbers[27 + n] * t + numbers[29 + n] * t * t / 2
+                for n in range(2)
+            )
+            now = turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
+            return angle_to_meet(b, at3, axis3, now, numbers[24], sign)
+
+        rod = exact_distance(*places[:2])
+        numbers = [*(n for place in places for n in place), rod]
+        numbers += [part for state in states for part in state]
+        errors.append(errors_of(angle, numbers, orders, floor=pi))
+    return Case([max(each) for each in zip(*errors, strict=True)], states)
+
+
+def joint_orders(
+    closure: Any, inputs: Sequence[float], rates: Sequence[float], changes: Sequence[float]
+) -> list[tuple[float, float, float]]:
+    """Return position, rate and acceleration of each published joint."""
+    position = closure.position(*inputs)
+    velocity = closure.velocity(position, *rates)
+    acceleration = closure.acceleration(position, velocity, *changes)
+    orders = position.joints, velocity.joints, acceleration.joints
+    return [*zip(*orders, strict=True)]
+
+
+def sign_of(closure: Any, joint: str) -> int:
+    """Return the sign of the step that closes a joint, as the check of a file names it."""
+    (group,) = (one for one in closure.groups if one.method.startswith(f'{joint},'))
+    return 1 if group.assembly.startswith('+') else -1
+
+
+FAMILIES: dict[str, Callable[[Random], Case]] = {
+    'hinge and rod': hinge_case,
+    'hinge and rod, near': partial(hinge_case, near=True),
+    'slide and rod': slide_case,
+    'slide and rod, near': partial(slide_case, near=True),
+    'three distances': three_distances_case,
+    'three distances, near': partial(three_distances_case, near=True),
+    'RSSR': rssr_case,
+    'ankle, joints to motors': ankle_case,
+}
+
+
+def main() -> int:
+    """Run the campaign, and return the exit code."""
+    begin = datetime.now().astimezone()
+    parser = parser_of('space', __doc__, page=PAGE, jobs=1)
+    parser.add_argument('--cases', type=int, default=4000, help='cases of each family')
+    arguments = parser.parse_args()
+    table = Table('Worst errors, in u·κ', ('family', 'cases', *ORDERS))
+    advance = progress_lines(arguments.cases * len(FAMILIES), 'cases')
+    worst = 0.0
+    for name, draw in FAMILIES.items():
+        random = Random(f'{arguments.seed} {name}')
+        greatest = [0.0, 0.0, 0.0]
+        for _ in range(arguments.cases):
+            greatest = [*map(max, greatest, draw(random).errors)]
+            advance(1)
+        worst = max(worst, *greatest)
+        table.rows.append((name, f'{arguments.cases:,}', *(f'{one:.2f}' for one in greatest)))
+    machine: Any = machine_of(begin, arguments, 'cases', arguments.cases * len(FAMILIES))
+    publish([table, machine], PAGE if arguments.write else None)
+    return int(not worst <= LIMIT)
+
+
+if __name__ == '__main__':
+    sys.exit(exit_code(main))
