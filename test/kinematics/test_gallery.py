@@ -18,7 +18,7 @@ import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
 
-from linkage_ros.description import read_linkage, read_yaml
+from linkage_ros.description import load
 from linkage_ros.kinematics import Closure, Dyad, Iterated, Status
 import pytest
 
@@ -54,7 +54,8 @@ KINDS = {
 
 
 def closure_of(name: str) -> Closure:
-    return Closure(read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0]))
+    closure: Closure = load(name)
+    return closure
 
 
 def inputs_of(closure: Closure, name: str, count: int) -> list[tuple[float, ...]]:

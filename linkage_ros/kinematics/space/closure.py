@@ -224,6 +224,10 @@ class SpaceClosure(StepwiseClosure):
         if not position.status.has_pose:
             raise ValueError(f'{what}: {position!r} has none; check its status first')
 
+    def _joint_rates(self, values: list[float]) -> tuple[float, ...]:
+        # Adding 0.0 makes 0.0 of −0.0: numbers that are 0 are left out of sums, symbols are not.
+        return tuple(rate + 0.0 for rate in super()._joint_rates(values))
+
     @property
     def ball_count(self) -> int:
         """Return the number of points that two links share."""

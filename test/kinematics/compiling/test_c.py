@@ -16,6 +16,7 @@ import random
 from campaigns.topologies.families import FAMILIES
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Limits, RevoluteJoint
+from linkage_ros.resources import spatial_linkage_names
 from linkage_ros.tools.models.source_code import C, write_source
 import pytest
 
@@ -33,7 +34,7 @@ from .emitted import (
 )
 from ..test_gallery import closure_of, KINDS
 
-GALLERY = list(KINDS)
+GALLERY = [*KINDS, *spatial_linkage_names()]
 ITERATED_TWICE = 'class III two inputs'
 COMPILED = [family for family in FAMILIES if family != ITERATED_TWICE]
 pytestmark = needs['C99']
@@ -55,7 +56,8 @@ def told_of(
 @pytest.mark.parametrize('name', GALLERY)
 def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
     told = told_of(closure_of(name), tmp_path, COUNT, name)
-    assert sum(one.status == 'CLOSED' for one in told) > COUNT / 3
+    # Spatial linkages close in a smaller part of what their inputs are drawn from.
+    assert sum(one.status == 'CLOSED' for one in told) > COUNT / (3 if name in KINDS else 6)
 
 
 @pytest.mark.sample(12)

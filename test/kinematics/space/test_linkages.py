@@ -7,14 +7,15 @@
 # language governing permissions and limitations under the License.
 """Spatial linkages from file to joints: exact, consistent, and those of the books."""
 
-from math import atan2, cos, dist, pi, radians, remainder, sin, tan, tau
+from math import acos, atan2, cos, dist, hypot, pi, radians, remainder, sin, sqrt, tan, tau
 from pathlib import Path
 from random import Random
 
-from campaigns.space_reference import moved
+from campaigns.space_reference import moved, turned_about
 import linkage_ros as lr
 from linkage_ros.kinematics import Status
 from linkage_ros.resources import spatial_linkage_names
+from mpmath import mp, mpf
 import numpy as np
 import pytest
 
@@ -205,3 +206,100 @@ def test_a_jacobian_in_the_plane_too():
     assert closure.jacobian(position).T.tolist() == [list(column) for column in columns]
     with pytest.raises(ValueError, match='has none'):
         closure.jacobian(closure.position(pi, 0.0))
+
+
+@pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 13).tolist())
+def test_a_spatial_slider_crank_stands_where_its_rod_ends(angle):
+    """The crank pin is at (0, 0.1 + r·sin, 0.12 + r·cos); the rod is 0.3 m long (Haug, 1989)."""
+    closure = closure_of('spatial_slider_crank')
+    position = closure.position(angle)
+    y, z = 0.1 - 0.08 * sin(angle), 0.12 + 0.08 * cos(angle)
+    assert position['slide'] == pytest.approx(sqrt(0.3**2 - y * y - z * z), abs=1e-15)
+
+
+@pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 13).tolist())
+def test_a_spherical_four_bar_keeps_the_angles_between_its_axes(angle):
+    """The rocker of a·cos q + b·sin q + c = 0, which says that coupler and last keep their arc."""
+    closure = closure_of('spherical_four_bar')
+    position = closure.position(angle)
+    axes = {name: np.array(hinge.axis) for name, hinge in closure.linkage.hinges.items()}
+    units = {name: axis / np.linalg.norm(axis) for name, axis in axes.items()}
+    coupler = np.array([*turned_about([*units['coupler']], [0, 0, 0], [0, 0, 1], angle)], float)
+    last, rocker = units['last'], units['rocker']
+    along = (rocker @ last) * (rocker @ coupler)
+    a, b = coupler @ last - along, coupler @ np.cross(rocker, last)
+    c = along - units['coupler'] @ last
+    ways = [atan2(b, a) + side * acos(-c / hypot(a, b)) for side in (-1, 1)]
+    start = closure.position(0.0)['rocker']
+    assert start == pytest.approx(0.0, abs=1e-15)
+    off = [abs(remainder(position['rocker'] - way, tau)) for way in ways]
+    assert min(off) < 1e-13
+
+
+def test_a_delta_stands_where_three_spheres_meet():
+    """About the elbows, moved by the platform's points: two planes, and the lower of two roots."""
+    closure = closure_of('delta')
+    points = {name: np.array(place) for name, place in closure.linkage.points.items()}
+    platform = np.array([0.0, 0.0, -0.5])
+    for inputs, _, _ in states_of(closure, 20):
+        centers = []
+        for number, angle in enumerate(inputs, 1):
+            hinge = closure.linkage.hinges[f'a{number}']
+            elbow = turned_about([*points[f'b{number}']], [*hinge.at], [*hinge.axis], angle)
+            centers.append(np.array(elbow, float) - (points[f'c{number}'] - platform))
+        squares = [dist(points[f'b{n}'], points[f'c{n}']) ** 2 for n in (1, 2, 3)]
+        rows = np.array([centers[0] - centers[1], centers[0] - centers[2]])
+        sides = [
+            0.5 * (squares[k] - squares[0] + centers[0] @ centers[0] - centers[k] @ centers[k])
+            for k in (1, 2)
+        ]
+        way = np.cross(*rows)
+        foot = np.linalg.lstsq(rows, np.array(sides), rcond=None)[0]
+        p, q = (foot - centers[0]) @ way / (way @ way), (foot - centers[0]) @ (foot - centers[0])
+        roots = [-p + side * sqrt(p * p - (q - squares[0]) / (way @ way)) for side in (-1, 1)]
+        expected = min((foot + root * way for root in roots), key=lambda place: place[2])
+        assert closure.position(*inputs).joints == pytest.approx(expected, abs=1e-14)
+
+
+def test_a_wishbone_is_where_its_six_distances_are_met():
+    """Upper ball and steering ball are found from their distances, to 40 digits (mpmath)."""
+    closure = closure_of('wishbone')
+    drawn = {name: [mpf(part) for part in place] for name, place in closure.linkage.points.items()}
+    ends = [
+        *(('upper', one) for one in ('u1', 'u2', 'lower')),
+        *(('steer', one) for one in ('lower', 'upper', 'rack_end')),
+    ]
+    for inputs, _, _ in states_of(closure, 6):
+        found = closure.position(*inputs).points
+        with mp.workdps(40):
+            axis = [a - b for a, b in zip(drawn['f1'], drawn['f2'], strict=True)]
+            known = drawn | {
+                'lower': turned_about(drawn['lower'], drawn['f2'], axis, mpf(inputs[0])),
+                'rack_end': [
+                    p + d * inputs[1] for p, d in zip(drawn['rack_end'], (0, 1, 0), strict=True)
+                ],
+            }
+
+            def gaps(*parts, known=known):
+                now = known | {'upper': parts[:3], 'steer': parts[3:]}
+                return [
+                    sum((a - b) ** 2 for a, b in zip(now[one], now[other], strict=True))
+                    - sum((a - b) ** 2 for a, b in zip(drawn[one], drawn[other], strict=True))
+                    for one, other in ends
+                ]
+
+            exact = mp.findroot(gaps, (*found['upper'], *found['steer']))
+            for point, places in (('upper', exact[:3]), ('steer', exact[3:])):
+                assert [*map(float, places)] == pytest.approx(found[point], abs=1e-14)
+
+
+def test_rods_that_may_spin_are_named_and_turn_the_shortest_way():
+    closure = closure_of('rssr')
+    assert closure.idle == ('rod',)
+    position = closure.position(0.5)
+    places = closure.points(position)
+    _, quaternion = closure.frames(position)['rod']
+    drawn = closure.linkage.points
+    way = np.subtract(drawn['B'], drawn['A'])
+    assert _rotate(quaternion, way) == pytest.approx(np.subtract(places['B'], places['A']))
+    assert np.dot(quaternion[:3], way) == pytest.approx(0.0, abs=1e-16)
