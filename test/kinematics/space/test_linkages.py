@@ -217,7 +217,7 @@ def test_a_spatial_slider_crank_stands_where_its_rod_ends(angle):
     assert position['slide'] == pytest.approx(sqrt(0.3**2 - y * y - z * z), abs=1e-15)
 
 
-@pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 13).tolist())
+@pytest.mark.parametrize('angle', np.linspace(-1.2, 1.5, 13).tolist())
 def test_a_spherical_four_bar_keeps_the_angles_between_its_axes(angle):
     """The rocker of a·cos q + b·sin q + c = 0, which says that coupler and last keep their arc."""
     closure = closure_of('spherical_four_bar')
@@ -273,11 +273,10 @@ def test_a_wishbone_is_where_its_six_distances_are_met():
         found = closure.position(*inputs).points
         with mp.workdps(40):
             axis = [a - b for a, b in zip(drawn['f1'], drawn['f2'], strict=True)]
+            x, y, z = drawn['rack_end']
             known = drawn | {
                 'lower': turned_about(drawn['lower'], drawn['f2'], axis, mpf(inputs[0])),
-                'rack_end': [
-                    p + d * inputs[1] for p, d in zip(drawn['rack_end'], (0, 1, 0), strict=True)
-                ],
+                'rack_end': [x, y + inputs[1], z],
             }
 
             def gaps(*parts, known=known):
