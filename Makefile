@@ -166,6 +166,7 @@ accuracy: $(STAMP)
 	$(BIN)/python -m campaigns.accuracy || status=$$?; \
 	$(BIN)/python -m campaigns.topologies || status=$$?; \
 	$(BIN)/python -m campaigns.inverse || status=$$?; \
+	$(BIN)/python -m campaigns.space || status=$$?; \
 	exit $$status
 
 topologies: $(STAMP)

@@ -25,6 +25,7 @@ from bench.inverse import measure_inverse
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
 from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
+from bench.space import measure_space
 from bench.ticks import (
     bare,
     cost_table,
@@ -98,6 +99,8 @@ def main() -> int:
                 say('kinematics: linkages solved with acceleration')
                 tables.append(measure_speed(_SPEED_QUICK if arguments.quick else _SPEED))
                 tables.append(measure_inverse(*((3, 500) if arguments.quick else (11, 5000))))
+                amount = (3, 500, 20_000) if arguments.quick else (11, 5000, 1_000_000)
+                tables.append(measure_space(*amount))
             if arguments.only in (None, 'compiled'):
                 say('compiled linkages against their plain steps')
                 amount = (1, 100) if arguments.quick else (11, 2000)
