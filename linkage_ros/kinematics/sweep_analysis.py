@@ -39,7 +39,9 @@ from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPo
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
 _SAMPLES = 720
-_GRID = 24
+_GRID, _MOST_ON_GRID = 24, 14_000
+"""Values of each input on a grid, and states on it at most."""
+
 _SAME = 1e-9
 """Largest difference of values that count as equal, in [rad] or relative to a length."""
 
@@ -289,6 +291,7 @@ def grid_positions(
 ) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
     ways = []
+    count = min(count, max(2, int(_MOST_ON_GRID ** (1.0 / len(closure.linkage.inputs)))))
     for given in closure.linkage.inputs:
         low, high = given.limits.low, given.limits.high
         if given.slider:
