@@ -59,9 +59,17 @@ def _multiply(
         tuple(value * factor for value in found.joints),
         LinkState(
             [value * factor for value in coordinates],
-            [complex(pin.real * factor, pin.imag * factor) for pin in pins],
+            [_multiply_pin(pin, factor) for pin in pins],
         ),
     )
+
+
+def _multiply_pin(pin: Any, factor: float) -> Any:
+    """Return a pin's rate times a factor: a complex number, a vector, or a twist of vectors."""
+    if isinstance(pin, tuple):
+        parts = [_multiply_pin(part, factor) for part in pin]
+        return type(pin)(*parts) if hasattr(pin, '_fields') else tuple(parts)
+    return pin * factor if type(pin) is float else complex(pin.real * factor, pin.imag * factor)
 
 
 class StepwiseClosure:
