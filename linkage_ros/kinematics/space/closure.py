@@ -9,14 +9,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
-from math import dist, sqrt
+from math import dist, remainder, sqrt, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.space.linkage import check_space_linkage, size_of, SpaceLinkage
+from linkage_ros.kinematics.space.linkage import (
+    check_space_linkage,
+    size_of,
+    SpaceLinkage,
+    SpatialJoint,
+)
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
@@ -177,44 +183,50 @@ class SpaceClosure(StepwiseClosure):
         """
         Return the closure error of a closed position, in [m].
 
-        It is the largest by which a point of two links has two places, a rod another length, or a
-        joint between known links, redundant or not, another axis (times the size).
+        It is the largest by which a point of two links has two places, a rod or strut another
+        length, a joint between known links another axis, or a joint is off its ratio (times the
+        size): of all equations, redundant or not.
         """
-        plan, worst = self._plan, 0.0
-        state = position.state
+        return max(self._errors(position), default=0.0) * self.scale
+
+    def _errors(self, position: Position) -> Iterator[float]:
+        """Yield the error of each equation, in the unit of the steps."""
+        plan, linkage, state = self._plan, self.linkage, position.state
         known = {name: state.pins[index] for name, index in plan.points.items()}
         for point, links in plan.carriers.items():
-            places = [
-                self._carried_place(position, one, point) for one in links if one in plan.frames
-            ]
+            carrying = [link for link in links if link in plan.frames]
+            places = [self._carried_place(position, link, point) for link in carrying]
             places += [known[point]] if point in known else []
-            worst = (
-                max(worst, *(dist(places[0], place) for place in places), 0.0) if places else worst
-            )
-            known.setdefault(point, places[0]) if places else None
+            for place in places:
+                yield dist(known.setdefault(point, places[0]), place)
         for link in plan.idle:
-            points = plan.carried[link]
-            for one, other in pairwise(points):
+            for one, other in pairwise(plan.carried[link]):
                 size = dist(plan.places[one], plan.places[other])
-                worst = max(worst, abs(dist(known[one], known[other]) - size))
-        for name in self.linkage.slides:
-            joint = self.linkage.slides[name]
+                yield abs(dist(known[one], known[other]) - size)
+        for joint in linkage.slides.values():
             if joint.parent in plan.frames and joint.child in plan.frames:
-                worst = max(worst, self._slide_error(position, joint.parent, joint.child, name))
-        return worst * self.scale
+                yield self._slide_error(position, joint)
+        values = {name: state.coordinates[index] for name, index in plan.coordinates.items()}
+        for name in values.keys() & linkage.struts.keys():
+            start, end = (plan.same[point] for point in linkage.struts[name])
+            if start in known and end in known:
+                yield abs(dist(known[start], known[end]) - values[name])
+        for name, ratio in linkage.ratios.items():
+            own, of = (
+                1.0 if joint in linkage.hinges else self.scale for joint in (name, ratio.of)
+            )
+            off = values[name] * own - ratio.ratio * values[ratio.of] * of - ratio.offset
+            yield abs(remainder(off, tau)) if name in linkage.hinges else abs(off) / self.scale
 
-    def _slide_error(self, position: Position, parent: str, child: str, name: str) -> float:
+    def _slide_error(self, position: Position, joint: SpatialJoint) -> float:
         """Return by how much a link turns, or leaves the axis, of which it may only slide."""
-        plan, errors = self._plan, []
-        now = [position.state.pins[plan.frames[link]] for link in (parent, child)]
-        drawn = [plan.pose_frames[link] for link in (parent, child)]
-        for axis in range(3):
-            one, other = (pair[0].resolve(pair[1][axis]) for pair in (now, drawn))
-            errors.append(dist(one, other))
-        moved, before = (pair[0].locate(pair[1].origin) for pair in (now, drawn))
-        axis_now = drawn[0].resolve(plan.axis_of(name))
-        errors.append(length(cross(axis_now, minus(moved, before))))
-        return max(errors)
+        plan, ends = self._plan, (joint.parent, joint.child)
+        parent, child = (position.state.pins[plan.frames[link]] for link in ends)
+        on, of = (plan.pose_frames[link] for link in ends)
+        turned = [dist(parent.resolve(child[axis]), on.resolve(of[axis])) for axis in range(3)]
+        moved = minus(parent.locate(child.origin), on.locate(of.origin))
+        way = on.resolve(scale(1.0 / length(joint.axis), joint.axis))
+        return max(*turned, length(cross(way, moved)))
 
     def _carried_place(self, position: Position, link: str, point: str) -> Vector:
         frame: SpaceFrame = position.state.pins[self._plan.frames[link]]
@@ -262,9 +274,10 @@ def check_pose(closure: SpaceClosure) -> None:
     )
     if gap > _MET * size_of(closure.linkage):
         count, places = closure.freedom.redundant, ', '.join(f'{value:.4g}' for value in inputs)
+        equations = f'{count} equation{"s" * (count != 1)}'
         raise DefinitionError(
             'points',
-            f'the linkage is over-constrained: {count} equations more than needed, missed by '
+            f'the linkage is over-constrained: {equations} more than needed, missed by '
             f'{gap:.3g} m where the input is {places}',
             'let a hinge be a ball, or give the axes and lengths that meet them',
         )

@@ -28,6 +28,12 @@ import numpy as np
 _RANK = 1e-9
 """Singular values below this, relative to the largest, are rounding."""
 
+_ROUNDED = 1e-4
+"""Singular values below this, relative to the largest, may be the rounding of CAD."""
+
+_MOVES = 1e-7
+"""Motions of links above this are none of rounding."""
+
 
 class Freedom(NamedTuple):
     """How free a linkage is in its pose."""
@@ -101,21 +107,28 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
     ground = np.zeros((6, count))
     ground[:, 6 * links[GROUND] : 6 * links[GROUND] + 6] = np.eye(6)
     constraints = np.vstack([*rows, ground])
-    inputs = np.vstack([rate(name) for name in linkage.driven])
-    rank, _ = _rank_and_motions(constraints)
-    locked, motions = _rank_and_motions(np.vstack([constraints, inputs]))
+    everything = np.vstack([constraints, np.vstack([rate(name) for name in linkage.driven])])
     rods = plan.rods
-    free = [
-        link
-        for link in links
-        if max(
-            (np.abs(velocity(link, places[point]) @ motions).max(initial=0.0)
-             for point in plan.carried[link]), default=0.0
-        ) > 1e-7
-        or (link not in rods and np.abs(spin(link) @ motions).max(initial=0.0) > 1e-7)
-    ]  # fmt: skip
-    dependent = len(linkage.driven) - (locked - rank)
-    return Freedom(count - rank - len(rods), needed + 6 - rank, tuple(free), dependent)
+
+    def judge(tolerance: float) -> Freedom:
+        rank, _ = _rank_and_motions(constraints, tolerance)
+        locked, motions = _rank_and_motions(everything, tolerance)
+
+        def moves(row: Array) -> bool:
+            return bool(np.abs(row @ motions).max(initial=0.0) > _MOVES)
+
+        free = [
+            link
+            for link in links
+            if any(moves(velocity(link, places[point])) for point in plan.carried[link])
+            or (link not in rods and moves(spin(link)))
+        ]
+        dependent = len(linkage.driven) - (locked - rank)
+        return Freedom(count - rank - len(rods), needed + 6 - rank, tuple(free), dependent)
+
+    # Rounded dimensions miss redundant equations: then the range decides whether they are met.
+    exact, rounded = judge(_RANK), judge(_ROUNDED)
+    return rounded if exact.dependent and not (rounded.free or rounded.dependent) else exact
 
 
 def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> None:
@@ -177,8 +190,8 @@ def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[
     return False
 
 
-def _rank_and_motions(matrix: Array) -> tuple[int, Array]:
+def _rank_and_motions(matrix: Array, tolerance: float) -> tuple[int, Array]:
     """Return the rank of a matrix, and the vectors that it makes 0, as columns."""
     _, values, rows = np.linalg.svd(matrix)
-    rank = int(np.count_nonzero(values > _RANK * values[0]))
+    rank = int(np.count_nonzero(values > tolerance * values[0]))
     return rank, rows[rank:].T

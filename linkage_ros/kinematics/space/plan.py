@@ -193,10 +193,6 @@ class SpacePlan:
         """Return the index of the pin that the next step appends."""
         return len(self._state.pins)
 
-    def axis_of(self, name: str) -> Vector:
-        """Return the direction of a joint in the pose."""
-        return self._axes[name]
-
     @property
     def rods(self) -> list[str]:
         """Return the links of points on one line that no joint holds: they may spin."""
@@ -463,15 +459,9 @@ class SpacePlan:
                     self._add(CarriedPoint(self.frames[root], offset, self._next_pin, to[-1]))
                     to[-1] = self._next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
-            lengths = tuple(pair.rod for pair in three)
             self.points[point] = self._next_pin
-            step = ThreeDistances(
-                (to[0], to[1], to[2]),
-                (lengths[0], lengths[1], lengths[2]),
-                sign,
-                self._next_pin,
-            )
-            self._add(step)
+            lengths = tuple(pair.rod for pair in three)
+            self._add(ThreeDistances(tuple(to), lengths, sign, self._next_pin))
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'
@@ -532,15 +522,6 @@ class SpacePlan:
 
     # What is published
 
-    def _measure_hinge(self, name: str) -> Any:
-        """Return the step that measures a hinge between known links."""
-        spatial: SpatialJoint = self._linkage.pair_joints[name]
-        joint, frame = self._make_joint(name, spatial.parent, spatial.child)
-        assert isinstance(joint, HingePair)
-        # The x axis of the seat, turned with the child.
-        mark = _clean(self.pose_frames[spatial.child].resolve(frame.x))
-        return MeasuredHinge(joint, mark, self.frames[spatial.child])
-
     def _measure_published(self) -> None:
         """Measure published joints that no step found."""
         linkage = self._linkage
@@ -567,8 +548,12 @@ class SpacePlan:
                 if self._slides(name):
                     self._measure_slide(name, joint)
                 else:
+                    pair, frame = self._make_joint(name, joint.parent, joint.child)
+                    assert isinstance(pair, HingePair)
+                    # The x axis of the seat, turned with the child.
+                    mark = _clean(self.pose_frames[joint.child].resolve(frame.x))
                     self.coordinates[name] = len(self._state.coordinates)
-                    self._add(self._measure_hinge(name))
+                    self._add(MeasuredHinge(pair, mark, self.frames[joint.child]))
             self._end_group('measured', (), name)
         for point in linkage.traced:
             if self._is_known(self.same[point]):

@@ -14,7 +14,7 @@ from random import Random
 from campaigns.space_reference import moved, turned_about
 import linkage_ros as lr
 from linkage_ros.kinematics import Status
-from linkage_ros.resources import spatial_linkage_names
+from linkage_ros.resources import named_file, spatial_linkage_names
 from mpmath import mp, mpf
 import numpy as np
 import pytest
@@ -302,3 +302,29 @@ def test_rods_that_may_spin_are_named_and_turn_the_shortest_way():
     way = np.subtract(drawn['B'], drawn['A'])
     assert _rotate(quaternion, way) == pytest.approx(np.subtract(places['B'], places['A']))
     assert np.dot(quaternion[:3], way) == pytest.approx(0.0, abs=1e-16)
+
+
+def test_a_ratio_that_holds_in_the_pose_alone_is_refused(tmp_path):
+    """To first order it is redundant; over the range it is missed."""
+    closure = closure_of('rssr')
+    slope = closure.jacobian(closure.position(0.0))[0, 0].item()
+    file = tmp_path / 'rssr.yaml'
+    text = named_file('rssr', 'linkages').read_text('utf-8')
+    file.write_text(f'{text}ratios: {{rocker_joint: {{of: crank_joint, ratio: {slope!r}}}}}\n')
+    with pytest.raises(
+        lr.FileError, match='over-constrained: 1 equation more than needed, missed by'
+    ):
+        lr.load(file)
+
+
+@pytest.mark.parametrize('length', [0.15027, 0.1503, 0.16])
+def test_bennett_equations_are_met_within_the_rounding_of_cad_or_refused(tmp_path, length):
+    file = tmp_path / 'bennett.yaml'
+    text = named_file('bennett', 'linkages').read_text('utf-8')
+    file.write_text(text.replace('-0.15027138229377354', f'-{length}'))
+    if length == 0.15027:
+        closure = lr.load(file)
+        assert 1e-7 < closure.residual(closure.position(1.0)) < 1e-5
+        return
+    with pytest.raises(lr.FileError, match='over-constrained'):
+        lr.load(file)
