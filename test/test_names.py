@@ -41,6 +41,7 @@ import pytest
 
 from .kinematics.compiling.emitted import COMPILERS, needs
 from .support.commands import linkage as run
+from .support.sampling import sample_count
 
 HOSTILE = [
     # C, JavaScript, Python: ends of comments and strings, trigraphs, line continuations.
@@ -229,7 +230,7 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
 ) -> None:
     monkeypatch.setitem(painting._SETTINGS, 'svg.fonttype', 'none')
     file = tmp_path / 'a.svg'
-    for closure in linkages(12):
+    for closure in linkages(sample_count(12, 3)):
         joints = list(closure.linkage.joints)
         pose = usual_inputs(closure)
         paint_picture(prepare_view(closure, pose), closure.name, file, names=True)
@@ -270,7 +271,7 @@ def test_a_csv_holds_no_formula_and_the_names(tmp_path: Path) -> None:
     for cell in [*found, *(cell for row in rows for cell in row if cell != '-1.0')]:
         assert cell[0] not in '=+-@\uff1d\uff0b\uff0d\uff20', cell
     assert [re.sub("^'(?='*[-=+@\uff1d])", '', cell) for cell in found] == heads
-    for closure in linkages(12):
+    for closure in linkages(sample_count(12, 3)):
         (tmp_path / 'odd.yaml').write_text(linkage_text(closure.linkage), 'utf-8')
         typed = ['solve', str(tmp_path / 'odd.yaml'), '--steps', '2', '-o', str(file), '--force']
         assert main(typed) == 0
@@ -310,7 +311,7 @@ class _Page(HTMLParser):
 
 def test_names_in_a_page_are_text() -> None:
     tags = None
-    for closure in linkages(12):
+    for closure in linkages(sample_count(12, 3)):
         page = _Page()
         page.feed(LinkagePage(closure).text)
         assert page.tags == (tags := tags or page.tags)
@@ -328,6 +329,7 @@ FILES = ['a\nb', 'a\x1b[31mb', 'a\x7fb', 'a\u202eb', 'a\udcffb', '$x^$', '=1+1',
 """Names of files can hold what names in files cannot."""
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', FILES)
 def test_the_name_of_a_file_is_data_too(name: str, tmp_path: Path) -> None:
     given = f'{name}.yaml'

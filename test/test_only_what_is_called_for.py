@@ -190,6 +190,7 @@ def test_an_empty_scene_has_nothing(bare):
     assert 'numpy' not in bare.modules
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('effect', SCENES)
 def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
     expected = SCENES[effect]
@@ -244,6 +245,7 @@ def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
         assert theirs & look.modules == there
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('fault', FAULT_SCENES)
 def test_a_scene_with_one_fault_imports_the_faults(tmp_path, fault):
     drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE

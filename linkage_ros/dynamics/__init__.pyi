@@ -23,7 +23,6 @@ from linkage_ros.dynamics.laws import (
 from linkage_ros.dynamics.loads import (
     AppliedLoads as AppliedLoads,
     check_loads as check_loads,
-    check_masses as check_masses,
     Friction as Friction,
     GREATEST_LOAD as GREATEST_LOAD,
     JointFriction as JointFriction,

@@ -119,7 +119,7 @@ class JointMatrix:
             elimination = Elimination([*zip(*rows, strict=True)] if transposed else rows, ())
             if any(divisor == 0.0 for divisor in elimination.divisors):
                 return []
-            found = [elimination.solve(side) for side in split(numbers[count:], self.size)]
+            found = [elimination.solve(side) for side in split_numbers(numbers[count:], self.size)]
             return [*chain(*found)] if select is None else select(found)
 
         line = compile_function(solve, count + number * self.size)
@@ -177,7 +177,7 @@ class JointMatrix:
         )
 
 
-def split(numbers: Sequence[Any], size: int) -> list[list[Any]]:
+def split_numbers(numbers: Sequence[Any], size: int) -> list[list[Any]]:
     """Return numbers in pieces of one size."""
     return [list(piece) for piece in zip(*[iter(numbers)] * size, strict=True)]
 

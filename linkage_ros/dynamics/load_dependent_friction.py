@@ -30,7 +30,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
-from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split
+from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split_numbers
 from linkage_ros.kinematics import Elimination, make_vector, where
 
 _ROUNDS = 12
@@ -89,7 +89,7 @@ class FrictionSolver:
         flat = self._solve_sides(*numbers)
         if flat is None:
             return None
-        free, *units = split(flat, self._matrix.size)
+        free, *units = split_numbers(flat, self._matrix.size)
         nothing = [0.0] * len(free)
         forces = self._joint_forces([free, nothing, *units])
         found = self.solve_frictions(forces, [0.0] * self._count, 0.0)
@@ -151,7 +151,7 @@ class FrictionSolver:
         *levers, pull, mobility = numbers[begin:]
         sizes: list[Any] = []
         forces: list[Any] = []
-        pieces = split(numbers[:begin], 2 * (count + 2))
+        pieces = split_numbers(numbers[:begin], 2 * (count + 2))
         for (_, _, factor), piece in zip(self._unknowns, pieces, strict=True):
             x, y, by_x, by_y, *units = piece
             size = abs(make_vector(x, y)) + abs(make_vector(pull * by_x, pull * by_y))
@@ -182,7 +182,7 @@ class FrictionSolver:
         """Return what is missing of each friction, and how it falls with each of them."""
         count = self._count
         missing, slopes = [], []
-        for i, piece in enumerate(split(forces, 2 * (count + 1))):
+        for i, piece in enumerate(split_numbers(forces, 2 * (count + 1))):
             _, _, factor = self._unknowns[i]
             x, y, *units = piece
             for k, friction in enumerate(found):

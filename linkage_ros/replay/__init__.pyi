@@ -11,7 +11,6 @@ from linkage_ros.replay.compare import (
     Deviation as Deviation,
     FirstDifference as FirstDifference,
     TickPlace as TickPlace,
-    TopicComparison as TopicComparison,
     ulp_distance as ulp_distance,
 )
 from linkage_ros.replay.counterfactual import (
@@ -65,7 +64,6 @@ from linkage_ros.replay.verify import (
     beginning_text as beginning_text,
     DIFFERENT as DIFFERENT,
     examine_states as examine_states,
-    ExaminedRun as ExaminedRun,
     IDENTICAL as IDENTICAL,
     ReplayVerification as ReplayVerification,
     turning_joints as turning_joints,

@@ -118,7 +118,7 @@ except RecordingError as error:
 """
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('limit', [1_000_000, 1_000_001, 1_003_000, 1_060_000])
 @pytest.mark.parametrize('flush_every', [7, 100, 10**9])
 def test_a_limit_on_the_files_size_leaves_a_bag_of_whole_chunks(
@@ -384,7 +384,7 @@ def readable(folder, beside):
     return list(read_bag(beside).messages())
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('storage', STORAGES)
 @pytest.mark.parametrize('then', ['silence', 'more messages', 'the end'])
 @pytest.mark.parametrize('do', WHAT_IS_DONE)

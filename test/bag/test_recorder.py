@@ -309,7 +309,8 @@ def test_metadata_that_were_renewed_too_early_are_renewed_without_another_messag
     monkeypatch.setattr('linkage_ros.bag.writer.time.monotonic', lambda: now)
     writer = BagWriter(tmp_path / 'run', topics)
     counts = []
-    for now, written in ((0.0, 1), (0.1, 2), (0.9, 0), (1.0, 1), (1.1, 0), (1.8, 0)):
+    for instant, written in ((0.0, 1), (0.1, 2), (0.9, 0), (1.0, 1), (1.1, 0), (1.8, 0)):
+        now = instant
         for message in messages[:written]:
             writer.write(*message)
         writer.flush()

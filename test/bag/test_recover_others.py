@@ -65,6 +65,7 @@ def with_channels(file: Path, count: int) -> Path:
     return file
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('count', [MOST_CHANNELS + 1, 65_535, 65_536])
 def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
     file = with_channels(tmp_path / 'many' / 'many_0.mcap', count)

@@ -297,6 +297,7 @@ for deadline in range(1, 10**6):
 """
 
 
+@pytest.mark.sample(0)
 def test_a_kill_at_any_step_leaves_all_that_was_flushed(tmp_path, topics, messages):
     storage = Storage(split_seconds=0.08, keep_files=3)
     messages = [tuple(message) for message in messages[:1000]]

@@ -69,7 +69,7 @@ def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None
     }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('disk', [Disk('tmpfs', 'tmpfs', 4), Disk('ext4', 'ext4', 6, 20)])
 @pytest.mark.parametrize(
     ('storage', 'filler'),

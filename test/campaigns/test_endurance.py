@@ -145,6 +145,7 @@ COUNTS = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', COUNTS)
 def test_wrong_counts_are_faults(tmp_path: Path, name: str) -> None:
     stats, faults = COUNTS[name]

@@ -17,6 +17,7 @@ import pytest
 from ..support.scenes import ROOT
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('module', TESTS)
 def test_each_mutant_differs_in_one_expression_and_parses(module):
     source = file_of(module).read_bytes()
@@ -32,6 +33,7 @@ def test_the_tests_beside_each_module_are_there():
     assert all((ROOT / 'test' / name).exists() for tests in TESTS.values() for name in tests)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('text', 'killer'),
     [

@@ -28,6 +28,7 @@ import pytest
 ALL = [*RANDOM, *(name for name in ADVERSARIAL if name != 'lengths × 1e±150')]
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('family', ALL)
 def test_condition_numbers_in_doubles_are_right_where_differences_can_tell(family: str) -> None:
     for index in range(4):

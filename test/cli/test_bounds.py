@@ -80,6 +80,7 @@ def channels(file: Path, number: int, qos: str, **options: Any) -> None:
         writer.finish()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     'qos',
     [BOMB, f'- {BOMB}', '- ' + 'x' * 4_000_000, f'- {"[" * 50_000}', '- depth: ' + ':59' * 50_000],
@@ -128,6 +129,7 @@ METADATA = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', METADATA)
 def test_metadata_that_are_none_are_told_in_a_line(tmp_path: Path, name: str) -> None:
     text, reason = METADATA[name]
@@ -212,6 +214,7 @@ SCENES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
 def test_a_scene_without_end_is_told_in_a_line(tmp_path: Path, name: str) -> None:
     text, reason = SCENES[name]
@@ -229,6 +232,7 @@ ENDS: dict[str, Callable[[int], str]] = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(('what', 'most'), [('values', MOST_VALUES), ('levels', DEEPEST)])
 def test_the_limits_are_where_they_are_said_to_be(what: str, most: int) -> None:
     bounded_yaml(ENDS[what](most))

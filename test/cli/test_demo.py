@@ -68,6 +68,7 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
     assert picture.read_bytes().startswith(PNG)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ('name', 'beside', 'topic'),
     [
@@ -160,6 +161,7 @@ def test_a_drill_names_its_faults_and_runs_until_they_have_ended(linkage: Run) -
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'after'),
     [

@@ -117,6 +117,7 @@ def test_a_damaged_account_is_told_in_a_line(tmp_path, capsys, bag, name) -> Non
     assert lines[0].startswith(f'{odd}: its run.json is damaged; ')
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize('value', VALUES)
 @pytest.mark.parametrize('key', KEYS)
 def test_an_account_of_wrong_values_is_told_in_a_line(tmp_path, capsys, bag, key, value) -> None:
@@ -146,6 +147,7 @@ def test_a_change_that_is_none_is_a_value_error(name: str) -> None:
         read_change(CHANGES[name])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', CHANGES)
 def test_a_change_that_is_none_is_told_in_a_line(tmp_path, capsys, name) -> None:
     bag = recorded(tmp_path, 'faults: {quiet: {silence: {}}}\n', 60)
@@ -220,6 +222,7 @@ def odd_bag(folder: Path, odd: str) -> Path:
     )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', ODD)
 def test_what_is_shown_is_printable(tmp_path: Path, name: str) -> None:
     odd_bag(tmp_path, ODD[name])
@@ -355,6 +358,7 @@ def test_every_command_that_takes_a_bag_is_tried() -> None:
 LINES = [[name, 'strange', *more] for name, lines in TYPED.items() for more in lines]
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('words', [*LINES, *WITH_A_SCENE], ids=' '.join)
 def test_nothing_that_a_bag_names_is_imported(folder: Path, words: list[str]) -> None:
     ended = typed(folder, *words)

@@ -40,6 +40,7 @@ PLACES = {
 }
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize('place', PLACES)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_no_command_shows_a_traceback_wherever_its_output_goes(tmp_path, command, place) -> None:

@@ -73,6 +73,7 @@ def test_all_commands_that_write_are_tried() -> None:
     assert writing == {*WRITES, *FOLDERS}
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('command', [name for name in WRITES if name != 'import'])
 def test_a_file_that_exists_is_overwritten_by_force_only_and_keeps_its_mode(
     folder, command

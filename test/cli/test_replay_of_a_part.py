@@ -51,6 +51,7 @@ RINGS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', RINGS)
 def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
     effects, code, verdict, lost = RINGS[name]
@@ -177,6 +178,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
     assert 'discarded' not in text
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     'counts',
     ['3', '[]', '{"/joint_states": "many"}', '{"/joint_states": -1}', '{"/joint_states": true}',

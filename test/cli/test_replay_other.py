@@ -173,6 +173,7 @@ RUNS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', RUNS)
 def test_the_new_bag_replays_by_itself(tmp_path, capsys, name):
     text, linkage, other_text, other_linkage, expected = RUNS[name]

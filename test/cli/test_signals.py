@@ -167,6 +167,7 @@ def stuck_at(folder: Path, place: str, *arguments: str) -> subprocess.Popen[str]
     return start(folder, PROGRAM, place, separator, *arguments)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', READS)
 def test_a_command_ends_while_it_reads(folder, command, number) -> None:
@@ -177,6 +178,7 @@ def test_a_command_ends_while_it_reads(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
 def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
@@ -184,6 +186,7 @@ def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
     assert found == (1, 'linkage run: stopped\n')
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
 def test_a_command_ends_while_it_computes(folder, command, number) -> None:
@@ -193,6 +196,7 @@ def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'fmu', 'urdf', 'mjcf'])
 def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
     typed, _ = READS[command]
@@ -295,6 +299,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_signal_is_heeded_while_a_bag_is_searched(tmp_path, large, command) -> None:
     typed, said = COMMANDS[command]

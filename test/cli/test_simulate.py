@@ -83,6 +83,7 @@ effects: {dropout: {probability: 0.3}, delay: {seconds: 0.05}, rate_limit: {rate
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENES)
 def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys, name):
     monkeypatch.chdir(tmp_path)

@@ -110,6 +110,7 @@ def check_answer(typed: list[str], capsys: pytest.CaptureFixture[str]) -> bool:
     return bool(faults)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_length_of_any_size_is_computed_or_refused_in_one_line(
@@ -132,6 +133,7 @@ def test_a_length_of_any_size_is_computed_or_refused_in_one_line(
     assert not all(refused)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('size', [1e-150, 1e-15])
 @pytest.mark.parametrize('kind', ['a four-bar', 'a yoke', 'its offset'])
 def test_a_length_of_any_size_is_drawn(

@@ -143,6 +143,7 @@ def faults(folder: Path, done: list[tuple[str, int, int]]) -> list[tuple[str, st
     return found
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_stop_within_any_record_damages_no_bag(folder, command) -> None:
     ((target, code, pieces),) = stopped(folder, command, 'short', [('whole', 'SIGINT', 0, 0.0)])
@@ -161,6 +162,7 @@ def test_a_stop_within_any_record_damages_no_bag(folder, command) -> None:
     assert faults(folder, done) == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_a_stop_at_any_time_damages_no_bag(folder, command) -> None:
     cases = [

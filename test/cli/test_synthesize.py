@@ -234,6 +234,7 @@ def in_radians(typed: list[str]) -> list[str]:
     return [*words, '--radians']
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('kind', IN_DEGREES)
 def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
     linkage: Run, kind: str

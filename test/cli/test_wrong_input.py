@@ -62,6 +62,7 @@ READS = {
 KINDS = {'pipe': 'a pipe', 'socket': 'a socket', 'device': 'a device'}
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('read', READS)
 def test_what_is_no_regular_file_is_refused(
@@ -224,6 +225,7 @@ def test_a_linkage_at_an_end_of_what_there_is_is_answered(
     assert 'inf times' not in answer.stderr
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(('content', 'typed', 'named'), REFUSED)
 def test_a_file_without_measure_is_refused_in_a_line(
     linkage: Run, tmp_path: Path, content: str, typed: str, named: str

@@ -135,6 +135,7 @@ def legend(axes: Any) -> list[str]:
     return [text.get_text() for text in axes.get_legend().get_texts()]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', DESIGNS)
 def test_no_number_lies_on_another_and_none_outside(name):
     found = sheet(name)

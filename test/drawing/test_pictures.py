@@ -55,6 +55,7 @@ def nearer(written: list[tuple[str, Any]], apart: float) -> list[tuple[str, str]
     ]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', linkage_names())
 def test_names_are_apart_and_all_texts_are_within_the_picture(name):
     figure = drawn(name)

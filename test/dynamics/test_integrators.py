@@ -158,6 +158,7 @@ def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
     assert slopes(drifts)[-1] == pytest.approx(ORDER[method], abs=0.5)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('steps', [2000, pytest.param(50_000, marks=pytest.mark.slow)])
 def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
     motions = turned(four_bar, 'gauss_legendre', steps * 5e-4, steps)

@@ -78,7 +78,7 @@ def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_
     assert dyad.accelerations(pose, 1.0, 0.5) == pytest.approx((0.0, 0.5), rel=8e-16, abs=8e-16)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
 @pytest.mark.parametrize('step', [0.001, 0.1, 2.9])
 @pytest.mark.parametrize('sign', [1, -1])

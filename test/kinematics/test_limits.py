@@ -279,7 +279,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
         assert interval.is_whole or interval.lowest <= value <= interval.highest
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ('lines', 'seed', 'turns'),
     [(0, 10, 0), (0, 50, 0), (1, 27, 0), (2, 11, 0), (2, 38, 0), (0, 0, 1), (0, 2, 1)],

@@ -119,6 +119,7 @@ def check_ranges(lengths: tuple[float, float, float, float]) -> tuple[bool, bool
     return folds, stretches
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', FOUR_BARS)
 def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name):
     lengths = FOUR_BARS[name]

@@ -229,6 +229,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
 def test_they_replay_so_in_another_process(recorded, name):
     folder, done = recorded(name)
@@ -247,6 +248,7 @@ def test_they_replay_so_in_another_process(recorded, name):
     assert again.stdout.strip() == digest.hexdigest()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
 def test_another_seed_replays_to_other_bytes(recorded, name):
     # What is equal above is not so by chance.

@@ -128,6 +128,7 @@ SILENCES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', SILENCES)
 def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
     latched = graph.node.create_publisher(String, '/two', LATCHED)

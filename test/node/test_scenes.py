@@ -212,6 +212,7 @@ def test_every_shipped_scene_is_here():
     assert set(PUBLISHED) == set(SHOWN) == shipped
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', PUBLISHED)
 def test_it_publishes_what_it_calls_for_and_no_more(graph, start, name):
     joints, arrays, extra_topics, from_topic = PUBLISHED[name]

@@ -66,6 +66,7 @@ def closed_bags(runs):
     return totals
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('moment', range(2))
 @pytest.mark.parametrize('number', SIGNALS)
 def test_at_a_random_moment(start, recorded, number, moment):
@@ -112,6 +113,7 @@ def test_an_impatient_user(start, recorded):
     assert len(closed_bags(runs)) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('where', STUCK)
 def test_a_middleware_that_hangs_does_not_keep_the_process(start, recorded, where):
     scene, runs = recorded

@@ -67,6 +67,7 @@ def test_the_installed_package_is_the_one_imported(workspace, installed, run):
     assert place.is_relative_to(installed) or place.is_relative_to(workspace / 'build')
 
 
+@pytest.mark.sample(0)
 def test_colcon_test_is_clean(workspace, run):
     # A few only: `make test` runs them all, and colcon adds nothing but its own doing.
     subset = ['test/packaging/test_launch.py', 'test/packaging/test_layering.py']

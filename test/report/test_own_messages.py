@@ -214,6 +214,7 @@ REJECTED = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('reason', REJECTED)
 def test_samples_are_rejected_for_the_reason_for_which_the_drive_did(tmp_path, reason):
     bad = REJECTED[reason]

@@ -145,6 +145,7 @@ HAPPENS = {
 }
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('block', [8192, 64])
 @pytest.mark.parametrize('name', HAPPENS)
 def test_what_happens_is_on_its_lane_at_its_time_and_nothing_on_the_others(
@@ -243,6 +244,7 @@ BEGUN_LATER = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('block', [8192, 1])
 @pytest.mark.parametrize('name', BEGUN_LATER)
 def test_a_fault_that_was_on_before_the_bag_is_on_from_its_begin(

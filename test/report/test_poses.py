@@ -86,6 +86,7 @@ def test_points_are_where_the_closure_has_them(file):
     assert found.apart.max() < 1e-12 * size
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_shapes_in_frames_are_those_of_the_drawing(file):
     closure = closure_of(file)
@@ -179,6 +180,7 @@ def of(text, kind):
     return np.frombuffer(b64decode(text), kind)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_links_are_drawn_where_the_loops_close_at_the_recorded_inputs(tmp_path, file):
     scene_file = tmp_path / 's.yaml'

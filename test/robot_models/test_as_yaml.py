@@ -46,6 +46,7 @@ def check(data):
     assert read.split() == text.split(), 'lines are folded, and that is all'
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize('write', [urdf_model, mujoco_model])
 @pytest.mark.parametrize('file', FILES, ids=lambda file: f'{file.parent.name}/{file.stem}')
 def test_what_comes_with_the_package(file, write):
@@ -100,6 +101,7 @@ def test_names_of_any_kind(names, robot):
 EXPRESSIONS = ['${1+1}', 'a$(pwd)', '$${x}', '$$(x)', '${']
 
 
+@pytest.mark.sample(15)
 @pytest.mark.parametrize('odd', EXPRESSIONS)
 @pytest.mark.parametrize('place', range(9))
 def test_a_name_that_xacro_would_evaluate_is_refused(place, odd):

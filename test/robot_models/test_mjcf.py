@@ -77,6 +77,7 @@ def case(name):
     return closure_of(name) if name in ODD else moving(LINKAGES / f'{name}.yaml').closures[0]
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
 def test_it_starts_closed(name):
     closure = case(name)
@@ -101,6 +102,7 @@ ROUNDING = 1e-14
 """Of the linkage's size: what the sums of some ten lengths round to."""
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
 def test_a_reset_closes_it_too(name):
     """Where no key is asked for, a simulation starts at qpos0: that is the same pose."""
@@ -122,6 +124,7 @@ def test_a_reset_closes_it_too(name):
     assert np.isfinite(state.qpos).all()
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
 def test_it_moves_as_the_closure_says(name):
     closure = case(name)

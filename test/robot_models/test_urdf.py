@@ -100,6 +100,7 @@ def limits_of(data):
     }
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_joints_keep_their_limits_and_come_near_them(name):
     """A node that starts where the linkage starts publishes nothing beyond the limits."""
@@ -142,6 +143,7 @@ def swept(pipeline, name, values):
             yield heard(message)
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize('angles', ['continuous', 'wrapped'])
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):

@@ -57,6 +57,7 @@ def check(data, closure, messages, within=1e-12):
     return count, cuts
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', ONE_INPUT)
 def test_every_cut_pin_of_the_shipped_linkages_meets(name):
     file = LINKAGES / f'{name}.yaml'
@@ -78,6 +79,7 @@ def test_cut_pins_of_a_linkage_with_two_inputs_meet():
     assert count == 60
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', ODD)
 def test_every_way_from_frame_to_frame(name):
     closure = closure_of(name)

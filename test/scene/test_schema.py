@@ -327,6 +327,7 @@ def reads(content: dict[str, Any], of: Any) -> bool:
     return True
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('what', TYPES)
 def test_schema_and_reader_take_the_same_parameters(what):
     of = TYPES[what]

@@ -95,6 +95,7 @@ def test_a_killed_worker_loses_no_finished_run(capsys):
     check_goes_on(kept, capsys)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('workers', ['1', '2'])
 @pytest.mark.parametrize('ended_by', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_study_that_is_ended_itself_goes_on(ended_by, workers, capsys):

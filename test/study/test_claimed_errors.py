@@ -124,6 +124,7 @@ def joints_of(name, theta):
     return {'drive_joint': theta, 'crank_joint': theta}
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('name', 'text', 'method', 'limits', 'like', 'truth'), TORQUE, ids=lambda each: str(each)[:24]
 )

@@ -142,6 +142,7 @@ def price_of(scene, setting):
     return price(dearer, changes.get('rate', scene.rate))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('text', [SWINGS, FOLLOWS], ids=['torque', 'sine'])
 def test_a_need_is_met_when_it_is_run(tmp_path, text):
     """What was written for a need is measured anew, with its advice followed."""

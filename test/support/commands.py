@@ -11,12 +11,14 @@
 
 Most of the time of a command goes into imports. One server process for each worker of the tests
 imports what commands need, and forks a child for each command. The child has its own
-arguments, folder, environment and output, and ends as any process does. A test of imports, of
-signals or of limits needs a Python of its own, by `subprocess`.
+arguments, folder, environment and output, and ends as any process does, but for the modules: to
+take them apart takes longer than most commands. A test of imports, of signals or of limits needs a
+Python of its own, by `subprocess`.
 """
 
 from __future__ import annotations
 
+import atexit
 from contextlib import suppress
 from functools import cache
 import gc
@@ -32,6 +34,7 @@ import subprocess
 import sys
 from tempfile import TemporaryFile
 import time
+from typing import NoReturn
 
 import linkage_ros
 from linkage_ros.cli.main import main
@@ -162,6 +165,29 @@ def _serve(control: socket.socket) -> None:
     sys.exit()
 
 
+def _run_command() -> NoReturn:
+    try:
+        code = main()
+    except SystemExit as ended:
+        if not isinstance(ended.code, int):
+            raise
+        code = ended.code
+    _codes.append(code)
+    sys.exit(code)
+
+
+_codes: list[int] = []  # Exit code of the command, once it has ended by itself
+
+
+def _leave() -> None:
+    """Leave without taking modules apart."""
+    if _codes:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_codes[0])
+
+
 if __name__ == '__main__':
+    atexit.register(_leave)  # the first of all: it is called last
     _serve(socket.socket(fileno=int(sys.argv[1])))
-    sys.exit(main())
+    _run_command()

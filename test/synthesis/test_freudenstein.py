@@ -32,12 +32,14 @@ from mpmath import cos, lu_solve, matrix, mp, mpf, sin, sqrt
 import numpy as np
 import pytest
 
+from ..support.sampling import sample_count
+
 mp.dps = 60
 Angles = tuple[float, ...]
 SEED = 20261121
 """Not the campaign's own."""
 
-MANY, FEW = 6_000, 600
+MANY, FEW = sample_count(6_000, 1_500), sample_count(600, 150)
 """Linkages of a usual family, and of a hard one."""
 
 

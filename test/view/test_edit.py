@@ -52,6 +52,7 @@ def changed_lines(before: str, after: str) -> list[str]:
 # A pin is dragged.
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', sorted({*linkage_names()} - {'elliptic_trammel', 'scotch_yoke'}))
 def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -> None:
     text = text_of(name)

@@ -64,6 +64,7 @@ def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]
     return states
 
 
+@pytest.mark.sample(5)
 @needs_node
 @pytest.mark.parametrize('name', sorted(linkage_names()))
 def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: Path) -> None:
@@ -107,6 +108,7 @@ def test_rates_of_frames_are_those_of_the_frames(tmp_path: Path) -> None:
     assert now['frameRates'] == pytest.approx(differences, abs=1e-8)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', linkage_names())
 def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
     found = build_model(text_of(name), name)
@@ -143,6 +145,7 @@ def test_what_takes_longer_is_left_out_during_a_drag() -> None:
     assert {'others', 'ranges', 'quality', 'warnings'}.isdisjoint(found)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', linkage_names())
 def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> None:
     found = build_model(text_of(name), name)

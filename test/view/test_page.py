@@ -114,7 +114,7 @@ def agrees(page: Any) -> None:
 # Without a server.
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', linkage_names())
 def test_every_shipped_linkage_opens_and_stands_where_the_closure_says(
     browser: Any, stills: Callable[[str], Path], name: str

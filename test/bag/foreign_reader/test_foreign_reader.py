@@ -146,7 +146,7 @@ RUNS = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(('linkage', 'text', 'how', 'topics'), RUNS.values(), ids=RUNS.keys())
 def test_a_run(tmp_path, linkage, text, how, topics):
     rate = 100 if 'split' in how else 1000
