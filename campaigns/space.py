@@ -81,6 +81,16 @@ def _place(random: Random) -> list[float]:
     return [random.uniform(-1.0, 1.0) for _ in range(3)]
 
 
+def _vector(place: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = place
+    return x, y, z
+
+
+def _three(numbers: Sequence[Any], first: int) -> list[Any]:
+    end = first + 3
+    return [*numbers[first:end]]
+
+
 def _distance(random: Random, near: bool) -> float:
     """Return a distance from a toggle: of angles, or of a length relative to it."""
     return 10.0 ** random.uniform(-9.0, -3.0) if near else random.uniform(0.05, pi - 0.05)
@@ -112,7 +122,7 @@ def hinge_case(random: Random, near: bool = False) -> Case:
         rod = sqrt(d * d + r * r - 2.0 * r * d * cos(apart) + height * height)
     direction = atan2(place[1], place[0])
     pair = HingePair(0, GROUND_FRAME)
-    step = ClosedHinge(pair, (*place,), 1, Rod(rod), float(sign), 2, r, direction)  # type: ignore[arg-type]
+    step: Any = ClosedHinge(pair, _vector(place), 1, Rod(rod), float(sign), 2, r, direction)
     found = [one.coordinates[1] for one in _states_after(step, [to], [velocity], [change])]
     errors = errors_of(
         lambda n, t: hinge_angle(n[:3], moved(n[3:6], n[7:10], n[10:], t), n[6], sign),
@@ -129,7 +139,7 @@ def slide_case(random: Random, near: bool = False) -> Case:
     sign = random.choice((-1, 1))
     rod = hypot(to[0] - place[0], to[1] - place[1]) * (1.0 + _distance(random, near))
     pair = SlidePair(0, GROUND_FRAME)
-    step = ClosedSlide(pair, (*place,), 1, Rod(rod), float(sign), 2)  # type: ignore[arg-type]
+    step = ClosedSlide(pair, _vector(place), 1, Rod(rod), float(sign), 2)
     found = [one.coordinates[1] for one in _states_after(step, [to], [velocity], [change])]
     errors = errors_of(
         lambda n, t: slide_length(n[:3], moved(n[3:6], n[7:10], n[10:], t), n[6], sign),
@@ -140,7 +150,7 @@ def slide_case(random: Random, near: bool = False) -> Case:
 
 
 def three_distances_case(random: Random, near: bool = False) -> Case:
-    """Return a point above the plane of three others, near it for a toggle."""
+    """Return a coordinate of a point above the plane of three others, near it for a toggle."""
     ends, velocities, changes = ([_place(random) for _ in range(3)] for _ in range(3))
     sign, apart = random.choice((-1, 1)), _distance(random, near)
     a, b = random.uniform(-1.0, 1.5), random.uniform(-1.0, 1.5)
@@ -152,18 +162,15 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     step = ThreeDistances((1, 2, 3), tuple(map(Rod, rods)), float(sign), 4)
     states = _states_after(step, ends, velocities, changes)
     flat = [n for rows in (ends, [rods], velocities, changes) for row in rows for n in row]
-    errors = []
-    for axis in range(3):
+    axis = random.randrange(3)
 
-        def coordinate(n: Sequence[Any], t: Any, axis: int = axis) -> Any:
-            places, velocities, changes = (
-                [n[first + k : first + k + 3] for k in (0, 3, 6)] for first in (0, 12, 21)
-            )
-            now = [moved(*each, t) for each in zip(places, velocities, changes, strict=True)]
-            return three_spheres(now, n[9:12], sign)[axis]
+    def coordinate(n: Sequence[Any], t: Any) -> Any:
+        parts = ([_three(n, first + k) for k in (0, 3, 6)] for first in (0, 12, 21))
+        now = [moved(*each, t) for each in zip(*parts, strict=True)]
+        return three_spheres(now, n[9:12], sign)[axis]
 
-        errors.append(errors_of(coordinate, flat, [state.pins[4][axis] for state in states]))
-    return Case([max(each) for each in zip(*errors, strict=True)], (sign, ends, rods))
+    errors = errors_of(coordinate, flat, [state.pins[4][axis] for state in states])
+    return Case(errors, (sign, axis, ends, rods))
 
 
 def random_rssr(random: Random) -> SpaceLinkage:
@@ -202,7 +209,7 @@ def rssr_case(random: Random) -> Case:
     sign = sign_of(closure, 'rocker')
 
     def angle(numbers: Sequence[Any], t: Any) -> Any:
-        a, b, at, axis, to_at, to_axis = (numbers[3 * k : 3 * k + 3] for k in range(6))
+        a, b, at, axis, to_at, to_axis = (_three(numbers, 3 * k) for k in range(6))
         rod, q, w, change = numbers[18:]
         now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
         return angle_to_meet(b, to_at, to_axis, now, rod, sign)
@@ -235,9 +242,7 @@ def ankle_case(random: Random, closure: Any = None) -> Case:
         sign = sign_of(closure, motor)
 
         def angle(numbers: Sequence[Any], t: Any, sign: int = sign) -> Any:
-            b, c, at1, axis1, at2, axis2, at3, axis3 = (
-                numbers[3 * n : 3 * n + 3] for n in range(8)
-            )
+            b, c, at1, axis1, at2, axis2, at3, axis3 = (_three(numbers, 3 * n) for n in range(8))
             pitch, roll = (
                 numbers[25 + n] + numbers[27 + n] * t + numbers[29 + n] * t * t / 2
                 for n in range(2)
@@ -285,7 +290,7 @@ def main() -> int:
     """Run the campaign, and return the exit code."""
     begin = datetime.now().astimezone()
     parser = parser_of('space', __doc__, page=PAGE, jobs=1)
-    parser.add_argument('--cases', type=int, default=4000, help='cases of each family')
+    parser.add_argument('--cases', type=int, default=2000, help='cases of each family')
     arguments = parser.parse_args()
     table = Table('Worst errors, in u·κ', ('family', 'cases', *ORDERS))
     advance = progress_lines(arguments.cases * len(FAMILIES), 'cases')

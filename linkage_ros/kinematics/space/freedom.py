@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.batch import Array
-from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import SpaceLinkage
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import Vector
@@ -51,8 +50,8 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
     rows: list[Array] = []
 
     def spin(link: str) -> Array:
-        found = np.zeros((3, count))
-        found[:, 6 * links[link] : 6 * links[link] + 3] = np.eye(3)
+        first, found = 6 * links[link], np.zeros((3, count))
+        found[:, first:][:, :3] = np.eye(3)
         return found
 
     def velocity(link: str, place: Vector) -> Array:
@@ -60,8 +59,8 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         first = 6 * links[link]
         found = np.zeros((3, count))
         # v + ω × place
-        found[:, first : first + 3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-        found[:, first + 3 : first + 6] = np.eye(3)
+        found[:, first:][:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+        found[:, first:][:, 3:6] = np.eye(3)
         return found
 
     def rate(name: str) -> Array:
@@ -105,7 +104,7 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         rows.append((rate(name) - ratio.ratio * rate(ratio.of))[None])
         needed += 1
     ground = np.zeros((6, count))
-    ground[:, 6 * links[GROUND] : 6 * links[GROUND] + 6] = np.eye(6)
+    ground[:, :6] = np.eye(6)  # The first of the links
     constraints = np.vstack([*rows, ground])
     everything = np.vstack([constraints, np.vstack([rate(name) for name in linkage.driven])])
     rods = plan.rods
