@@ -68,7 +68,9 @@ def named_file(named: str | PathLike[str], *folders: str) -> Path:
     FileError if there is no such file or name; TypeError if ``named`` cannot be a path.
     """
     searched = (*folders, SPATIAL) if 'linkages' in folders else folders
-    known = {name: folder for folder in reversed(searched) for name in _yaml_names(folder)}
+    known: dict[str, str] = {}
+    for folder in searched:
+        known |= {name: folder for name in _yaml_names(folder) if name not in known}
     try:
         path = Path(named)
     except TypeError:
