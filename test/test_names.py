@@ -41,7 +41,6 @@ import pytest
 
 from .kinematics.compiling.emitted import COMPILERS, needs
 from .support.commands import linkage as run
-from .support.sampling import sample_count
 
 HOSTILE = [
     # C, JavaScript, Python: ends of comments and strings, trigraphs, line continuations.
@@ -230,7 +229,7 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
 ) -> None:
     monkeypatch.setitem(painting._SETTINGS, 'svg.fonttype', 'none')
     file = tmp_path / 'a.svg'
-    for closure in linkages(sample_count(12, 3)):
+    for closure in linkages(12):
         joints = list(closure.linkage.joints)
         pose = usual_inputs(closure)
         paint_picture(prepare_view(closure, pose), closure.name, file, names=True)
@@ -271,7 +270,7 @@ def test_a_csv_holds_no_formula_and_the_names(tmp_path: Path) -> None:
     for cell in [*found, *(cell for row in rows for cell in row if cell != '-1.0')]:
         assert cell[0] not in '=+-@\uff1d\uff0b\uff0d\uff20', cell
     assert [re.sub("^'(?='*[-=+@\uff1d])", '', cell) for cell in found] == heads
-    for closure in linkages(sample_count(12, 3)):
+    for closure in linkages(12):
         (tmp_path / 'odd.yaml').write_text(linkage_text(closure.linkage), 'utf-8')
         typed = ['solve', str(tmp_path / 'odd.yaml'), '--steps', '2', '-o', str(file), '--force']
         assert main(typed) == 0
@@ -311,7 +310,7 @@ class _Page(HTMLParser):
 
 def test_names_in_a_page_are_text() -> None:
     tags = None
-    for closure in linkages(sample_count(12, 3)):
+    for closure in linkages(12):
         page = _Page()
         page.feed(LinkagePage(closure).text)
         assert page.tags == (tags := tags or page.tags)
