@@ -23,7 +23,7 @@ import sys
 from linkage_ros.cli import COMMANDS, EXIT_CODES, find_command, Parser, parser_of, SHELLS
 from linkage_ros.description import load_scene, SCENE_FILE
 from linkage_ros.errors import LinkageError
-from linkage_ros.resources import linkage_names, named_file, scene_names
+from linkage_ros.resources import linkage_names, named_file, scene_names, spatial_linkage_names
 import pytest
 
 from .recorded import Recorded, scene_file
@@ -157,7 +157,7 @@ def test_a_choice_that_is_nearly_right_is_named(capsys: pytest.CaptureFixture[st
     assert tried > 5
 
 
-@pytest.mark.parametrize('name', [*linkage_names(), *scene_names()])
+@pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names(), *scene_names()])
 def test_a_name_that_is_nearly_right_is_told(name: str) -> None:
     with pytest.raises(LinkageError, match=f'did you mean .{name}.?'):
         named_file(f'{name}x', 'scenes', 'linkages')
@@ -367,7 +367,8 @@ def test_a_replay_runs_the_scene_of_the_bag_with_what_is_set(folder: Path) -> No
 def test_the_gallery_lists_every_linkage_and_scene_with_a_line(tmp_path: Path) -> None:
     lines = linkage(tmp_path, 'gallery').stdout.splitlines()
     names = [line.split()[0] for line in lines if line]
-    assert names == ['linkages', *linkage_names(), 'scenes', *scene_names()]
+    linkages = [*linkage_names(), *spatial_linkage_names()]
+    assert names == ['linkages', *linkages, 'scenes', *scene_names()]
     assert all(len(line.split()) > 3 for line in lines if line not in ('', 'linkages', 'scenes'))
 
 
@@ -376,6 +377,7 @@ def test_a_file_of_the_gallery_is_printed(tmp_path: Path) -> None:
         (['hoeken'], 'linkages/hoeken'),
         (['demo'], 'scenes/demo'),
         (['jansen_leg'], 'linkages/jansen_leg'),
+        (['ankle'], 'linkages/space/ankle'),
         (['jansen_leg', '--scene'], 'scenes/jansen_leg'),
     ):
         answer = linkage(tmp_path, 'gallery', *typed)

@@ -38,7 +38,7 @@ def test_a_reader_of_the_bare_files_finds_every_command_key_and_effect():
         'commands.md': [f'## linkage {name}' for name in COMMANDS],
         'files.md': [
             f'| `{key}` |'
-            for schema in (scene_schema(), linkage_schema())
+            for schema in (scene_schema(), linkage_schema()['then'], linkage_schema()['else'])
             for key in schema['properties']
         ],
         'parameters.md': [

@@ -180,7 +180,14 @@ def test_every_drive_effect_and_fault_is_in_its_reference(pages):
     assert found == expected
 
 
-@pytest.mark.parametrize('schema', [scene_schema(), linkage_schema()], ids=['scene', 'linkage'])
+SCHEMAS = {
+    'scene': scene_schema(),
+    'linkage': linkage_schema()['else'],
+    'spatial linkage': linkage_schema()['then'],
+}
+
+
+@pytest.mark.parametrize('schema', SCHEMAS.values(), ids=SCHEMAS.keys())
 def test_every_key_of_a_file_is_in_its_reference(pages, schema):
     words = {word.strip() for word in pages['reference/files.html'].words}
     assert {*schema['properties']} <= words
