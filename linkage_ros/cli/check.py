@@ -336,7 +336,8 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'limits': _limits_json(linkage),
         **_examine_reach(closure, sweep),
         **_examine_residual(closure, sweep),
-        **tables_json(tables),
+        'groups': [group._asdict() for group in closure.groups],
+        **tables_json(tables[1:]),
     }, tables
 
 
