@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
-from functools import partial
+from functools import cache, partial
 from math import atan2, cos, dist, hypot, pi, sin, sqrt
 from random import Random
 import sys
@@ -225,9 +225,14 @@ _ANKLE = {'m1': ('b1', 'c1'), 'm2': ('b2', 'c2')}
 """For each motor the points of its bar and of the foot."""
 
 
-def ankle_case(random: Random, closure: Any = None) -> Case:
+@cache
+def _shipped_ankle() -> Any:
+    return load(ROOT / 'config' / 'linkages' / 'space' / 'ankle.yaml')
+
+
+def ankle_case(random: Random) -> Case:
     """Return the shipped ankle in a random state; each motor is a closed form of both joints."""
-    closure = closure or load(ROOT / 'config' / 'linkages' / 'space' / 'ankle.yaml')
+    closure = _shipped_ankle()
     linkage: SpaceLinkage = closure.linkage
     while True:
         states = [[random.uniform(-reach, reach) for _ in range(2)] for reach in (0.5, 1.0, 1.0)]
