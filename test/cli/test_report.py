@@ -25,6 +25,7 @@ from linkage_ros.tools.view import report_command as command
 import pytest
 
 from .recorded import answer, JOINT_STATE, Recorded, rewritten, scene_file, topic
+from ..support.commands import linkage
 
 pytest.importorskip('plotly', reason='is within the page')
 
@@ -157,6 +158,17 @@ def test_a_part_beyond_the_end_says_so(bag: Path, tmp_path: Path) -> None:
     assert answer(command, bag, '-o', page, '--since', '5') == 0
     assert warnings_of(page) == ['The part begins after the end of the run, at 0.299 s.']
     assert data_of(page)['curves'] == []
+
+
+def test_a_spatial_linkage_has_plots_and_a_line_in_place_of_its_picture(tmp_path: Path) -> None:
+    scene = tmp_path / 'ankle_scene.yaml'
+    scene.write_text('linkage: ankle\ndrive: {sine: {amplitude: 0.1, frequency: 1}}\n')
+    for typed in (('simulate', scene, '--seconds', '1', '-o', 'bag'), ('report', 'bag')):
+        assert linkage(tmp_path, *map(str, typed)).returncode == 0
+    page = tmp_path / 'bag.html'
+    assert 'Not drawn: a spatial linkage<' in page.read_text()
+    assert 'The links stand where' not in page.read_text()
+    assert [each['drawn'] for each in data_of(page)['linkages']] == [None]
 
 
 def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:

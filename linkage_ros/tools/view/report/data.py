@@ -319,8 +319,10 @@ def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[
     return found
 
 
-def _drawing_of(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
+def _drawing_of(closure: Any, space: int) -> tuple[dict[str, Any] | None, int, str]:
     """Return the drawing of a linkage and its size in [bytes], or why there is none."""
+    if not isinstance(closure, Closure):
+        return None, 0, 'a spatial linkage'
     try:
         drawn = drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)

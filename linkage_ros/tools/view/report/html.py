@@ -233,7 +233,8 @@ def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Ite
     yield '<label><input type="checkbox" id="traces" checked> traced curves</label>'
     yield '</div><dl class="readout" id="readout" aria-live="off"></dl>'
     why = next((each['untold'] for each in drawn if each['untold']), '')
-    yield f'<p class="note">{escape(CLOSED_NOTE.format(why=why) if why else POSE_NOTE)}</p>'
+    if any(each['drawn'] for each in drawn):
+        yield f'<p class="note">{escape(CLOSED_NOTE.format(why=why) if why else POSE_NOTE)}</p>'
     yield '</section>'
 
 

@@ -145,6 +145,7 @@ const Report = (() => {
         if (Number.isFinite(value)) facts.push([name, Angles.readout(value, units.get(name))]);
       }
       const apart = linkage.apart[number] * 1e3;
+      if (!Number.isFinite(apart)) return;
       const unlike = apart < 1e-6 ? '< 1 nm' : `${apart.toPrecision(3)} mm`;
       facts.push([`links come apart by${linkages.length > 1 ? ` (${linkage.name})` : ''}`, unlike]);
     });
