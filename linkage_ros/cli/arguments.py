@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Collection, Sequence
-from math import degrees, isfinite, pi, radians, remainder, tau
+from math import degrees, isfinite, nan, pi, radians, remainder, tau
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
@@ -41,6 +41,49 @@ _IN_DEGREES = re.compile(r'([-+]?(?:nan|inf|\d[\d.]*(?:e[-+]?\d+)?))°')
 def add_file(parser: argparse.ArgumentParser) -> None:
     """Declare the linkage file."""
     parser.add_argument('file', metavar='FILE', help='linkage file, or a name of linkage gallery')
+
+
+def add_robot(parser: argparse.ArgumentParser) -> None:
+    """Declare what may be told of a robot, if the linkage file is a URDF; see `robot_of`."""
+    robot = parser.add_argument_group('a robot: FILE is a URDF with loops')
+    robot.add_argument(
+        '--input', action='append', default=[], metavar='JOINT', help='joint that is driven'
+    )
+    robot.add_argument(
+        '--close',
+        action='append',
+        default=[],
+        metavar='FRAME=FRAME[:KIND]',
+        help='links whose origins meet, or places LINK.x,y,z in metres: by a ball, or by a hinge '
+        'about the z axis of the first, or fixed; once for each loop that the URDF does not close',
+    )
+    robot.add_argument(
+        '--pose',
+        action='append',
+        type=read_joint_value,
+        default=[],
+        metavar='JOINT=VALUE',
+        help='value of a joint, if not 0, at which the loops close, in radians or metres; at in a '
+        'scene',
+    )
+
+
+def robot_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what is told of a robot, by the keys of a scene."""
+    told = {'input': arguments.input, 'close': arguments.close, 'at': dict(arguments.pose)}
+    return {key: value for key, value in told.items() if value}
+
+
+def read_joint_value(text: str) -> tuple[str, float]:
+    """Read JOINT=VALUE, in [rad] or [m]."""
+    joint, equal, value = text.rpartition('=')
+    try:
+        number = float(value)
+    except ValueError:
+        number = nan
+    if not (joint and equal and isfinite(number)):
+        raise argparse.ArgumentTypeError(f'{text!r} is not a value; write JOINT=0.5')
+    return joint, number
 
 
 def add_bag(parser: argparse.ArgumentParser) -> None:

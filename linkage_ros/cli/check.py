@@ -19,7 +19,14 @@ import sys
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.arguments import add_file, add_radians, DisplayUnits, finite_or_none
+from linkage_ros.cli.arguments import (
+    add_file,
+    add_radians,
+    add_robot,
+    DisplayUnits,
+    finite_or_none,
+    robot_of,
+)
 from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, facts_table, Quantity, Table, UNIT
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
@@ -70,6 +77,7 @@ EXAMPLE = 'linkage check jansen_leg'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
+    add_robot(parser)
     add_result(parser)
     parser.add_argument(
         '--branches',
@@ -82,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; an invalid file raises before this returns."""
     file = named_file(arguments.file, 'linkages')
-    content = linkage_content(file)
+    content = linkage_content(file, robot_of(arguments))
     closure = read_any_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
@@ -336,6 +344,8 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'limits': _limits_json(linkage),
         **_examine_reach(closure, sweep),
         **_examine_residual(closure, sweep),
+        'robot_open_by_m': linkage.open_by,
+        'left_out': list(linkage.left_out),
         'groups': [group._asdict() for group in closure.groups],
         **tables_json(tables[1:]),
     }, tables
@@ -511,6 +521,10 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
     if account['redundant_equations']:
         met = 'equations, met within the worst residual'
         yield 'redundant', f'{account["redundant_equations"]} {met}'
+    if account['robot_open_by_m'] is not None:
+        yield 'open by', f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose'
+    if account['left_out']:
+        yield 'left out, in no loop', ', '.join(account['left_out'])
     yield from _reach_facts(account, units)
 
 

@@ -42,6 +42,7 @@ from linkage_ros.replay import (
     describe_topic,
     message_type,
     ReplayEvent,
+    to_attachments,
     user_effects_here,
     versions_here,
 )
@@ -150,8 +151,7 @@ class ReplayBag:
                 'run': read_raw_metadata(bag),
             },
         }
-        files = {name: ('application/yaml', data) for name, data in scene.files.items()}
-        files[RUN_FILE] = ('application/json', json.dumps(account).encode())
+        files = to_attachments({**scene.files, RUN_FILE: json.dumps(account).encode()})
         self._recorder = DirectRecorder(BagWriter(folder, described, files))
 
     @property

@@ -27,10 +27,12 @@ from linkage_ros.cli.arguments import (
     add_at,
     add_file,
     add_radians,
+    add_robot,
     bounded_number,
     DisplayUnits,
     read_inputs,
     read_numbers,
+    robot_of,
     wrap_angle,
 )
 from linkage_ros.cli.result import add_result, Result, show_result
@@ -63,6 +65,7 @@ EXAMPLE = 'linkage solve four_bar --at 40 --at 90'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
+    add_robot(parser)
     add_at(parser, 'an input to solve for; may be repeated')
     parser.add_argument(
         '--joint',
@@ -124,7 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Solve the linkage."""
     file = named_file(arguments.file, 'linkages')
-    content = linkage_content(file)
+    content = linkage_content(file, robot_of(arguments))
     closure = read_any_closure(content, file.stem)
     arguments.angles = arguments.angles.of_file(content.units)
     if arguments.joint:

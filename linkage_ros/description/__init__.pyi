@@ -114,6 +114,14 @@ from linkage_ros.description.tables import (
     write_tables as write_tables,
 )
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
+from linkage_ros.description.urdf_file import (
+    MOVING as MOVING,
+    read_urdf as read_urdf,
+    read_urdf_file as read_urdf_file,
+    UrdfFile as UrdfFile,
+    UrdfJoint as UrdfJoint,
+    UrdfLink as UrdfLink,
+)
 from linkage_ros.description.violations import (
     find_violations as find_violations,
     import_jsonschema as import_jsonschema,

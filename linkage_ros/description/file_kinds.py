@@ -53,8 +53,12 @@ _BEGINNINGS = (
     (b'\xfe\xff', _UTF_16),
     (b'\x28\xb5\x2f\xfd', FileKind('a compressed file')),
 )
+_OF_A_URDF = (
+    'a scene names it by linkage: {urdf: FILE, input: [JOINT]}; linkage import makes a linkage '
+    'file of a URDF'
+)
 _ELEMENTS = {
-    'robot': FileKind('a URDF', 'linkage import makes a linkage file of a URDF'),
+    'robot': FileKind('a URDF', _OF_A_URDF),
     'mujoco': FileKind('a model of MuJoCo'),
     'sdf': FileKind('an SDF model'),
     'html': FileKind('a web page'),

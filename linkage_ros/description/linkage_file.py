@@ -29,7 +29,7 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.space_file import is_spatial, read_space_closure
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError, FileError, list_names
 from linkage_ros.kinematics import (
     assembly_sides,
     AssemblyPose,
@@ -83,11 +83,27 @@ def load(linkage: str | PathLike[str]) -> Closure | Any:
     return read_any_closure(linkage_content(file), file.stem)
 
 
-def linkage_content(file: Path) -> Section:
-    """Return the content of a linkage file; refuse a scene, and name its linkage."""
+def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:
+    """
+    Return the content of a linkage file; refuse a scene, and name its linkage.
+
+    A URDF, whose name ends in .urdf, may be told more by the keys of a robot in a scene.
+    """
+    if file.suffix.lower() == '.urdf':
+        return robot_content(Section(str(file), '', {'urdf': str(file), **(robot or {})}), file)
+    if robot:
+        raise FileError(file, '', 'is no URDF', f'leave out {list_names(robot)}')
     content, _ = read_yaml(file)
     if 'linkage' in content or 'linkages' in content:
         raise content.error('', 'is a scene', f'name {_linkage_of(content, file)}')
+    return content
+
+
+def robot_content(content: Section, file: Path) -> Section:
+    """Return a section that names a robot, with the content of its URDF."""
+    from linkage_ros.description.urdf_file import read_urdf_file  # local import: for robots
+
+    content.named_data = read_urdf_file(file)
     return content
 
 
@@ -109,6 +125,12 @@ def read_any_closure(
     content: Section, name: str = '', *, publish_inputs: bool = False
 ) -> Closure | SpaceClosure:
     """Read a planar or a spatial linkage; errors as in `read_closure`."""
+    if 'urdf' in content:
+        from linkage_ros.description.robot_file import (
+            read_robot_closure,  # local import: few linkages are robots
+        )
+
+        return read_robot_closure(content, name, publish_inputs=publish_inputs)
     read = read_space_closure if is_spatial(content) else read_closure
     return read(content, name, publish_inputs=publish_inputs)
 
@@ -138,8 +160,9 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
 
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
-    if is_spatial(content):
-        raise content.error('points', 'make it a spatial linkage', PLANAR_ONLY)
+    if is_spatial(content) or 'urdf' in content:
+        key = 'urdf' if 'urdf' in content else 'points'
+        raise content.error(key, 'make it a spatial linkage', PLANAR_ONLY)
     content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))
     for shorthand, keys in SHORTHANDS.items():
         if shorthand in content:

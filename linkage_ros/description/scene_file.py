@@ -18,7 +18,11 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING
 from zlib import crc32
 
-from linkage_ros.description.linkage_file import looks_like_linkage, read_any_closure
+from linkage_ros.description.linkage_file import (
+    looks_like_linkage,
+    read_any_closure,
+    robot_content,
+)
 from linkage_ros.description.parameters import Parts
 from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
 from linkage_ros.description.scene_grammar import (
@@ -92,6 +96,10 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
         return _stand_in(name, content, data, folder, settings)
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
+        if isinstance(where.mapping.get('linkage'), dict):
+            robot = where.section('linkage')
+            robot_content(robot, file.parent / robot.text('urdf'))
+            return robot, robot.named_data
         linkage = linkage_of_scene(where.text('linkage'), file.parent)
         if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
             raise where.error(
@@ -194,10 +202,15 @@ def parse_scene(
     linkages = iter([part for part in files if part != SCENE_FILE])
 
     def open_linkage(within: Section) -> tuple[Section, bytes]:
-        within.text('linkage')
+        robot = isinstance(within.mapping.get('linkage'), dict) and within.section('linkage')
+        if not robot:
+            within.text('linkage')
         part = next(linkages, None)
         if part is None:
             raise within.error('linkage', 'is not among the files', 'name another bag')
+        if robot:
+            robot.named_data = files[part]
+            return robot, files[part]
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
     source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
@@ -280,7 +293,7 @@ def _read_linkages(
         scene_linkage = _read_scene_linkage(
             '', linkage_content, content, content, source, source.closed
         )
-        return [scene_linkage], {LINKAGE_FILE: data}
+        return [scene_linkage], {_file_name(LINKAGE_FILE, linkage_content): data}
     if 'linkage' in content:
         raise content.error('linkage', 'cannot be combined with linkages', 'write one of the two')
     entries = content.sections('linkages')
@@ -291,7 +304,8 @@ def _read_linkages(
     members: list[SceneLinkage] = []
     files = {}
     for index, entry in enumerate(entries, 1):
-        linkage_content, files[f'linkage_{index}.yaml'] = source.open_linkage(entry)
+        linkage_content, data = source.open_linkage(entry)
+        files[_file_name(f'linkage_{index}.yaml', linkage_content)] = data
         name = entry.ros_name(entry.text('name'))
         if name in [scene_linkage.name for scene_linkage in members]:
             raise entry.error('name', f'{quote(name)} is taken', 'give each its own')
@@ -305,6 +319,11 @@ def _read_linkages(
             )
         entry.finish(tuple(OF_A_LINKAGE.entries))
     return members, files
+
+
+def _file_name(name: str, content: Section) -> str:
+    """Return the name of a linkage's file in a bag, which is a URDF for a robot."""
+    return name.replace('.yaml', '.urdf') if 'urdf' in content else name
 
 
 def _read_scene_linkage(

@@ -53,6 +53,7 @@ class Section:
         self._content = content
         self._line = line
         self.units = units
+        self.named_data = b''  # Of the file that the section names, if it has been read
         self._taken: set[str] = set()
 
     def __contains__(self, key: str) -> bool:

@@ -69,7 +69,7 @@ class _TwoPoints(ListOf):
 
 
 @dataclass(frozen=True, slots=True)
-class _NameOrNames(ListOf):
+class NameOrNames(ListOf):
     """A name, or a list of names."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
@@ -152,7 +152,7 @@ SPACE = Keys(
             _TwoPoints('its two points', TextOf('a point')),
         ),
         'input': declare(
-            _NameOrNames('The driven hinge, slide or strut; several in a list.', TextOf('a joint'))
+            NameOrNames('The driven hinge, slide or strut; several in a list.', TextOf('a joint'))
         ),
         'joints': declare(
             ListOf(

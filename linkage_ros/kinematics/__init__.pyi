@@ -157,6 +157,17 @@ from linkage_ros.kinematics.space.linkage import (
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
 )
+from linkage_ros.kinematics.space.vectors import (
+    cross as cross,
+    dot as dot,
+    GROUND_FRAME as GROUND_FRAME,
+    length as length,
+    minus as minus,
+    plus as plus,
+    scale as scale,
+    SpaceFrame as SpaceFrame,
+    Vector as Vector,
+)
 from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (

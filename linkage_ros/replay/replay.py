@@ -105,7 +105,8 @@ def recorded_scene(
             'name a bag that linkage_ros has recorded',
         )
     run = read_run_metadata(bag)
-    files = {name: data for name, data in bag.attachments.items() if name.endswith('.yaml')}
+    kinds = ('.yaml', '.urdf')
+    files = {name: data for name, data in bag.attachments.items() if name.endswith(kinds)}
     if len(files) < 2:
         raise BagError(
             bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'

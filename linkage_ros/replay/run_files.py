@@ -22,6 +22,9 @@ from linkage_ros.description import Scene
 from linkage_ros.replay.replay import user_effects_here
 from linkage_ros.tick import name_topics
 
+_MEDIA = {'.json': 'json', '.urdf': 'xml'}
+"""Media types by suffix; others are YAML."""
+
 
 def scene_files(
     scene: Scene,
@@ -60,6 +63,6 @@ def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
 def to_attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:
     """Return such files as attachments of a bag, each with its media type."""
     return {
-        name: ('application/json' if name == RUN_FILE else 'application/yaml', data)
+        name: (f'application/{_MEDIA.get(Path(name).suffix, "yaml")}', data)
         for name, data in files.items()
     }

@@ -12,10 +12,10 @@ from cmath import phase, rect
 from math import cos, hypot, remainder, sin, tau
 
 from linkage_ros.cli.main import main
-from linkage_ros.description import linkage_text, parse_yaml, read_linkage
+from linkage_ros.description import linkage_text, parse_yaml, read_linkage, read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, Limits, RevoluteJoint
-from linkage_ros.tools.models import find_pinned, linkage_from_urdf, read_urdf
+from linkage_ros.tools.models import find_pinned, linkage_from_urdf
 import numpy as np
 import pytest
 
@@ -294,7 +294,7 @@ UNREAD = {
         '<pose>', '<pose relative_to="base">'
     ): 'joint pin of <gazebo>, between rocker and coupler',
     LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is not a pin',
-    '<constraint type="ball"/>': '<constraint>',
+    '<closure type="ball"/>': '<closure>',
 }
 
 

@@ -12,9 +12,10 @@ from dataclasses import replace
 import io
 
 from linkage_ros.cli.main import main
+from linkage_ros.description import read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, RevoluteJoint
-from linkage_ros.tools.models import linkage_from_urdf, ModelPart, read_urdf, urdf_onto
+from linkage_ros.tools.models import linkage_from_urdf, ModelPart, urdf_onto
 import numpy as np
 import pytest
 import yourdfpy

@@ -85,6 +85,11 @@ class SpaceLinkage:
         How a joint follows another, by name.
     traced
         Names of points whose paths are drawn.
+    left_out
+        What belongs to no loop of the robot that it is read from.
+    open_by
+        By how much the loops of that robot do not close in the pose, in [m]; None without a
+        robot. What they miss, the pose is corrected by.
 
     """
 
@@ -97,6 +102,8 @@ class SpaceLinkage:
     published: tuple[str, ...]
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
     traced: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    open_by: float | None = None
 
     @cached_property
     def pair_joints(self) -> dict[str, SpatialJoint]:

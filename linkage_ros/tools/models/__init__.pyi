@@ -22,4 +22,3 @@ from linkage_ros.tools.models.robot_model_command import model_of as model_of
 from linkage_ros.tools.models.scene_model import make_scene_model as make_scene_model
 from linkage_ros.tools.models.tree import grow_tree as grow_tree, Tree as Tree
 from linkage_ros.tools.models.urdf import add_frames as add_frames, urdf_model as urdf_model
-from linkage_ros.tools.models.urdf_file import read_urdf as read_urdf

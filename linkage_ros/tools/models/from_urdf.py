@@ -17,6 +17,7 @@ from itertools import combinations, islice, product
 from math import hypot, inf, pi, remainder, tau
 from typing import NamedTuple
 
+from linkage_ros.description import MOVING, UrdfFile
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names
 from linkage_ros.kinematics import (
     AssemblyPose,
@@ -44,7 +45,6 @@ from linkage_ros.tools.models.planar import (
     lay_flat,
     Planar,
 )
-from linkage_ros.tools.models.urdf_file import MOVING, UrdfFile
 from linkage_ros.tools.models.urdf_topology import urdf_topology, UrdfTopology
 
 # The assembly of each dyad, from a pose of its links.
@@ -200,6 +200,13 @@ class _Import:
                         'is not a moving joint',
                         did_you_mean(name, moving, f'name one of {list_names(moving)}'),
                     )
+        for joint in urdf.joints.values():
+            if joint.kind in ('floating', 'planar'):
+                raise self._file_error(
+                    f'joint {joint.name}',
+                    f'type {joint.kind} cannot be a pin or slider of a planar linkage',
+                    f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
+                )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
         followed = [joint.mimics for joint in urdf.joints.values() if joint.mimics]

@@ -17,16 +17,20 @@ pins that simulators close loops by: the tags ``loop_joint`` and ``loop_constrai
 from __future__ import annotations
 
 import argparse
-from math import isfinite
 from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.cli import add_output, LINKAGES
-from linkage_ros.description import linkage_text, parse_yaml, read_linkage
+from linkage_ros.cli import add_output, LINKAGES, read_joint_value
+from linkage_ros.description import (
+    linkage_text,
+    parse_yaml,
+    read_linkage,
+    read_urdf,
+    read_urdf_file,
+)
 from linkage_ros.tools.models.from_urdf import linkage_from_urdf
 from linkage_ros.tools.models.robot_model_command import write_or_print
-from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file
 
 EXAMPLE = 'linkage import four_bar.urdf --input crank_joint -o my_four_bar.yaml'
 
@@ -49,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--at',
         action='append',
-        type=_read_value,
+        type=read_joint_value,
         default=[],
         metavar='JOINT=VALUE',
         help='value of a joint in a pose in which the loops close, in radians or metres '
@@ -84,14 +88,3 @@ def _read_pair(text: str) -> tuple[str, str]:
     if not (one and equal and other):
         raise argparse.ArgumentTypeError(f'{text!r} is not a pair; write FRAME=FRAME')
     return one, other
-
-
-def _read_value(text: str) -> tuple[str, float]:
-    joint, equal, value = text.rpartition('=')
-    try:
-        number = float(value)
-    except ValueError:
-        number = float('nan')
-    if not (joint and equal and isfinite(number)):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a value; write JOINT=0.5')
-    return joint, number

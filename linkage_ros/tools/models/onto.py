@@ -22,6 +22,7 @@ from math import atan2, cos, hypot, sin
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from linkage_ros.description import MOVING, UrdfFile
 from linkage_ros.errors import FileError, list_names, quote
 from linkage_ros.kinematics import GROUND, links_by_point, NO_LIMITS, SlideJoint
 from linkage_ros.tools.models.orientation import joint_spans, named_joints
@@ -35,7 +36,6 @@ from linkage_ros.tools.models.part import (
 from linkage_ros.tools.models.planar import lay_flat, PlanarJoint, UrdfLoops
 from linkage_ros.tools.models.tree import Tree, TreeJoint
 from linkage_ros.tools.models.urdf import add_frames, add_joint, LoopJoint, start_element
-from linkage_ros.tools.models.urdf_file import MOVING, UrdfFile
 from linkage_ros.tools.models.urdf_topology import Chain, find_chains
 from linkage_ros.tools.models.xml import format_numbers
 import numpy as np

@@ -22,9 +22,9 @@ from math import cos, sin
 import re
 from typing import Any, NamedTuple
 
+from linkage_ros.description import MOVING, UrdfFile, UrdfJoint, UrdfLink
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Mass, NO_LIMITS
-from linkage_ros.tools.models.urdf_file import MOVING, UrdfFile, UrdfJoint, UrdfLink
 import numpy as np
 
 # The pins that close the loops of a URDF, as requested or by frames named PIN_on_LINK, and the

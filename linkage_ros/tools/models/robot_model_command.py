@@ -22,14 +22,20 @@ import sys
 from threading import Event
 
 from linkage_ros.cli import add_output, SCENE_HELP
-from linkage_ros.description import atomic_write, kind_of, read_closure, read_yaml
+from linkage_ros.description import (
+    atomic_write,
+    kind_of,
+    read_closure,
+    read_urdf,
+    read_urdf_file,
+    read_yaml,
+)
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.onto import urdf_onto
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.scene_model import make_scene_model, Write
 from linkage_ros.tools.models.urdf import urdf_model
-from linkage_ros.tools.models.urdf_file import read_urdf, read_urdf_file
 
 WRITERS: dict[str, Write] = {'urdf': urdf_model, 'mjcf': mujoco_model}
 """Writers of models, by the command's name."""

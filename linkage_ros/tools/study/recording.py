@@ -31,6 +31,7 @@ from typing import Any, NamedTuple
 from linkage_ros.bag import BagSummary, BagWriter, FLUSH_AFTER, Recorder, Storage, Topic
 from linkage_ros.description import LEAST_FLUSH_PERIOD, Scene
 from linkage_ros.errors import RecordingError
+from linkage_ros.replay import to_attachments
 from linkage_ros.tick import find_handles, list_run_topics, Pipeline
 from linkage_ros.tools.study.budget import Price, RecordingLoss
 from linkage_ros.tools.study.measuring import alternate_order, Progress, spread_of
@@ -118,7 +119,7 @@ def _record_run(
     handles = find_handles(topics)
     passing = []
     with _as_in_the_node():
-        files = {name: ('application/yaml', data) for name, data in scene.files.items()}
+        files = to_attachments(scene.files)
         # Their definitions and their names on the graph cost nothing after the start.
         empty = [Topic(f'/{topic.name}', topic.type, '', '') for topic in topics]
         writer = _WatchedWriter(folder, empty, files, storage)

@@ -6,7 +6,24 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Read a URDF: links and joints by name, each joint checked against the rules of URDF."""
+"""
+Read a URDF: links, joints, and what closes loops, checked against the rules of URDF.
+
+URDF has no loops. Tags outside of it that close some are read in these dialects:
+
+- ``<loop_joint>`` with ``<link1 link xyz rpy>`` and ``<link2 …>``, of Isaac Sim's importer, whose
+  manual and followers write ``link1`` twice; an axis is in the frame of the first end
+- ``<loop_joint>`` with ``<parent>``, ``<child>``, ``<parent_origin>``, ``<child_origin>``, and
+  ``<axis>`` in the frame of the parent, as an exporter of Fusion 360 writes it
+- ``<constraint>`` with the same and ``<parent_axis>``, ``<child_axis>`` (ros/urdfdom#264); its
+  type ``link`` is a rod between two balls
+- ``<loop>`` of URDF+, with an ``<origin>`` in ``<predecessor>`` and ``<successor>``, and
+  ``<coupling>``, where q of the successor is ``<ratio>`` times q of the predecessor, each from
+  their common ancestor (M. Chignoli et al., arXiv:2411.19753; generalized_rbda); and the older
+  ``<loop_constraint>`` of the same authors, which is a pin
+
+As in URDF an axis that is not written is 1 0 0.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +33,8 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description import kind_of_bytes, kind_of_folder, read_regular
+from linkage_ros.description.file_access import read_regular
+from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.errors import FileError, LinkageError, list_names, quote
 from linkage_ros.kinematics import Limits, NO_LIMITS
 
@@ -29,14 +47,18 @@ MOVING = ('revolute', 'continuous', 'prismatic')
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
 _FARTHEST = 1e9
 
-_LOOP_TAGS = {
-    'loop_joint': (('link1', 'link1'), ('link2', 'link2')),
-    'loop_constraint': (('parent', 'parent_origin'), ('child', 'child_origin')),
-}
-"""Tags outside of URDF that close loops: for both ends the tags with ``link`` and ``xyz``."""
+_LOOP_TAGS = ('loop_joint', 'loop_constraint', 'constraint', 'loop')
+"""Tags outside of URDF that close loops."""
 
-_PINS = ('', 'revolute', 'continuous', 'spherical')
-"""Types of a loop joint that are a pin in the plane; without a type it is one."""
+_LOOP_ENDS = (('link1', 'link2'), ('parent', 'child'), ('predecessor', 'successor'))
+"""Tags of the two ends of a loop."""
+
+LOOP_KINDS = {
+    '': 'ball', 'ball': 'ball', 'spherical': 'ball', 'hinge': 'hinge', 'revolute': 'hinge',
+    'continuous': 'hinge', 'prismatic': 'slide', 'fixed': 'fixed', 'universal': 'universal',
+    'link': 'rod',
+}  # fmt: skip
+"""What closes a loop, by its type; without a type it is a ball, a pin in the plane."""
 
 _USUAL_TAGS = (
     'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
@@ -44,6 +66,7 @@ _USUAL_TAGS = (
 )  # fmt: skip
 
 _LARGEST_FILE = 10_000_000
+_MOST_JOINTS = 2000
 
 
 class Inertial(NamedTuple):
@@ -83,6 +106,32 @@ class UrdfJoint(NamedTuple):
     limits: Limits  # As in ``<limit>``, without those that ``linkage urdf`` made up
 
 
+class LoopEnd(NamedTuple):
+    """An end of what closes a loop: a frame on a link, in [m] and [rad], and an axis in it."""
+
+    link: str
+    xyz: Vector
+    rpy: Vector | None = None  # None if the file does not say it
+    axis: Vector | None = None
+
+
+class UrdfLoop(NamedTuple):
+    """What closes a loop: a joint outside of the tree."""
+
+    name: str
+    kind: str  # A value of LOOP_KINDS, or a type that is not known
+    ends: tuple[LoopEnd, LoopEnd]
+
+
+class Coupling(NamedTuple):
+    """A ratio of two chains of joints, which lead from their common ancestor to two links."""
+
+    name: str
+    predecessor: str
+    successor: str
+    ratio: float
+
+
 class UrdfFile(NamedTuple):
     """A robot."""
 
@@ -95,11 +144,21 @@ class UrdfFile(NamedTuple):
     inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
     # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
     start: Mapping[str, float]
-    # Places that meet, LINK.x,y,z, as tags say by which simulators close loops.
-    closings: tuple[tuple[str, str], ...]
+    loops: tuple[UrdfLoop, ...]  # What closes loops, as tags say; of two at one place the first
+    couplings: tuple[Coupling, ...]
     # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
     pinned: tuple[tuple[str, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
+
+    @property
+    def closings(self) -> list[tuple[str, str]]:
+        """Return the pairs of places that are pins in the plane: LINK.x,y,z."""
+        pins = [loop.ends for loop in self.loops if loop.kind in ('ball', 'hinge')]
+        return [(_place_text(one), _place_text(other)) for one, other in pins]
+
+
+def _place_text(end: LoopEnd) -> str:
+    return f'{end.link}.{",".join(map(repr, end.xyz))}'
 
 
 def read_urdf_file(file: Path) -> bytes:
@@ -119,6 +178,9 @@ def read_urdf_file(file: Path) -> bytes:
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
     """Read a URDF; a FileError has file, link or joint, and remedy."""
+    if b'<!DOCTYPE' in data.replace(b'\0', b''):  # also in UTF-16
+        reason = 'declares a document type, which a URDF does not need'
+        raise FileError(file, '', reason, 'remove <!DOCTYPE …> and its entities')
     try:
         root = ET.fromstring(data)
     except ET.ParseError as error:
@@ -159,6 +221,9 @@ class _Reader:
             if name not in made_up or made_up[name] is not None:
                 limits = self._read_limits(element, name, made_up.get(name))
             joints[name] = self._read_joint(element, name, links)._replace(limits=limits)
+        if len(joints) > _MOST_JOINTS:
+            reason = f'has {len(joints)} joints'
+            raise self._file_error('', reason, f'keep the part with the loops: {_MOST_JOINTS}')
         self._check_mimics(joints)
         base, ordered = self._order_joints(links, joints)
         said = [] if start is None else [each for each in start if each.get('name') in joints]
@@ -174,25 +239,64 @@ class _Reader:
                 each.get('name', ''): self._read_value(each, 'value', 'linkage_start')
                 for each in said
             },
-            self._read_closings(root, links),
+            tuple(self._read_loops(root, links)),
+            tuple(self._read_couplings(root, links)),
             tuple(self._pinned_places(root, links)),
             tuple(_unread_tags(root)),
         )
 
-    def _read_closings(
-        self, root: ET.Element, links: Mapping[str, UrdfLink]
-    ) -> tuple[tuple[str, str], ...]:
-        """Return the pairs of places that loop tags join; a pair that two tags name, once."""
-        found: dict[frozenset[str], tuple[str, str]] = {}
-        for element in root:
-            if element.tag in _LOOP_TAGS and element.get('type', '') in _PINS:
-                where = f'{element.tag} {element.get("name", "")}'.rstrip()
-                one, other = (
-                    self._read_place(element, link, place, where, links)
-                    for link, place in _LOOP_TAGS[element.tag]
+    def _read_loops(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[UrdfLoop]:
+        """Yield what closes loops; of two at one place the first."""
+        there = set()
+        for number, element in enumerate(each for each in root if each.tag in _LOOP_TAGS):
+            name = element.get('name') or f'{element.tag}{number + 1}'
+            where, kind = f'{element.tag} {name}', element.get('type', '').removesuffix('_joint')
+            ends = self._read_loop_ends(element, where, links)
+            places = frozenset(end[:2] for end in ends)
+            if places not in there:
+                yield UrdfLoop(name, LOOP_KINDS.get(kind, kind), ends)
+            there.add(places)
+
+    def _read_loop_ends(
+        self, element: ET.Element, where: str, links: Mapping[str, UrdfLink]
+    ) -> tuple[LoopEnd, LoopEnd]:
+        for tags in _LOOP_ENDS:
+            # Some write link1 twice.
+            found = [each for each in element if each.tag in tags]
+            if len(found) == 2:
+                break
+        else:
+            raise self._file_error(where, 'has no two ends', 'write <parent> and <child>')
+        ends = []
+        for end, own in zip(found, ('parent_axis', 'child_axis'), strict=True):
+            link, origin = end.get('link', ''), end.find('origin')
+            if link not in links:
+                raise self._file_error(
+                    where, f'its {end.tag} {quote(link)} is not a link', 'name a link'
                 )
-                found.setdefault(frozenset((one, other)), (one, other))
-        return tuple(found.values())
+            if origin is None:
+                origin = element.find(f'{end.tag}_origin')
+            origin = end if origin is None else origin
+            axis = element.find(own)
+            if axis is None and not ends:
+                axis = element.find('axis')
+            way = None if axis is None else self._read_vector(axis, 'xyz', where, '1 0 0')
+            if way == (0.0, 0.0, 0.0):
+                raise self._file_error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
+            rpy = self._read_vector(origin, 'rpy', where, '') if 'rpy' in origin.attrib else None
+            ends.append(LoopEnd(link, self._read_vector(origin, 'xyz', where, '0 0 0'), rpy, way))
+        return ends[0], ends[1]
+
+    def _read_couplings(
+        self, root: ET.Element, links: Mapping[str, UrdfLink]
+    ) -> Iterator[Coupling]:
+        for element in root.findall('coupling'):
+            name = element.get('name', '')
+            where, ratio = f'coupling {name}', element.find('ratio')
+            ends = [
+                self._read_end(element, end, where, links) for end in ('predecessor', 'successor')
+            ]
+            yield Coupling(name, *ends, self._read_values(ratio, 'value', where, 1, '1')[0])
 
     def _pinned_places(
         self, root: ET.Element, links: Mapping[str, UrdfLink]
@@ -209,13 +313,6 @@ class _Reader:
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
             values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
             yield f'{child}.{",".join(map(repr, values[:3]))}', parent
-
-    def _read_place(
-        self, element: ET.Element, link: str, place: str, where: str, links: Mapping[str, UrdfLink]
-    ) -> str:
-        name = self._read_end(element, link, where, links)
-        xyz = self._read_vector(element.find(place), 'xyz', where, '0 0 0')
-        return f'{name}.{",".join(map(repr, xyz))}'
 
     def _file_error(self, key: str, reason: str, remedy: str) -> FileError:
         return FileError(self._file, key, reason, remedy)
@@ -290,12 +387,6 @@ class _Reader:
                 where,
                 f'type={quote(kind)} is not a joint type',
                 f'write {list_names(MOVING)} or fixed',
-            )
-        if kind in ('floating', 'planar'):
-            raise self._file_error(
-                where,
-                f'type {kind} cannot be a pin or slider of a planar linkage',
-                f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
             )
         parent, child = (self._read_end(element, end, where, links) for end in ('parent', 'child'))
         axis = self._read_vector(element.find('axis'), 'xyz', where, '1 0 0')
@@ -427,7 +518,8 @@ def _unread_tags(root: ET.Element) -> Iterator[str]:
         ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
     for element in root:
-        if element.tag in _LOOP_TAGS and element.get('type', '') not in _PINS:
+        kind = LOOP_KINDS.get(element.get('type', '').removesuffix('_joint'))
+        if element.tag in _LOOP_TAGS and kind not in ('ball', 'hinge'):
             yield f'<{element.tag}> {element.get("name", "")}, which is not a pin'
         elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
             yield f'<{element.tag}>'
