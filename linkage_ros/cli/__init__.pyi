@@ -12,6 +12,7 @@ from linkage_ros.cli.arguments import (
     add_file as add_file,
     add_output as add_output,
     add_radians as add_radians,
+    add_robot as add_robot,
     add_set as add_set,
     angle_text as angle_text,
     bounded_number as bounded_number,
@@ -26,6 +27,7 @@ from linkage_ros.cli.arguments import (
     read_inputs as read_inputs,
     read_joint_value as read_joint_value,
     RESULTS as RESULTS,
+    robot_of as robot_of,
     SCENE_HELP as SCENE_HELP,
 )
 from linkage_ros.cli.bag_reading import (

@@ -368,6 +368,6 @@ def _find_violations(file: Path) -> list[FileError]:
 
 
 def _named_linkages(content: Section) -> list[str]:
-    if 'linkages' in content:
-        return [entry.text('linkage') for entry in content.sections('linkages')]
-    return [content.text('linkage')]
+    entries = content.sections('linkages') if 'linkages' in content else [content]
+    named = [entry.mapping.get('linkage') for entry in entries]
+    return [linkage for linkage in named if isinstance(linkage, str)]

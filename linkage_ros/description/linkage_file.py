@@ -61,7 +61,7 @@ def looks_like_linkage(content: Section) -> bool:
     return any(key in content for key in ('links', 'points', *SHORTHANDS))
 
 
-def load(linkage: str | PathLike[str]) -> Closure | Any:
+def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -> Closure | Any:
     """
     Load a linkage as a closure: a `Closure`, or a `SpaceClosure` if it is spatial.
 
@@ -69,7 +69,11 @@ def load(linkage: str | PathLike[str]) -> Closure | Any:
     ----------
     linkage
         Path of a linkage file, or the name of a linkage that comes with the package, such as
-        ``'jansen_leg'``; `linkage_names` lists them.
+        ``'jansen_leg'``; `linkage_names` lists them. Or a URDF with loops, which ends in
+        ``.urdf``.
+    robot
+        What a scene says of a robot beside its URDF: ``{'input': ['m1', 'm2']}``, and ``at`` and
+        ``close``.
 
     Raises
     ------
@@ -80,7 +84,7 @@ def load(linkage: str | PathLike[str]) -> Closure | Any:
 
     """
     file = named_file(linkage, 'linkages')
-    return read_any_closure(linkage_content(file), file.stem)
+    return read_any_closure(linkage_content(file, robot), file.stem)
 
 
 def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import cos, hypot, inf, sin, tau
+from math import cos, hypot, inf, remainder, sin, tau
 import re
 
 from linkage_ros.description.urdf_file import (
@@ -67,6 +67,8 @@ _MOST_STEPS, _MOST_HALVED = 40, 8
 """Most steps of Newton's method, and how often one is halved."""
 
 _SLOPE_STEP, _DAMPING = 1e-6, 1e-10
+_NUDGES = (0.5, -0.5)
+"""How much joints are moved before a pose is sought once more, in [rad] or [m]."""
 
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 _PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
@@ -315,17 +317,29 @@ class RobotLoops:
         ]
         worst, apart, name = max(gaps, default=(0.0, 0.0, ''))
         if worst > _MET:
-            untold = [name for name in free if name not in self._told]
-            met = self._meet(values, untold, ratios)
-            pose = ', '.join(f'{k}: {met[k]:.6g}' for k in moving if met[k] and k not in ratios)
             by = f'{apart:.3g} m' if apart > _MET * size else f'{worst:.3g} rad'
-            raise DefinitionError(
-                'at', f'the loop {name} of {self._urdf.file} is open by {by} in the pose',
-                f'near it all close: at: {{{pose}}}'
-                if hypot(*self._residuals(met)) < _CLOSED * size
-                else 'give values of joints at which all loops close',
-            )  # fmt: skip
+            reason = f'the loop {name} of {self._urdf.file} is open by {by} in the pose'
+            raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
         return self._build(self._meet(values, free, ratios), moving, ratios, apart)
+
+    def _found_pose(
+        self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> str:
+        """Return a pose near values of joints in which all loops close, as a remedy."""
+        untold = [name for name in free if name not in self._told]
+        slides = [name for name, of in self._urdf.joints.items() if of.kind == 'prismatic']
+        turns = dict.fromkeys(self._kept, tau) | dict.fromkeys(slides, inf)
+        for nudge in (0.0, *_NUDGES):  # Newton's method does not leave a stretched pose.
+            start = self._follow({**values, **{k: values[k] + nudge for k in untold}}, ratios)
+            met = self._meet(start, untold, ratios)
+            if hypot(*self._residuals(met)) < _CLOSED * self._size:
+                pose = [
+                    f'{name}: {remainder(value, turns[name]):.6g}'
+                    for name, value in met.items()
+                    if name in self._kept and abs(value) > _CLOSED and name not in ratios
+                ]
+                return f'near it all close: at: {{{", ".join(pose)}}}'
+        return 'give values of joints at which all loops close'
 
     # The linkage
 

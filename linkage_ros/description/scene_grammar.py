@@ -493,8 +493,15 @@ def _refused_pairs() -> Schema:
 
 def scene_schema() -> Schema:
     """Return the schema of a scene file; it imports all drives, effects and faults."""
+    from linkage_ros.description.robot_file import ROBOT  # local import: for few scenes
+
     own = {key: {'$ref': f'#/$defs/{key}'} for key in OF_A_LINKAGE.entries}
-    linkage = _NAMED_LINKAGE.json_schema()
+    linkage = {
+        'description': f'{_NAMED_LINKAGE.meaning}; or a robot',
+        'if': {'type': 'object'},
+        'then': parameters_schema(ROBOT),
+        'else': _NAMED_LINKAGE.json_schema(),
+    }
     name = TextOf('its name, and the prefix of its joints: letters, digits and _', _ROS_NAME)
     one = mapping_schema(
         'A linkage; keys that it leaves out have the values of the scene.',

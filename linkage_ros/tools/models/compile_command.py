@@ -21,7 +21,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli import add_file, add_output
+from linkage_ros.cli import add_file, add_output, add_robot, robot_of
 from linkage_ros.description import atomic_write, linkage_content, read_any_closure
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
 from linkage_ros.kinematics import Closure
@@ -34,6 +34,7 @@ EXAMPLE = 'linkage compile four_bar -o four_bar.c'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
+    add_robot(parser)
     add_output(parser, LANGUAGES)
     parser.add_argument(
         '--derivatives', type=int, choices=(0, 1, 2), default=2,
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     output: Path = arguments.output
     language = LANGUAGES[output.suffix.lower()]
     file = named_file(arguments.file, 'linkages')
-    content = linkage_content(file)
+    content = linkage_content(file, robot_of(arguments))
     closure: Any = read_any_closure(content)
     in_c = output.suffix.lower() in ('.c', '.h')
     subject = Subject(
