@@ -35,6 +35,7 @@ from linkage_ros.description.urdf_file import (
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
     cross,
+    direction_of,
     dot,
     Elimination,
     GROUND,
@@ -48,6 +49,7 @@ from linkage_ros.kinematics import (
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
+    turn_about,
     Vector,
 )
 
@@ -67,8 +69,8 @@ _MOST_STEPS, _MOST_HALVED = 40, 8
 """Most steps of Newton's method, and how often one is halved."""
 
 _SLOPE_STEP, _DAMPING = 1e-6, 1e-10
-_NUDGES = (0.5, -0.5)
-"""How much joints are moved before a pose is sought once more, in [rad] or [m]."""
+_NUDGES = (0.0, 0.5, -0.5)
+"""How much joints are moved before a pose is sought, in [rad] or [m]."""
 
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
 _PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
@@ -214,11 +216,11 @@ class RobotLoops:
             base = _within(frames[joint.parent], self._frames[joint.name])
             value = values.get(joint.name, 0.0)
             if joint.kind in MOVING and value:
-                axis = base.turn(_unit(joint.axis))
+                axis = base.turn(direction_of(joint.axis))
                 if joint.kind == 'prismatic':
                     base = base._replace(origin=plus(base.origin, scale(value, axis)))
                 else:
-                    x, y, z = (_turned(way, axis, value) for way in base[:3])
+                    x, y, z = (turn_about(axis, value, way) for way in base[:3])
                     base = SpaceFrame(x, y, z, base.origin)
             frames[joint.child] = base
         return frames
@@ -227,13 +229,13 @@ class RobotLoops:
         """Return by how much a loop is open: in place in [m], and in direction, as a sine."""
         ends = loop.ends
         one, other = (_end_frame(end, frames) for end in ends)
-        axis = one.turn(_unit(ends[0].axis or _X))
+        axis = one.turn(direction_of(ends[0].axis or _X))
         gap, turned = minus(other.origin, one.origin), _STRAIGHT
         is_turned = None not in (ends[0].rpy, ends[1].rpy)
         if loop.kind == 'slide':
             gap = minus(gap, scale(dot(gap, axis), axis))
         if loop.kind == 'hinge' and (is_turned or ends[1].axis):
-            turned = cross(axis, other.turn(_unit(ends[1].axis or ends[0].axis or _X)))
+            turned = cross(axis, other.turn(direction_of(ends[1].axis or ends[0].axis or _X)))
         elif loop.kind in ('slide', 'fixed') and is_turned:
             for way, its in zip(one[:3], other[:3], strict=True):
                 turned = plus(turned, scale(0.5, cross(way, its)))
@@ -329,9 +331,10 @@ class RobotLoops:
         untold = [name for name in free if name not in self._told]
         slides = [name for name, of in self._urdf.joints.items() if of.kind == 'prismatic']
         turns = dict.fromkeys(self._kept, tau) | dict.fromkeys(slides, inf)
-        for nudge in (0.0, *_NUDGES):  # Newton's method does not leave a stretched pose.
-            start = self._follow({**values, **{k: values[k] + nudge for k in untold}}, ratios)
-            met = self._meet(start, untold, ratios)
+        # Newton's method does not leave a stretched pose. What is told is moved last.
+        for moved, nudge in (*((untold, nudge) for nudge in _NUDGES), (free, 0.0)):
+            start = self._follow({**values, **{k: values[k] + nudge for k in moved}}, ratios)
+            met = self._meet(start, moved, ratios)
             if hypot(*self._residuals(met)) < _CLOSED * self._size:
                 pose = [
                     f'{name}: {remainder(value, turns[name]):.6g}'
@@ -371,7 +374,7 @@ class RobotLoops:
                 continue
             turns = joint.kind != 'prismatic'
             found['hinges' if turns else 'slides'][name] = SpatialJoint(
-                parent, child, frame.turn(_unit(joint.axis)), frame.origin, values[name],
+                parent, child, frame.turn(direction_of(joint.axis)), frame.origin, values[name],
                 _usual_limits(joint.limits) if turns else joint.limits,
             )  # fmt: skip
         taken = {*joints, *self._urdf.links}
@@ -404,7 +407,7 @@ class RobotLoops:
     ) -> None:
         """Add what closes a loop between two links."""
         one, other = (_end_frame(end, frames) for end in loop.ends)
-        axis = one.turn(_unit(loop.ends[0].axis or _X))
+        axis = one.turn(direction_of(loop.ends[0].axis or _X))
         name = _free_name(loop.name, taken)
 
         def carry(point: str, place: Vector, *carriers: str) -> None:
@@ -420,7 +423,7 @@ class RobotLoops:
             ):
                 carry(_free_name(f'{name}_{number + 1}', taken), place, link, name)
         elif loop.kind == 'universal':
-            ways = (axis, other.turn(_unit(loop.ends[1].axis or _X)))
+            ways = (axis, other.turn(direction_of(loop.ends[1].axis or _X)))
             for number, way in enumerate(ways):
                 ends = ((on[0], name), (name, on[1]))[number]
                 hinge = _free_name(f'{name}_{number + 1}', taken)
@@ -447,10 +450,6 @@ def _sum(one: Sequence[float], other: Sequence[float]) -> float:
     return sum(a * b for a, b in zip(one, other, strict=True))
 
 
-def _unit(vector: Vector) -> Vector:
-    return scale(1.0 / hypot(*vector), vector)
-
-
 def _end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
     return _within(frames[end.link], _frame(end.xyz, end.rpy or _STRAIGHT))
 
@@ -470,10 +469,3 @@ def _frame(xyz: Vector, rpy: Vector) -> SpaceFrame:
         (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
         xyz,
     )
-
-
-def _turned(vector: Vector, axis: Vector, angle: float) -> Vector:
-    """Return a vector turned about a unit vector (Rodrigues)."""
-    along = scale(dot(axis, vector) * (1.0 - cos(angle)), axis)
-    across = plus(scale(cos(angle), vector), scale(sin(angle), cross(axis, vector)))
-    return plus(across, along)

@@ -159,6 +159,7 @@ from linkage_ros.kinematics.space.linkage import (
 )
 from linkage_ros.kinematics.space.vectors import (
     cross as cross,
+    direction_of as direction_of,
     dot as dot,
     GROUND_FRAME as GROUND_FRAME,
     length as length,
@@ -166,6 +167,7 @@ from linkage_ros.kinematics.space.vectors import (
     plus as plus,
     scale as scale,
     SpaceFrame as SpaceFrame,
+    turn_about as turn_about,
     Vector as Vector,
 )
 from linkage_ros.kinematics.start_table import StartTable as StartTable

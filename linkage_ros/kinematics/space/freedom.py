@@ -160,7 +160,8 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             f'{away}drive another joint, or hold what is free',
         )  # fmt: skip
     for name in linkage.driven:
-        if name in linkage.pair_joints and _is_in_no_loop(linkage, name):
+        followed = any(ratio.of == name for ratio in linkage.ratios.values())
+        if name in linkage.pair_joints and not followed and _is_in_no_loop(linkage, name):
             raise DefinitionError('input', f'{quote(name)} is in no loop', 'leave its link out')
     if freedom.dependent and not freedom.mobility:
         raise DefinitionError(

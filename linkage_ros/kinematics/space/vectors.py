@@ -13,6 +13,7 @@ A product with a constant 0 is not computed: axes along the axes of the ground a
 
 from __future__ import annotations
 
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import make_vector, sqrt
@@ -129,3 +130,15 @@ def hypotenuse(one: float, other: float) -> float:
 def length(vector: Vector) -> float:
     """Return the length of a vector."""
     return sqrt(dot(vector, vector))
+
+
+def direction_of(vector: Vector) -> Vector:
+    """Return the direction of a vector of numbers."""
+    return scale(1.0 / hypot(*vector), vector)
+
+
+def turn_about(axis: Vector, angle: float, vector: Vector) -> Vector:
+    """Return a vector of numbers, turned about a unit vector (Rodrigues)."""
+    along = scale(dot(axis, vector) * (1.0 - cos(angle)), axis)
+    across = plus(scale(cos(angle), vector), scale(sin(angle), cross(axis, vector)))
+    return plus(across, along)
