@@ -102,7 +102,7 @@ class RobotLoops:
                 reason = f'{quote(loop.kind)} is no type of what closes a loop'
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
-        moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
+        moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
         for key, names in (('input', driven), ('at', told)):
             for name in names:
                 if name not in moving:
@@ -183,13 +183,13 @@ class RobotLoops:
 
     def _check_kept(self, looped: Collection[str]) -> None:
         """Refuse a robot without loops, inputs in none, and joints that are no hinge or slide."""
-        joints = {name: joint for name, joint in self._urdf.joints.items() if name in self._kept}
-        for joint in joints.values():
+        joints = [self._urdf.joints[name] for name in self._urdf.order if name in self._kept]
+        for joint in joints:
             if joint.kind not in (*MOVING, 'fixed'):
                 remedy = f'write {list_names(MOVING)} or fixed'
                 reason = f'type {joint.kind} cannot be in a loop'
                 raise self._error(f'joint {joint.name}', reason, remedy)
-        moving = [name for name, joint in joints.items() if joint.kind in MOVING]
+        moving = [joint.name for joint in joints if joint.kind in MOVING]
         if not set(moving) & set(looped):
             unread = self._urdf.unread
             raise self._error(
@@ -337,9 +337,9 @@ class RobotLoops:
             met = self._meet(start, moved, ratios)
             if hypot(*self._residuals(met)) < _CLOSED * self._size:
                 pose = [
-                    f'{name}: {remainder(value, turns[name]):.6g}'
-                    for name, value in met.items()
-                    if name in self._kept and abs(value) > _CLOSED and name not in ratios
+                    f'{name}: {remainder(met[name], turns[name]):.6g}'
+                    for name in self._urdf.order
+                    if name in self._kept and abs(met[name]) > _CLOSED and name not in ratios
                 ]
                 return f'near it all close: at: {{{", ".join(pose)}}}'
         return 'give values of joints at which all loops close'

@@ -1,0 +1,340 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Robots whose URDF has loops: read in each dialect, solved, run, written, and refused."""
+
+from pathlib import Path
+import re
+from xml.etree import ElementTree as ET
+
+from linkage_ros import load, load_scene
+from linkage_ros.cli.main import main
+from linkage_ros.description import linkage_content, parse_yaml
+from linkage_ros.errors import LinkageError
+from linkage_ros.resources import spatial_linkage_names
+from linkage_ros.tools.models import model_of, urdf_model
+import numpy as np
+import pytest
+import yaml
+
+ROBOTS = Path(__file__).with_name('robots')
+RNG = np.random.default_rng(37)
+
+# An independent route: homogeneous matrices of the URDF, and Newton's method in small steps.
+
+
+def numbers(element, key, default='0 0 0'):
+    text = default if element is None else element.get(key, default)
+    return np.array(text.split(), float)
+
+
+def moved(xyz, turn=None):
+    matrix = np.eye(4)
+    matrix[:3, 3] = xyz
+    matrix[:3, :3] = np.eye(3) if turn is None else turn
+    return matrix
+
+
+def turn(axis, angle):
+    x, y, z = axis / np.linalg.norm(axis)
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+
+
+def origin(element):
+    roll, pitch, yaw = numbers(element, 'rpy')
+    x, y, z = np.eye(3)
+    return moved(numbers(element, 'xyz'), turn(z, yaw) @ turn(y, pitch) @ turn(x, roll))
+
+
+class Walk:
+    """A robot whose loops, pairs of places on links, are closed from one state to the next."""
+
+    def __init__(self, text, loops):
+        self.joints, self.loops = ET.fromstring(text).findall('joint'), loops
+
+    def places(self, values):
+        frames, waiting = {}, list(self.joints)
+        children = {joint.find('child').get('link') for joint in waiting}
+        frames |= {joint.find('parent').get('link'): np.eye(4) for joint in waiting
+                   if joint.find('parent').get('link') not in children}  # fmt: skip
+        while waiting:
+            joint = waiting.pop(0)
+            parent, child = (joint.find(end).get('link') for end in ('parent', 'child'))
+            if parent not in frames:
+                waiting.append(joint)
+                continue
+            value, axis = values.get(joint.get('name'), 0.0), numbers(joint.find('axis'), 'xyz')
+            move = moved(value * axis) if joint.get('type') == 'prismatic' else np.eye(4)
+            if joint.get('type') in ('revolute', 'continuous'):
+                move = moved((0, 0, 0), turn(axis, value))
+            frames[child] = frames[parent] @ origin(joint.find('origin')) @ move
+        return [(frames[link] @ [*xyz, 1.0])[:3] for pair in self.loops for link, xyz in pair]
+
+    def gaps(self, values):
+        places = np.array(self.places(values))
+        return (places[1::2] - places[::2]).ravel()
+
+    def go(self, state, inputs, steps=6):
+        """Return the state at some inputs, by small steps from another state."""
+        state, start = dict(state), {name: state[name] for name in inputs}
+        free = [name for name in state if name not in inputs]
+        for step in range(1, steps + 1):
+            part = step / steps
+            state |= {k: start[k] + part * (v - start[k]) for k, v in inputs.items()}
+            for _ in range(3 if step < steps else 7):
+                slopes = [
+                    (self.gaps(state | {k: state[k] + 1e-6})
+                     - self.gaps(state | {k: state[k] - 1e-6})) / 2e-6
+                    for k in free
+                ]  # fmt: skip
+                change = np.linalg.lstsq(np.transpose(slopes), self.gaps(state), rcond=1e-9)[0]
+                state |= {k: state[k] - d for k, d in zip(free, change, strict=True)}
+        return state
+
+
+ROD1, ROD2 = ('rod1', (-0.013, -0.0015, -0.156)), ('rod2', (-0.018, 0.0015, -0.221))
+FOOT1, FOOT2 = ('foot', (0.022, 0.015, 0.008)), ('foot', (0.022, -0.015, 0.008))
+KNEE = {'crank_joint': 1.2, 'coupler_joint': -0.88242, 'rocker_joint': -1.20663}
+TIPS = ['left_rod_tip=left_arm_eye', 'right_rod.0.1,-0.03,-0.05=right_arm.0,0,0.15']
+CHOICES = {
+    'ankle': ({'input': ['pitch', 'roll']}, [(ROD1, FOOT1), (ROD2, FOOT2)], 0.3),
+    'rover': (
+        {'input': 'left_rocker', 'close': TIPS},
+        [(('left_rod', (0.1, 0.03, -0.05)), ('left_arm', (0, 0, 0.15))),
+         (('right_rod', (0.1, -0.03, -0.05)), ('right_arm', (0, 0, 0.15)))],
+        0.25,
+    ),
+    'four_bar': (
+        {'input': 'crank_joint', 'at': KNEE},
+        [(('coupler', (0.12, 0, -0.01)), ('rocker', (0.08, 0, 0)))], 1.5,
+    ),
+    'palletizer': (
+        {'input': ['shoulder', 'counterweight']},
+        [(('link', (0, 0, 1.2)), ('forearm', (-0.3, 0.1, 0.05)))], 0.5,
+    ),
+}  # fmt: skip
+"""For each robot what is told, the places of its loops, and how far its inputs go."""
+
+
+def read(folder, text, **told):
+    file = folder / 'robot.urdf'
+    file.write_text(text)
+    return load(file, told)
+
+
+def near_pose(closure, reach, count):
+    pose = np.array(closure.linkage.pose.inputs)
+    return pose + RNG.uniform(-reach, reach, (count, len(pose)))
+
+
+@pytest.mark.parametrize('name', CHOICES)
+def test_states_are_those_of_newtons_method_on_the_urdf(name):
+    told, loops, reach = CHOICES[name]
+    closure = load(ROBOTS / f'{name}.urdf', told)
+    walk = Walk((ROBOTS / f'{name}.urdf').read_text(), loops)
+    names = [*closure.linkage.driven, *closure.joint_names]
+    pose = {k: closure.linkage.pose_value(k) for k in names}
+    for inputs in near_pose(closure, reach, 3):
+        given = dict(zip(closure.linkage.driven, inputs.tolist(), strict=True))
+        expected = walk.go(pose, given)
+        position = closure.position(*given.values())
+        found = {**given, **dict(zip(closure.joint_names, position.joints, strict=True))}
+        assert found == pytest.approx(expected, abs=1e-12)
+
+
+def ends(spelling, *pairs):
+    """Return a loop tag for each pair of places."""
+    return ''.join(
+        spelling.format(n=number, a=one[0], p=' '.join(map(str, one[1])),
+                        b=other[0], q=' '.join(map(str, other[1])))
+        for number, (one, other) in enumerate(pairs)
+    )  # fmt: skip
+
+
+PLACES = (
+    '<parent link="{a}"/><child link="{b}"/><parent_origin xyz="{p}"/><child_origin xyz="{q}"/>'
+)
+PLUS = ('<predecessor link="{a}"><origin xyz="{p}"/></predecessor>'
+        '<successor link="{b}"><origin xyz="{q}"/></successor>')  # fmt: skip
+TAGS = {
+    'Isaac Sim': '<loop_joint name="l{n}" type="{t}">'
+    '<link1 link="{a}" xyz="{p}" rpy="0 0 0"/><link2 link="{b}" xyz="{q}" rpy="0 0 0"/>{x}'
+    '</loop_joint>',
+    'Isaac Sim, link1 twice': '<loop_joint name="l{n}" type="{t}">'
+    '<link1 link="{a}" xyz="{p}" rpy="0 0 0"/><link1 link="{b}" xyz="{q}" rpy="0 0 0"/>{x}'
+    '</loop_joint>',
+    'Fusion': f'<loop_joint name="l{{n}}" type="{{t}}">{PLACES}{{x}}</loop_joint>',
+    'urdfdom': f'<constraint name="l{{n}}" type="{{t}}_joint">{PLACES}{{x}}</constraint>',
+    'URDF+': f'<loop name="l{{n}}" type="{{t}}">{PLUS}{{x}}</loop>',
+    'loop_constraint': f'<loop_constraint name="l{{n}}">{PLACES}</loop_constraint>',
+}
+AXES = {'urdfdom': '<parent_axis xyz="0 0 1"/><child_axis xyz="0 0 2"/>'}
+OPEN = re.compile(r'<(loop_joint|loop|constraint)\b.*</\1>', re.DOTALL)
+
+
+@pytest.mark.parametrize('kind', ['spherical', 'revolute'])
+@pytest.mark.parametrize('dialect', [*TAGS, 'close'])
+def test_dialects_of_one_robot_have_the_same_states(tmp_path, dialect, kind):
+    name = 'ankle' if kind == 'spherical' else 'four_bar'
+    told, pairs, reach = CHOICES[name]
+    text = OPEN.sub('', (ROBOTS / f'{name}.urdf').read_text())
+    expected = load(ROBOTS / f'{name}.urdf', told)
+    if dialect == 'close':
+        places = [[f'{link}.{",".join(map(str, xyz))}' for link, xyz in pair] for pair in pairs]
+        end = ':hinge' if kind == 'revolute' else ''
+        closure = read(tmp_path, text, **told, close=[f'{"=".join(one)}{end}' for one in places])
+    else:
+        axis = AXES.get(dialect, '<axis xyz="0 0 1"/>') if kind == 'revolute' else ''
+        tag = TAGS[dialect].replace('{t}', kind).replace('{x}', axis)
+        closure = read(tmp_path, text.replace('</robot>', ends(tag, *pairs) + '</robot>'), **told)
+    for inputs in near_pose(expected, reach, 30):
+        joints = expected.position(*inputs).joints
+        assert closure.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
+
+
+def test_rods_may_be_links_without_a_joint(tmp_path):
+    """A <constraint type="link"> is a rod between two balls (urdfdom#264)."""
+    text = OPEN.sub('', (ROBOTS / 'ankle.urdf').read_text())
+    bars = (('bar1', (0, -0.004, -0.0165)), FOOT1), (('bar2', (0, -0.0165, -0.004)), FOOT2)
+    rods = ends(f'<constraint name="l{{n}}" type="link">{PLACES}</constraint>', *bars)
+    closure = read(tmp_path, text.replace('</robot>', f'{rods}</robot>'), input=['pitch', 'roll'])
+    expected = load(ROBOTS / 'ankle.urdf', {'input': ['pitch', 'roll']})
+    assert closure.joint_names == ('m1', 'm2')
+    assert {'rod1_y', 'toe', 'hip'} < set(closure.linkage.left_out)
+    for inputs in near_pose(expected, 0.3, 30):
+        found = dict(zip(expected.joint_names, expected.position(*inputs).joints, strict=True))
+        joints = closure.position(*inputs).joints
+        assert joints == pytest.approx((found['m1'], found['m2']), abs=1e-14)
+
+
+def test_a_planar_loop_is_that_of_the_planar_import(tmp_path, capsys):
+    pose = [f'--at={name}={value}' for name, value in KNEE.items()]
+    file = str(tmp_path / 'planar.yaml')
+    assert main(['import', str(ROBOTS / 'four_bar.urdf'), '--input', 'crank_joint', *pose,
+                 '-o', file]) == 0  # fmt: skip
+    planar, closure = load(file), load(ROBOTS / 'four_bar.urdf', CHOICES['four_bar'][0])
+    for inputs in near_pose(closure, 3.0, 30):
+        joints = planar.position(*inputs).joints
+        away = np.subtract(closure.position(*inputs).joints, joints)
+        assert np.abs(np.remainder(away + np.pi, 2 * np.pi) - np.pi).max() < 1e-12
+
+
+MOTOR = '<link name="rotor"/><joint name="motor" type="continuous"><parent link="arm"/>'
+MOTOR += '<child link="rotor"/><axis xyz="0 1 0"/></joint>'
+COUPLED = '<coupling name="gear"><predecessor link="{}"/><successor link="{}"/>{}</coupling>'
+GEARS = {
+    'mimic': ('<mimic joint="motor" multiplier="0.5"/>', ''),
+    'coupling': ('', COUPLED.format('rotor', 'crank', '<ratio value="0.5"/>')),
+    'coupling, turned round': ('', COUPLED.format('crank', 'rotor', '<ratio value="2"/>')),
+}
+
+
+@pytest.mark.parametrize('gear', GEARS)
+def test_a_motor_may_move_a_loop_by_a_ratio(tmp_path, gear):
+    within, beside = GEARS[gear]
+    text = (ROBOTS / 'four_bar.urdf').read_text()
+    text = text.replace('<child link="crank"/>', f'<child link="crank"/>{within}')
+    text = text.replace('</robot>', f'{MOTOR}{beside}</robot>')
+    geared = read(tmp_path, text, input='motor', at={**KNEE, 'motor': 2.4})
+    expected = load(ROBOTS / 'four_bar.urdf', CHOICES['four_bar'][0])
+    for (crank,) in near_pose(expected, 1.5, 20):
+        found = dict(zip(geared.joint_names, geared.position(2.0 * crank).joints, strict=True))
+        assert found.pop('crank_joint') == pytest.approx(crank, abs=1e-15)
+        assert [*found.values()] == pytest.approx(expected.position(crank).joints, abs=1e-14)
+
+
+def test_a_mimic_that_loops_make_needless_is_left_out(tmp_path):
+    """Exporters write roughly by a mimic what a loop does exactly."""
+    text = (ROBOTS / 'four_bar.urdf').read_text()
+    rough = '<child link="rocker"/><mimic joint="crank_joint" multiplier="-0.4" offset="-0.7"/>'
+    closure = read(
+        tmp_path, text.replace('<child link="rocker"/>', rough), **CHOICES['four_bar'][0]
+    )
+    assert closure.linkage.left_out == ('mimic of rocker_joint',)
+
+
+def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
+    """CAD writes five digits: no link changes, and each angle is that at which the loops close."""
+    text = (ROBOTS / 'ankle.urdf').read_text().replace('0.040 0 0.215', '0.04001 0 0.21502')
+    closure = read(tmp_path, text, input=['pitch', 'roll'])
+    assert 1e-5 < closure.linkage.open_by < 3e-5
+    pose = {
+        k: closure.linkage.pose_value(k) for k in (*closure.linkage.driven, *closure.joint_names)
+    }
+    walk = Walk(text, CHOICES['ankle'][1])
+    assert np.abs(walk.gaps(pose)).max() < 1e-14
+    assert 1e-5 < max(map(abs, pose.values())) < 1e-2
+
+
+@pytest.mark.parametrize('name', spatial_linkage_names())
+def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
+    file = tmp_path / f'{name}.urdf'
+    file.write_bytes(model_of(name, urdf_model))
+    linkage, robot = load(name), load(file)
+    assert robot.linkage.driven == linkage.linkage.driven
+    assert {k: robot.linkage.limits[k] for k in linkage.linkage.limits} == linkage.linkage.limits
+    count = 0
+    for inputs in near_pose(linkage, 0.1, 30):
+        one, other = linkage.position(*inputs), robot.position(*inputs)
+        assert one.status == other.status
+        if one.status.has_pose:
+            found = dict(zip(robot.joint_names, other.joints, strict=True))
+            joints = [found[joint] for joint in linkage.joint_names]
+            assert joints == pytest.approx(one.joints, abs=1e-12)
+            count += 1
+    assert count > 10
+
+
+SCENE = 'linkage: {urdf: robots/ankle.urdf, input: [pitch, roll]}\nrate: 200\n'
+SCENE += 'drive: {sine: {amplitude: 0.1, frequency: 0.5}}\neffects: {velocity: {}}\n'
+
+
+def test_the_bag_of_a_robot_replays_without_its_urdf(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'robots').mkdir()
+    urdf = tmp_path / 'robots' / 'ankle.urdf'
+    urdf.write_bytes((ROBOTS / 'ankle.urdf').read_bytes())
+    (tmp_path / 'legs.yaml').write_text(SCENE)
+    assert load_scene('legs.yaml').files['linkage.urdf'] == urdf.read_bytes()
+    assert main(['simulate', 'legs.yaml', '--seconds', '1', '-o', 'bag']) == 0
+    urdf.unlink()
+    assert main(['replay', 'bag']) == 0
+    assert 'identical: all 201 ticks' in capsys.readouterr().out
+    assert main(['report', 'bag', '-o', 'bag.html']) == 0
+
+
+BAD = yaml.safe_load((ROBOTS / 'refused.yaml').read_text('utf-8'))
+LARGE = {
+    'PADDING': ' ' * 10_000_000,
+    'JOINTS': ''.join(
+        f'<joint name="j{n}" type="fixed"><parent link="foot"/><child link="k{n}"/></joint>'
+        f'<link name="k{n}"/>'
+        for n in range(2000)
+    ),
+}
+
+
+@pytest.mark.parametrize('case', BAD)
+def test_bad_robots_are_refused_in_one_line(tmp_path, case):
+    told = BAD[case].get('told', {'input': ['pitch', 'roll']})
+    text = (ROBOTS / f'{BAD[case].get("robot", "ankle")}.urdf').read_text()
+    for old, new in {**BAD[case].get('changes', {}), **LARGE}.items():
+        assert old in text or old in LARGE
+        text = text.replace(old, new)
+    with pytest.raises(LinkageError) as caught:
+        read(tmp_path, text, **told)
+    said = str(caught.value).replace(str(tmp_path / 'robot.urdf'), 'FILE')
+    assert said.removeprefix('FILE: ') == BAD[case]['line']
+
+
+def test_a_robot_that_a_linkage_file_cannot_be_is_said(tmp_path):
+    with pytest.raises(LinkageError, match='is no URDF; leave out input'):
+        linkage_content(Path('four_bar.yaml'), {'input': 'x'})
+    scene = parse_yaml(SCENE.encode(), 'legs.yaml')
+    assert scene.section('linkage').text('urdf') == 'robots/ankle.urdf'
