@@ -45,7 +45,7 @@ def add_file(parser: argparse.ArgumentParser) -> None:
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare what may be told of a robot, if the linkage file is a URDF; see `robot_of`."""
-    robot = parser.add_argument_group('a robot: FILE is a URDF with loops')
+    robot = parser.add_argument_group('of a robot', 'FILE is a URDF whose tree loops close')
     robot.add_argument(
         '--input', action='append', default=[], metavar='JOINT', help='joint that is driven'
     )

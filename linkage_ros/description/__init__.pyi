@@ -16,7 +16,6 @@ from linkage_ros.description.file_access import (
 from linkage_ros.description.file_kinds import (
     BINARY as BINARY,
     kind_of_bytes as kind_of_bytes,
-    kind_of_folder as kind_of_folder,
 )
 from linkage_ros.description.linkage_file import (
     checked_closure as checked_closure,

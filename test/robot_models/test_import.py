@@ -347,7 +347,7 @@ BAD = {
                            ("x.urdf: joint j: type='ball' is not a joint type; "
                             'write revolute, continuous, prismatic or fixed')),
     'a planar joint': (
-        robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='planar')),
+        robot(A_B, joint('j', 'base', 'a', '0 0 0', kind='planar'), joint('k', 'a', 'b', '0 0 0')),
         (
             'x.urdf: joint j: type planar cannot be a pin or slider of a planar linkage; write '
             'revolute, continuous, prismatic or fixed, or leave it out with what hangs on it'

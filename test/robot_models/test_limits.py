@@ -12,13 +12,13 @@ from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 from hypothesis import given, settings, strategies as st
+from linkage_ros.description import read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, Limits
 from linkage_ros.tools.models import (
     linkage_from_urdf,
     ModelPart,
     mujoco_model,
-    read_urdf,
     urdf_model,
 )
 import mujoco

@@ -11,6 +11,7 @@
 from math import hypot, remainder, tau
 from random import Random
 
+from linkage_ros.description import read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, InputSweep, Ratio, sample_inputs
 from linkage_ros.tools.models import (
@@ -18,7 +19,6 @@ from linkage_ros.tools.models import (
     linkage_from_urdf,
     ModelPart,
     mujoco_model,
-    read_urdf,
     urdf_model,
 )
 import numpy as np

@@ -12,7 +12,7 @@ from collections import Counter
 from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description import linkage_text, load, load_scene
+from linkage_ros.description import linkage_text, load, load_scene, read_urdf
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure, InputSweep, sample_inputs, usual_inputs
 from linkage_ros.messages import JointStateWriter
@@ -23,7 +23,6 @@ from linkage_ros.tools.models import (
     model_of,
     ModelPart,
     PartError,
-    read_urdf,
     urdf_model,
 )
 import pytest
