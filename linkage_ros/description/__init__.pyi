@@ -119,6 +119,7 @@ from linkage_ros.description.tables import (
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.urdf_file import (
     MOVING as MOVING,
+    PLACE as PLACE,
     read_urdf as read_urdf,
     read_urdf_file as read_urdf_file,
     UrdfFile as UrdfFile,

@@ -5,11 +5,25 @@
 # writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
-"""Read a robot whose URDF has loops: the keys that a scene says of it, declared once."""
+"""
+Read a robot whose URDF has loops as a spatial linkage: its tree, and what closes it.
+
+A loop leads from an end of what closes it up the tree to the common ancestor, and down to the
+other end. The joints on such ways are the linkage. All others are left out, and what hangs on them
+stands still in its own loops: the topmost link of each loop is the ground. Joints keep their
+names, signs and zeroes.
+
+The pose has the values of joints that are told, or else 0. If the loops miss it by rounding, the
+joints that are not driven are moved until they close (Newton's method, damped): no length changes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
+from itertools import chain
+from math import hypot, inf, remainder, tau
 
 from linkage_ros.description.grammar import ListOf, Named
 from linkage_ros.description.linkage_grammar import FARTHEST, MOST_LINKS
@@ -21,12 +35,50 @@ from linkage_ros.description.parameters import (
     text,
     TextOf,
 )
-from linkage_ros.description.robot_loops import CLOSE_KINDS, RobotLoops
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import NameOrNames
-from linkage_ros.description.urdf_file import read_urdf
-from linkage_ros.errors import DefinitionError, FileError, list_names
-from linkage_ros.kinematics import check_limits, check_pose, SpaceClosure, SpaceLinkage
+from linkage_ros.description.urdf_file import (
+    LOOP_KINDS,
+    LoopEnd,
+    MOVING,
+    PLACE,
+    read_urdf,
+    UrdfFile,
+    UrdfJoint,
+    UrdfLoop,
+)
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
+from linkage_ros.kinematics import (
+    check_limits,
+    check_pose,
+    direction_of,
+    dot,
+    Elimination,
+    GROUND,
+    GROUND_FRAME,
+    minus,
+    plus,
+    Ratio,
+    scale,
+    SpaceClosure,
+    SpaceFrame,
+    SpaceLinkage,
+    SpatialJoint,
+    turn_about,
+    Vector,
+)
+
+_MET = 1e-3
+"""Largest gap of a loop in the pose, relative to the size."""
+
+_ROUNDED, _CLOSED = 1e-14, 1e-9
+"""Gaps that are rounding, and those of a pose that is found, relative to the size."""
+
+_STEP, _DAMPING, _MOST_STEPS, _MOST_HALVED = 1e-6, 1e-10, 40, 8
+"""Of Newton's method: step of slopes, damping relative to the size, most steps and halvings."""
+
+_NUDGES = (0.0, 0.5, -0.5)
+"""How much joints are moved before a pose is sought, which a stretched one does not lead to."""
 
 ROBOT = Keys(
     'A robot whose URDF has loops; all joints in them that are no inputs are published.',
@@ -34,10 +86,7 @@ ROBOT = Keys(
     {
         'urdf': text('path of the URDF, relative to the folder of this file'),
         'input': declare(
-            NameOrNames(
-                'The driven joint of the robot; several in a list.', TextOf('a joint of the robot')
-            ),
-            (),
+            NameOrNames('The driven joint; several in a list.', TextOf('a joint of the URDF')), ()
         ),
         'at': declare(
             Named(
@@ -50,8 +99,7 @@ ROBOT = Keys(
         'close': declare(
             ListOf(
                 'What else meets: FRAME=FRAME, links whose origins a ball joins, or places '
-                f'LINK.x,y,z; FRAME=FRAME:KIND for another, {list_names(CLOSE_KINDS, " or ")}: a '
-                'hinge turns about the z axis of the first frame.',
+                'LINK.x,y,z; FRAME=FRAME:hinge, about the z axis of the first, or :fixed.',
                 TextOf('two frames'),
             ),
             (),
@@ -67,29 +115,317 @@ def read_robot_closure(
     urdf = read_urdf(content.named_data, content.mapping['urdf'])
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
+
+    def close(without: Sequence[str] = ()) -> SpaceClosure:
+        closure = SpaceClosure(robot.linkage(publish_inputs, without), name)
+        check_pose(closure)
+        check_limits(closure)
+        return closure
+
     try:
-        loops = RobotLoops(urdf, given['input'], given['at'], given['close'], publish_inputs)
-        if loops.needless:
+        robot = _Robot(urdf, given['input'], given['at'], given['close'])
+        if robot.needless:
             # A robot may say roughly by a mimic what its loops do exactly.
             with suppress(DefinitionError):
-                return _checked_closure(loops.close(loops.needless), name)
-        return _checked_closure(loops.close(), name)
+                return close(robot.needless)
+        return close()
     except DefinitionError as error:
-        raise _locate_error(content, error, urdf.file) from None
+        section, _, part = error.where.partition('.')
+        if section in ('input', 'at', 'close', 'pose'):
+            key = 'at' if section == 'pose' else section
+            raise content.error(
+                key if key in content else '', error.reason, error.remedy
+            ) from None
+        where = f'joint {part.partition(".")[0]}' if part else ''
+        raise FileError(urdf.file, where, error.reason, error.remedy) from None
 
 
-def _checked_closure(linkage: SpaceLinkage, name: str) -> SpaceClosure:
-    closure = SpaceClosure(linkage, name)
-    check_pose(closure)
-    check_limits(closure)
-    return closure
+class _Robot:
+    """The loops of a robot; a DefinitionError names one of its keys, a FileError its URDF."""
+
+    def __init__(
+        self,
+        urdf: UrdfFile,
+        driven: Sequence[str],
+        told: Mapping[str, float],
+        close: Sequence[str],
+    ) -> None:
+        self._urdf, self._told = urdf, {**urdf.start, **told}
+        self._loops = [*urdf.loops, *map(self._read_close, close)]
+        self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
+        for joint in urdf.joints.values():
+            self._above[joint.child] = (joint, *self._above[joint.parent])
+        ways = (self._ways(*(end.link for end in loop.ends)) for loop in self._loops)
+        looped = {joint.name for way in chain(*ways) for joint in way}
+        self._driven = tuple(driven) or tuple(name for name in urdf.inputs if name in looped)
+        self._ratios = dict(self._find_ratios())
+        pairs = [{name, ratio.of} for name, ratio in self._ratios.items()]
+        kept = looped.union(*(pair for pair in pairs if pair & looped))
+        self.needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
+        """Joints that follow others in loops, which may move them as well."""
+        moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
+        self._moving = [name for name in moving if name in kept]
+        self._check(moving, kept, told)
+        self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
+        places = [frame.origin for frame in self._place_links({}).values()]
+        self._size = max(max(one) - min(one) for one in zip(*places, strict=True)) or 1.0
+
+    def _check(self, moving: list[str], kept: set[str], told: Mapping[str, float]) -> None:
+        names, unread = self._moving, self._urdf.unread
+        if not names:
+            reason = f'closes no loop{"; not read: " if unread else ""}{list_names(unread)}'
+            raise self._error(
+                '', reason, 'write a <loop_joint>, or name frames that meet: close: [FRAME=FRAME] '
+                'in a scene, --close FRAME=FRAME',
+            )  # fmt: skip
+        for loop in self._loops:
+            if loop.kind not in LOOP_KINDS.values():
+                reason = f'{quote(loop.kind)} is no type of what closes a loop'
+                remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
+                raise self._error(f'loop {loop.name}', reason, remedy)
+        for joint in map(self._urdf.joints.__getitem__, kept):
+            if joint.kind not in (*MOVING, 'fixed'):
+                reason, remedy = f'type {joint.kind} cannot be in a loop', list_names(MOVING)
+                raise self._error(f'joint {joint.name}', reason, f'write {remedy} or fixed')
+        for key, name in (*(('input', name) for name in self._driven), *(('at', k) for k in told)):
+            if name not in moving:
+                remedy = did_you_mean(name, moving, f'name one of {list_names(moving)}')
+                raise DefinitionError(key, f'there is no moving joint {quote(name)}', remedy)
+        for name in self._driven or ('',):
+            if name not in names:
+                reason = f'{self._urdf.file} does not say which joint drives it'
+                reason = f'{quote(name)} is in no loop' if name else reason
+                raise DefinitionError('input', reason, f'name one of {list_names(names)}')
+
+    def _error(self, where: str, reason: str, remedy: str) -> FileError:
+        return FileError(self._urdf.file, where, reason, remedy)
+
+    def _read_close(self, asked: str) -> UrdfLoop:
+        """Read FRAME=FRAME[:KIND]; the axis of a hinge is the z axis of the first frame."""
+        pair, _, kind = asked.rpartition(':')
+        if kind not in ('ball', 'hinge', 'fixed'):
+            pair, kind = asked, 'ball'
+        ends = []
+        for name in pair.split('='):
+            found = None if name in self._urdf.links else PLACE.fullmatch(name)
+            link, *place = found.groups() if found else (name, 0, 0, 0)
+            if link not in self._urdf.links:
+                remedy = did_you_mean(link, self._urdf.links, 'name a link, or LINK.x,y,z')
+                raise DefinitionError('close', f'there is no link {quote(link)}', remedy)
+            x, y, z = map(float, place)
+            ends.append(LoopEnd(link, (x, y, z), axis=(0.0, 0.0, 1.0)))
+        if len(ends) != 2:
+            raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
+        return UrdfLoop(pair, kind, (ends[0], ends[1]))
+
+    def _ways(self, one: str, other: str) -> list[list[UrdfJoint]]:
+        """Return the joints from two links up to their common ancestor."""
+        shared = {*self._above[one]} & {*self._above[other]}
+        return [
+            [joint for joint in self._above[link] if joint not in shared] for link in (one, other)
+        ]
+
+    def _find_ratios(self) -> Iterator[tuple[str, Ratio]]:
+        """Yield the joints that follow others: mimics and couplings."""
+        for joint in self._urdf.joints.values():
+            if joint.mimics:
+                yield joint.name, Ratio(joint.mimics, joint.multiplier, joint.offset)
+        for name, predecessor, successor, ratio in self._urdf.couplings:
+            ways = self._ways(predecessor, successor)
+            chains = [[one.name for one in way if one.kind in MOVING] for way in ways]
+            if [*map(len, chains)] != [1, 1] or not ratio:
+                reason = f'couples {len(chains[0])} and {len(chains[1])} joints by {ratio:g}'
+                remedy = 'couple one joint with one, by a ratio other than 0'
+                raise self._error(f'coupling {name}', reason, remedy)
+            (leader,), (follower,) = chains
+            if follower in self._driven:
+                yield leader, Ratio(follower, 1.0 / ratio)
+            else:
+                yield follower, Ratio(leader, ratio)
+
+    # The pose
+
+    def _place_links(self, values: Mapping[str, float]) -> dict[str, SpaceFrame]:
+        """Return the frame of each link at values of the joints, in that of the root."""
+        frames = {self._urdf.root: GROUND_FRAME}
+        for joint in self._urdf.joints.values():
+            base = _within(frames[joint.parent], self._bases[joint.name])
+            if value := values.get(joint.name, 0.0):
+                axis = base.turn(direction_of(joint.axis))
+                if joint.kind == 'prismatic':
+                    base = base._replace(origin=plus(base.origin, scale(value, axis)))
+                else:
+                    x, y, z = (turn_about(axis, value, way) for way in base[:3])
+                    base = SpaceFrame(x, y, z, base.origin)
+            frames[joint.child] = base
+        return frames
+
+    def _move(
+        self, values: dict[str, float], moves: Mapping[str, float], ratios: Mapping[str, Ratio]
+    ) -> dict[str, float]:
+        """Return values after some moves; joints follow others."""
+        values = values | {name: values[name] + move for name, move in moves.items()}
+        return values | {
+            name: of.ratio * values[of.of] + of.offset
+            for name, of in ratios.items()
+            if name not in self._told
+        }
+
+    def _gaps(self, values: Mapping[str, float]) -> dict[str, Vector]:
+        """Return by how much each loop is open, in [m]; a rod has its length in the pose."""
+        frames, gaps = self._place_links(values), {}
+        for loop in self._loops:
+            one, other = (_end_frame(end, frames) for end in loop.ends)
+            gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
+            if loop.kind == 'slide':
+                gap = minus(gap, scale(dot(gap, axis), axis))
+            if loop.kind != 'rod':
+                gaps[loop.name] = gap
+        return gaps
+
+    def _meet(
+        self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> tuple[dict[str, float], float]:
+        """Return values at which the loops close, as far as free joints do it, and the gap."""
+
+        def misses(moves: Mapping[str, float]) -> list[float]:
+            return [*chain(*self._gaps(self._move(values, moves, ratios)).values())]
+
+        left = misses({})
+        for _ in range(_MOST_STEPS):
+            if hypot(*left) <= _ROUNDED * self._size:
+                break
+            slopes = [
+                [0.5 * (b - a) / _STEP for a, b in zip(*ends, strict=True)]
+                for ends in ([misses({name: -_STEP}), misses({name: _STEP})] for name in free)
+            ]
+            matrix = [[_product(one, other) for other in slopes] for one in slopes]
+            for number, row in enumerate(matrix):
+                row[number] += _DAMPING * self._size**2
+            steps = Elimination(matrix, ()).solve([_product(row, left) for row in slopes])
+            for halved in range(_MOST_HALVED):
+                moves = {k: -(0.5**halved) * step for k, step in zip(free, steps, strict=True)}
+                if hypot(*(tried := misses(moves))) < hypot(*left):
+                    break
+            else:
+                break
+            values, left = self._move(values, moves, ratios), tried
+        return values, hypot(*left)
+
+    def _found_pose(
+        self, values: dict[str, float], free: list[str], ratios: Mapping[str, Ratio]
+    ) -> str:
+        """Return a pose near values of joints in which all loops close, as a remedy."""
+        untold = [name for name in free if name not in self._told]
+        # What is told is moved last.
+        for moved, nudge in (*((untold, nudge) for nudge in _NUDGES), (free, 0.0)):
+            start = self._move(values, dict.fromkeys(moved, nudge), ratios)
+            met, gap = self._meet(start, moved, ratios)
+            if gap < _CLOSED * self._size:
+                pose = []
+                for name in self._moving:
+                    turn = inf if self._urdf.joints[name].kind == 'prismatic' else tau
+                    if name not in ratios and abs(value := remainder(met[name], turn)) > _CLOSED:
+                        pose.append(f'{name}: {value:.6g}')
+                return f'near it all close: at: {{{", ".join(pose)}}}'
+        return 'give values of joints at which all loops close'
+
+    # The linkage
+
+    def linkage(self, publish_inputs: bool, without: Sequence[str]) -> SpaceLinkage:
+        """Return the linkage in the pose, in which its loops close, without some ratios."""
+        ratios = {name: of for name, of in self._ratios.items() if name not in without}
+        free = [name for name in self._moving if name not in (*self._driven, *ratios)]
+        told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
+        values = self._move(told, {}, self._ratios)
+        gaps = {name: hypot(*gap) for name, gap in self._gaps(values).items()}
+        worst = max(gaps, key=gaps.__getitem__, default='')
+        open_by = gaps.get(worst, 0.0)
+        if open_by > _MET * self._size:
+            reason = (
+                f'the loop {worst} of {self._urdf.file} is open by {open_by:.3g} m in the pose'
+            )
+            raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
+        values, _ = self._meet(values, free, ratios)
+        frames, joints = self._place_links(values), self._urdf.joints
+        on = {self._urdf.root: GROUND}
+        for joint in joints.values():
+            own = f'{GROUND}_link' if joint.child == GROUND else joint.child
+            still = on[joint.parent] if joint.kind == 'fixed' else GROUND
+            on[joint.child] = own if joint.name in self._moving else still
+        for loop in self._loops:
+            if loop.kind == 'fixed':
+                kept, gone = sorted((on[end.link] for end in loop.ends), key=GROUND.__ne__)
+                on = {link: kept if of == gone else of for link, of in on.items()}
+        made = SpaceLinkage({}, {}, {}, {}, {}, self._driven, (), open_by=open_by)
+        for name in self._moving:
+            joint, frame = joints[name], frames[joints[name].child]
+            turns, limits = joint.kind != 'prismatic', joint.limits
+            if turns and limits.high - limits.low >= tau:  # It does not limit an angle.
+                limits = replace(limits, low=-inf, high=inf)
+            axis, ends = frame.turn(direction_of(joint.axis)), (on[joint.parent], on[joint.child])
+            if ends[0] != ends[1]:  # It is not held by a fixed loop.
+                joined = SpatialJoint(*ends, axis, frame.origin, values[name], limits)
+                (made.hinges if turns else made.slides)[name] = joined
+        found = [*made.hinges, *made.slides]
+        for loop in self._loops:
+            self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
+        published = [k for k in self._moving if k in found and k not in self._driven]
+        left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
+        return replace(
+            made,
+            published=(*(self._driven if publish_inputs else ()), *published),
+            ratios={name: of for name, of in ratios.items() if name in found},
+            left_out=(*left_out, *(f'mimic of {name}' for name in without)),
+        )
+
+    def _add_loop(
+        self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: SpaceLinkage
+    ) -> None:
+        """Add what closes a loop to a linkage."""
+        places, axes = zip(
+            *((end.origin, end.turn(direction_of(its.axis)))
+              for its in loop.ends for end in [_end_frame(its, frames)]), strict=True,
+        )  # fmt: skip
+        name = loop.name
+        while name in (*self._urdf.joints, *self._urdf.links):
+            name += '_'
+        if on[0] == on[1] or loop.kind == 'fixed':
+            return
+        if loop.kind in ('hinge', 'slide'):
+            joints = made.hinges if loop.kind == 'hinge' else made.slides
+            joints[name] = SpatialJoint(on[0], on[1], axes[0], places[0])
+        elif loop.kind == 'universal':
+            made.hinges[f'{name} 1'] = SpatialJoint(on[0], name, axes[0], places[0])
+            made.hinges[f'{name} 2'] = SpatialJoint(name, on[1], axes[1], places[0])
+        elif loop.kind == 'rod':
+            for number, (link, place) in enumerate(zip(on, places, strict=True)):
+                made.points[point := f'{name} {number + 1}'] = place
+                for carrier in (link, name):
+                    made.links[carrier] = (*made.links.get(carrier, ()), point)
+        else:
+            made.points[name] = places[0]
+            for link in on:
+                made.links[link] = (*made.links.get(link, ()), name)
 
 
-def _locate_error(content: Section, error: DefinitionError, file: str) -> FileError:
-    """Return an error as one of the keys of the robot, or of a part of its URDF."""
-    section, _, part = error.where.partition('.')
-    if section in ('input', 'at', 'close', 'pose'):
-        key = 'at' if section == 'pose' else section
-        return content.error(key if key in content else '', error.reason, error.remedy)
-    where = f'joint {part.partition(".")[0]}' if part else ''
-    return FileError(file, where, error.reason, error.remedy)
+def _product(one: Sequence[float], other: Sequence[float]) -> float:
+    return sum(a * b for a, b in zip(one, other, strict=True))
+
+
+def _end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
+    return _within(frames[end.link], _frame(end.xyz, end.rpy))
+
+
+def _within(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
+    """Return a frame that is given in another one."""
+    x, y, z = map(outer.turn, inner[:3])
+    return SpaceFrame(x, y, z, outer.place(inner.origin))
+
+
+def _frame(xyz: Vector, rpy: Vector) -> SpaceFrame:
+    """Return the frame of an origin of a URDF: roll, pitch and yaw about fixed axes."""
+    x, y, z = GROUND_FRAME[:3]
+    for axis, angle in zip((x, y, z), rpy, strict=True):
+        x, y, z = (turn_about(axis, angle, way) for way in (x, y, z))
+    return SpaceFrame(x, y, z, xyz)

@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 from pathlib import Path
+import re
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -64,6 +65,10 @@ _USUAL_TAGS = (
     'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
     *_LOOP_TAGS,
 )  # fmt: skip
+
+_NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
+PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
+"""A place on a link: LINK.x,y,z."""
 
 _LARGEST_FILE = 10_000_000
 _MOST_JOINTS = 2000
@@ -111,8 +116,8 @@ class LoopEnd(NamedTuple):
 
     link: str
     xyz: Vector
-    rpy: Vector | None = None  # None if the file does not say it
-    axis: Vector | None = None
+    rpy: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (1.0, 0.0, 0.0)  # Of any length except 0
 
 
 class UrdfLoop(NamedTuple):
@@ -268,23 +273,16 @@ class _Reader:
         else:
             raise self._file_error(where, 'has no two ends', 'write <parent> and <child>')
         ends = []
-        for end, own in zip(found, ('parent_axis', 'child_axis'), strict=True):
-            link, origin = end.get('link', ''), end.find('origin')
-            if link not in links:
-                raise self._file_error(
-                    where, f'its {end.tag} {quote(link)} is not a link', 'name a link'
-                )
-            if origin is None:
-                origin = element.find(f'{end.tag}_origin')
-            origin = end if origin is None else origin
-            axis = element.find(own)
-            if axis is None and not ends:
-                axis = element.find('axis')
-            way = None if axis is None else self._read_vector(axis, 'xyz', where, '1 0 0')
+        for end, axes in zip(found, (('parent_axis', 'axis'), ('child_axis',)), strict=True):
+            link = self._checked_link(end.get('link', ''), end.tag, where, links)
+            own = (end.find('origin'), element.find(f'{end.tag}_origin'))
+            origin = next((each for each in own if each is not None), end)
+            axis = next((each for each in map(element.find, axes) if each is not None), None)
+            way = self._read_vector(axis, 'xyz', where, '1 0 0')
             if way == (0.0, 0.0, 0.0):
                 raise self._file_error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
-            rpy = self._read_vector(origin, 'rpy', where, '') if 'rpy' in origin.attrib else None
-            ends.append(LoopEnd(link, self._read_vector(origin, 'xyz', where, '0 0 0'), rpy, way))
+            xyz, rpy = (self._read_vector(origin, key, where, '0 0 0') for key in ('xyz', 'rpy'))
+            ends.append(LoopEnd(link, xyz, rpy, way))
         return ends[0], ends[1]
 
     def _read_couplings(
@@ -306,10 +304,7 @@ class _Reader:
             where = f'joint {joint.get("name", "")} of <gazebo>'
             parent, child = ((joint.findtext(end) or '').strip() for end in ('parent', 'child'))
             for end, link in (('parent', parent), ('child', child)):
-                if link not in links:
-                    raise self._file_error(
-                        where, f'its {end} {quote(link)} is not a link', 'name a link'
-                    )
+                self._checked_link(link, end, where, links)
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
             values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
             yield f'{child}.{",".join(map(repr, values[:3]))}', parent
@@ -448,6 +443,9 @@ class _Reader:
     ) -> str:
         found = element.find(end)
         link = found.get('link', '') if found is not None else ''
+        return self._checked_link(link, end, where, links)
+
+    def _checked_link(self, link: str, end: str, where: str, links: Mapping[str, UrdfLink]) -> str:
         if link not in links:
             raise self._file_error(where, f'its {end} {quote(link)} is not a link', 'name a link')
         return link

@@ -19,10 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import cos, sin
-import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description import MOVING, UrdfFile, UrdfJoint, UrdfLink
+from linkage_ros.description import MOVING, PLACE, UrdfFile, UrdfJoint, UrdfLink
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Mass, NO_LIMITS
 import numpy as np
@@ -31,9 +30,6 @@ import numpy as np
 # links and joints of these loops.
 
 _LINE = '_line'
-
-_NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
-_PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
 
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -85,7 +81,7 @@ def find_closings(
             raise FileError(
                 urdf.file, f'--close {"=".join(pair)}', 'names one link twice', 'name two'
             )
-        closings.append(Closing(_PLACE.sub(r'\1_end', pair[0]), pair))
+        closings.append(Closing(PLACE.sub(r'\1_end', pair[0]), pair))
     return closings, alone
 
 
@@ -99,7 +95,7 @@ def find_pinned(urdf: UrdfFile) -> Iterator[tuple[str, str]]:
             place + turn @ np.array(joint.xyz),
         )
     for end, parent in urdf.pinned:
-        found = _PLACE.fullmatch(end)
+        found = PLACE.fullmatch(end)
         assert found
         (turn, place), (to, origin) = frames[found[1]], frames[parent]
         there = to.T @ (place + turn @ np.array([*map(float, found.groups()[1:])]) - origin)
@@ -110,7 +106,7 @@ def add_places(urdf: UrdfFile, asked: Sequence[tuple[str, str]]) -> UrdfFile:
     """Return the robot with a frame at each asked place, LINK.x,y,z, which bears its name."""
     links, joints = dict(urdf.links), dict(urdf.joints)
     for name in (name for pair in asked for name in pair):
-        found = _PLACE.fullmatch(name)
+        found = PLACE.fullmatch(name)
         if name in links or not found or found[1] not in links:
             continue
         x, y, z = map(float, found.groups()[1:])
