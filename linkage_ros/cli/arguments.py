@@ -45,27 +45,16 @@ def add_file(parser: argparse.ArgumentParser) -> None:
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare what may be told of a robot, if the linkage file is a URDF; see `robot_of`."""
-    robot = parser.add_argument_group('of a robot', 'FILE is a URDF whose tree loops close')
-    robot.add_argument(
-        '--input', action='append', default=[], metavar='JOINT', help='joint that is driven'
-    )
-    robot.add_argument(
-        '--close',
-        action='append',
-        default=[],
-        metavar='FRAME=FRAME[:KIND]',
-        help='links whose origins meet, or places LINK.x,y,z in metres: by a ball, or by a hinge '
-        'about the z axis of the first, or fixed; once for each loop that the URDF does not close',
-    )
-    robot.add_argument(
-        '--pose',
-        action='append',
-        type=read_joint_value,
-        default=[],
-        metavar='JOINT=VALUE',
-        help='value of a joint, if not 0, at which the loops close, in radians or metres; at in a '
-        'scene',
-    )
+    robot = parser.add_argument_group('of a robot', 'FILE is a URDF; more in docs/how_to/loops.md')
+    close = 'links whose origins meet, or places LINK.x,y,z in metres: by a ball, :hinge or :fixed'
+    pose = 'value of a joint, if not 0, at which the loops close, in radians or metres'
+    for option, name, kind, text in (
+        ('--input', 'JOINT', str, 'joint that is driven; may be repeated, as the next two'),
+        ('--close', 'FRAME=FRAME[:KIND]', str, close),
+        ('--pose', 'JOINT=VALUE', read_joint_value, pose),
+    ):
+        given: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}
+        robot.add_argument(option, action='append', **given)
 
 
 def robot_of(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -88,11 +88,7 @@ def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -
 
 
 def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:
-    """
-    Return the content of a linkage file; refuse a scene, and name its linkage.
-
-    A URDF, whose name ends in .urdf, may be told more by the keys of a robot in a scene.
-    """
+    """Return the content of a linkage file or a robot; refuse a scene, and name its linkage."""
     if file.suffix.lower() == '.urdf':
         return robot_content(Section(str(file), '', {'urdf': str(file), **(robot or {})}), file)
     if robot:

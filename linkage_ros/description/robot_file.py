@@ -24,6 +24,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from math import hypot, inf, remainder, tau
+from typing import Any
 
 from linkage_ros.description.grammar import ListOf, Named
 from linkage_ros.description.linkage_grammar import FARTHEST, MOST_LINKS
@@ -74,8 +75,8 @@ _MET = 1e-3
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
 
-_STEP, _DAMPING, _MOST_STEPS, _MOST_HALVED = 1e-6, 1e-10, 40, 8
-"""Of Newton's method: step of slopes, damping relative to the size, most steps and halvings."""
+_STEP, _DAMPING, _MOST_STEPS = 1e-6, 1e-10, 40
+"""Of Newton's method: step of slopes, damping relative to the size, and most steps."""
 
 _NUDGES = (0.0, 0.5, -0.5)
 """How much joints are moved before a pose is sought, which a stretched one does not lead to."""
@@ -133,9 +134,8 @@ def read_robot_closure(
         section, _, part = error.where.partition('.')
         if section in ('input', 'at', 'close', 'pose'):
             key = 'at' if section == 'pose' else section
-            raise content.error(
-                key if key in content else '', error.reason, error.remedy
-            ) from None
+            where = key if key in content else ''
+            raise content.error(where, error.reason, error.remedy) from None
         where = f'joint {part.partition(".")[0]}' if part else ''
         raise FileError(urdf.file, where, error.reason, error.remedy) from None
 
@@ -143,13 +143,7 @@ def read_robot_closure(
 class _Robot:
     """The loops of a robot; a DefinitionError names one of its keys, a FileError its URDF."""
 
-    def __init__(
-        self,
-        urdf: UrdfFile,
-        driven: Sequence[str],
-        told: Mapping[str, float],
-        close: Sequence[str],
-    ) -> None:
+    def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
         self._urdf, self._told = urdf, {**urdf.start, **told}
         self._loops = [*urdf.loops, *map(self._read_close, close)]
         self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
@@ -167,7 +161,9 @@ class _Robot:
         self._moving = [name for name in moving if name in kept]
         self._check(moving, kept, told)
         self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
-        places = [frame.origin for frame in self._place_links({}).values()]
+        frames = self._place_links({})
+        places = [frames[urdf.joints[name].child].origin for name in self._moving]
+        places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
         self._size = max(max(one) - min(one) for one in zip(*places, strict=True)) or 1.0
 
     def _check(self, moving: list[str], kept: set[str], told: Mapping[str, float]) -> None:
@@ -236,7 +232,7 @@ class _Robot:
             if [*map(len, chains)] != [1, 1] or not ratio:
                 reason = f'couples {len(chains[0])} and {len(chains[1])} joints by {ratio:g}'
                 remedy = 'couple one joint with one, by a ratio other than 0'
-                raise self._error(f'coupling {name}', reason, remedy)
+                raise self._error(name, reason, remedy)
             (leader,), (follower,) = chains
             if follower in self._driven:
                 yield leader, Ratio(follower, 1.0 / ratio)
@@ -291,8 +287,8 @@ class _Robot:
         def misses(moves: Mapping[str, float]) -> list[float]:
             return [*chain(*self._gaps(self._move(values, moves, ratios)).values())]
 
-        left = misses({})
         for _ in range(_MOST_STEPS):
+            left = misses({})
             if hypot(*left) <= _ROUNDED * self._size:
                 break
             slopes = [
@@ -302,14 +298,8 @@ class _Robot:
             matrix = [[_product(one, other) for other in slopes] for one in slopes]
             for number, row in enumerate(matrix):
                 row[number] += _DAMPING * self._size**2
-            steps = Elimination(matrix, ()).solve([_product(row, left) for row in slopes])
-            for halved in range(_MOST_HALVED):
-                moves = {k: -(0.5**halved) * step for k, step in zip(free, steps, strict=True)}
-                if hypot(*(tried := misses(moves))) < hypot(*left):
-                    break
-            else:
-                break
-            values, left = self._move(values, moves, ratios), tried
+            steps = Elimination(matrix, ()).solve([-_product(row, left) for row in slopes])
+            values = self._move(values, dict(zip(free, steps, strict=True)), ratios)
         return values, hypot(*left)
 
     def _found_pose(

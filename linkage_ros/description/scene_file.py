@@ -202,13 +202,12 @@ def parse_scene(
     linkages = iter([part for part in files if part != SCENE_FILE])
 
     def open_linkage(within: Section) -> tuple[Section, bytes]:
-        robot = isinstance(within.mapping.get('linkage'), dict) and within.section('linkage')
-        if not robot:
-            within.text('linkage')
+        is_robot = isinstance(within.mapping.get('linkage'), dict)
+        robot = within.section('linkage') if is_robot else within.text('linkage')
         part = next(linkages, None)
         if part is None:
             raise within.error('linkage', 'is not among the files', 'name another bag')
-        if robot:
+        if isinstance(robot, Section):
             robot.named_data = files[part]
             return robot, files[part]
         return parse_yaml(files[part], f'{where}: {part}'), files[part]

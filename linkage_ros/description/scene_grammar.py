@@ -496,15 +496,10 @@ def scene_schema() -> Schema:
     from linkage_ros.description.robot_file import ROBOT  # local import: for few scenes
 
     own = {key: {'$ref': f'#/$defs/{key}'} for key in OF_A_LINKAGE.entries}
-    linkage, named_or_robot = (
-        {'$ref': '#/$defs/linkage'},
-        {
-            'description': f'{_NAMED_LINKAGE.meaning}; or a robot',
-            'if': {'type': ['object']},
-            'then': parameters_schema(ROBOT),
-            'else': _NAMED_LINKAGE.json_schema(),
-        },
-    )
+    linkage = {'$ref': '#/$defs/linkage'}
+    robot = {'if': {'type': ['object']}, 'then': parameters_schema(ROBOT)}
+    named = _NAMED_LINKAGE.json_schema()
+    either = {'description': f'{_NAMED_LINKAGE.meaning}; or a robot', **robot, 'else': named}
     name = TextOf('its name, and the prefix of its joints: letters, digits and _', _ROS_NAME)
     one = mapping_schema(
         'A linkage; keys that it leaves out have the values of the scene.',
@@ -520,7 +515,7 @@ def scene_schema() -> Schema:
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
         'else': {'required': ['linkage'], **_refused_pairs()},
-        '$defs': parameters_schema(OF_A_LINKAGE)['properties'] | {'linkage': named_or_robot},
+        '$defs': parameters_schema(OF_A_LINKAGE)['properties'] | {'linkage': either},
     }
 
 

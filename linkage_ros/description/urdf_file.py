@@ -9,20 +9,19 @@
 """
 Read a URDF: links, joints, and what closes loops, checked against the rules of URDF.
 
-URDF has no loops. Tags outside of it that close some are read in these dialects:
+URDF has no loops. These tags outside of it close some:
 
 - ``<loop_joint>`` with ``<link1 link xyz rpy>`` and ``<link2 …>``, of Isaac Sim's importer, whose
-  manual and followers write ``link1`` twice; an axis is in the frame of the first end
-- ``<loop_joint>`` with ``<parent>``, ``<child>``, ``<parent_origin>``, ``<child_origin>``, and
-  ``<axis>`` in the frame of the parent, as an exporter of Fusion 360 writes it
+  manual and followers write ``link1`` twice
+- ``<loop_joint>`` with ``<parent>``, ``<child>``, ``<parent_origin>``, ``<child_origin>`` and
+  ``<axis frame="parent">``, of exporters of Fusion 360
 - ``<constraint>`` with the same and ``<parent_axis>``, ``<child_axis>`` (ros/urdfdom#264); its
   type ``link`` is a rod between two balls
-- ``<loop>`` of URDF+, with an ``<origin>`` in ``<predecessor>`` and ``<successor>``, and
-  ``<coupling>``, where q of the successor is ``<ratio>`` times q of the predecessor, each from
-  their common ancestor (M. Chignoli et al., arXiv:2411.19753; generalized_rbda); and the older
-  ``<loop_constraint>`` of the same authors, which is a pin
+- ``<loop>`` of URDF+, with ``<origin>`` in ``<predecessor>`` and ``<successor>``; ``<coupling>``,
+  where q of the successor is ``<ratio>`` times q of the predecessor; and the older
+  ``<loop_constraint>``, a pin (M. Chignoli et al., arXiv:2411.19753; generalized_rbda)
 
-As in URDF an axis that is not written is 1 0 0.
+An axis is in the frame of the first end; as in URDF it is 1 0 0 if it is not written.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 from pathlib import Path
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.description.file_access import read_regular
@@ -128,15 +127,6 @@ class UrdfLoop(NamedTuple):
     ends: tuple[LoopEnd, LoopEnd]
 
 
-class Coupling(NamedTuple):
-    """A ratio of two chains of joints, which lead from their common ancestor to two links."""
-
-    name: str
-    predecessor: str
-    successor: str
-    ratio: float
-
-
 class UrdfFile(NamedTuple):
     """A robot."""
 
@@ -150,7 +140,9 @@ class UrdfFile(NamedTuple):
     # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
     start: Mapping[str, float]
     loops: tuple[UrdfLoop, ...]  # What closes loops, as tags say; of two at one place the first
-    couplings: tuple[Coupling, ...]
+    # Ratios of two chains of joints, which lead from their common ancestor to two links: name,
+    # predecessor, successor, ratio.
+    couplings: tuple[tuple[str, str, str, float], ...]
     # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
     pinned: tuple[tuple[str, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
@@ -285,16 +277,11 @@ class _Reader:
             ends.append(LoopEnd(link, xyz, rpy, way))
         return ends[0], ends[1]
 
-    def _read_couplings(
-        self, root: ET.Element, links: Mapping[str, UrdfLink]
-    ) -> Iterator[Coupling]:
+    def _read_couplings(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[Any]:
         for element in root.findall('coupling'):
-            name = element.get('name', '')
-            where, ratio = f'coupling {name}', element.find('ratio')
-            ends = [
-                self._read_end(element, end, where, links) for end in ('predecessor', 'successor')
-            ]
-            yield Coupling(name, *ends, self._read_values(ratio, 'value', where, 1, '1')[0])
+            where, ratio = f'coupling {element.get("name", "")}', element.find('ratio')
+            ends = [self._read_end(element, end, where, links) for end in _LOOP_ENDS[2]]
+            yield where, *ends, self._read_values(ratio, 'value', where, 1, '1')[0]
 
     def _pinned_places(
         self, root: ET.Element, links: Mapping[str, UrdfLink]

@@ -103,9 +103,8 @@ def model_of(named: str, write: Write) -> bytes:
         scene = load_scene(file)
         return make_scene_model(scene, Pipeline(scene).closures, write)
     if write is urdf_model and is_spatial(content):
-        closure = read_space_closure(content)
         try:
-            return space_urdf(file.stem, closure)
+            return space_urdf(file.stem, read_space_closure(content).linkage)
         except DefinitionError as error:
             raise content.locate_error(error) from None
     try:

@@ -369,22 +369,29 @@ def add_joint(
     ET.SubElement(element, 'axis', xyz=axis)
     # A continuous angle that is limited on one side only gets a far limit on the other.
     lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
+    return write_limits(element, limits, lowest, highest, mimic)
+
+
+def write_limits(
+    joint: ET.Element, limits: Limits, lowest: float, highest: float, mimic: Ratio | None
+) -> dict[str, str]:
+    """Write limits, with others where there are none, and a mimic; return what is made up."""
     known = {
         'lower': (limits.low, lowest),
         'upper': (limits.high, highest),
         'effort': (limits.effort, EFFORT),
         'velocity': (limits.velocity, VELOCITY),
     }
-    if kind == 'continuous':
+    if joint.get('type') == 'continuous':
         del known['lower'], known['upper']
     written = {
         key: format_number(given if isfinite(given) else ours)
         for key, (given, ours) in known.items()
     }
-    ET.SubElement(element, 'limit', written)
+    ET.SubElement(joint, 'limit', written)
     if mimic:
         multiplier, offset = format_number(mimic.ratio), format_number(mimic.offset)
-        ET.SubElement(element, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
+        ET.SubElement(joint, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
     return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
 
 
