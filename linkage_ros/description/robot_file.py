@@ -24,7 +24,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from math import hypot, inf, remainder, tau
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.description.grammar import ListOf, Named
 from linkage_ros.description.linkage_grammar import FARTHEST, MOST_LINKS
@@ -52,11 +52,13 @@ from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_na
 from linkage_ros.kinematics import (
     check_limits,
     check_pose,
+    cross,
     direction_of,
     dot,
     Elimination,
     GROUND,
     GROUND_FRAME,
+    length,
     minus,
     plus,
     Ratio,
@@ -67,6 +69,7 @@ from linkage_ros.kinematics import (
     SpatialJoint,
     turn_about,
     Vector,
+    ZERO,
 )
 
 _MET = 1e-3
@@ -75,8 +78,8 @@ _MET = 1e-3
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
 
-_STEP, _DAMPING, _MOST_STEPS = 1e-6, 1e-10, 40
-"""Of Newton's method: step of slopes, damping relative to the size, and most steps."""
+_DAMPING, _MOST_STEPS, _MOST_LOOPED = 1e-10, 20, 100
+"""Of Newton's method: damping relative to the size, most steps, most joints in loops."""
 
 _NUDGES = (0.0, 0.5, -0.5)
 """How much joints are moved before a pose is sought, which a stretched one does not lead to."""
@@ -136,8 +139,18 @@ def read_robot_closure(
             key = 'at' if section == 'pose' else section
             where = key if key in content else ''
             raise content.error(where, error.reason, error.remedy) from None
-        where = f'joint {part.partition(".")[0]}' if part else ''
-        raise FileError(urdf.file, where, error.reason, error.remedy) from None
+        where = f'{"link" if section == "links" else "joint"} {part.partition(".")[0]}'
+        remedy = error.remedy.replace('draw another pose', 'give another: at: {JOINT: VALUE}')
+        raise FileError(urdf.file, where if part else '', error.reason, remedy) from None
+
+
+class _Parts(NamedTuple):
+    """What a linkage is made of."""
+
+    points: dict[str, Vector]
+    links: dict[str, tuple[str, ...]]
+    hinges: dict[str, SpatialJoint]
+    slides: dict[str, SpatialJoint]
 
 
 class _Robot:
@@ -145,7 +158,15 @@ class _Robot:
 
     def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
         self._urdf, self._told = urdf, {**urdf.start, **told}
-        self._loops = [*urdf.loops, *map(self._read_close, close)]
+        self._loops: list[UrdfLoop] = []
+        taken = {*urdf.joints, *urdf.links}
+        for loop in (*urdf.loops, *map(self._read_close, close)):
+            name = loop.name
+            while name in taken:
+                name += '_'
+            taken.add(name)
+            self._loops.append(loop._replace(name=name))
+        self._closed = [loop for loop in self._loops if loop.kind != 'rod']
         self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
         for joint in urdf.joints.values():
             self._above[joint.child] = (joint, *self._above[joint.parent])
@@ -174,6 +195,9 @@ class _Robot:
                 '', reason, 'write a <loop_joint>, or name frames that meet: close: [FRAME=FRAME] '
                 'in a scene, --close FRAME=FRAME',
             )  # fmt: skip
+        if len(names) > _MOST_LOOPED:
+            reason = f'has {len(names)} joints in loops'
+            raise self._error('', reason, f'keep {_MOST_LOOPED} of them at most')
         for loop in self._loops:
             if loop.kind not in LOOP_KINDS.values():
                 reason = f'{quote(loop.kind)} is no type of what closes a loop'
@@ -267,34 +291,46 @@ class _Robot:
             if name not in self._told
         }
 
-    def _gaps(self, values: Mapping[str, float]) -> dict[str, Vector]:
+    def _gaps(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
         """Return by how much each loop is open, in [m]; a rod has its length in the pose."""
-        frames, gaps = self._place_links(values), {}
-        for loop in self._loops:
+        gaps = []
+        for loop in self._closed:
             one, other = (_end_frame(end, frames) for end in loop.ends)
             gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
-            if loop.kind == 'slide':
-                gap = minus(gap, scale(dot(gap, axis), axis))
-            if loop.kind != 'rod':
-                gaps[loop.name] = gap
+            along = dot(gap, axis) if loop.kind == 'slide' else 0.0
+            gaps.append(minus(gap, scale(along, axis)))
         return gaps
+
+    def _slopes(
+        self, frames: Mapping[str, SpaceFrame], free: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> list[list[float]]:
+        """Return for each free joint the rates of all gaps at a rate of 1."""
+        rates = {name: [ZERO] * len(self._closed) for name in free}
+        for number, loop in enumerate(self._closed):
+            ways = self._ways(*(end.link for end in loop.ends))
+            for end, way, sign in zip(loop.ends, ways, (-1.0, 1.0), strict=True):
+                place = _end_frame(end, frames).origin
+                for joint in way:
+                    of = ratios.get(joint.name, Ratio(joint.name, 1.0))
+                    if of.of in rates and joint.kind in MOVING:
+                        frame = frames[joint.child]
+                        rate = frame.turn(direction_of(joint.axis))
+                        if joint.kind != 'prismatic':
+                            rate = cross(rate, minus(place, frame.origin))
+                        before = rates[of.of][number]
+                        rates[of.of][number] = plus(before, scale(sign * of.ratio, rate))
+        return [[*chain(*row)] for row in rates.values()]
 
     def _meet(
         self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
     ) -> tuple[dict[str, float], float]:
         """Return values at which the loops close, as far as free joints do it, and the gap."""
-
-        def misses(moves: Mapping[str, float]) -> list[float]:
-            return [*chain(*self._gaps(self._move(values, moves, ratios)).values())]
-
         for _ in range(_MOST_STEPS):
-            left = misses({})
+            frames = self._place_links(values)
+            left = [*chain(*self._gaps(frames))]
             if hypot(*left) <= _ROUNDED * self._size:
                 break
-            slopes = [
-                [0.5 * (b - a) / _STEP for a, b in zip(*ends, strict=True)]
-                for ends in ([misses({name: -_STEP}), misses({name: _STEP})] for name in free)
-            ]
+            slopes = self._slopes(frames, free, ratios)
             matrix = [[_product(one, other) for other in slopes] for one in slopes]
             for number, row in enumerate(matrix):
                 row[number] += _DAMPING * self._size**2
@@ -328,9 +364,9 @@ class _Robot:
         free = [name for name in self._moving if name not in (*self._driven, *ratios)]
         told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
         values = self._move(told, {}, self._ratios)
-        gaps = {name: hypot(*gap) for name, gap in self._gaps(values).items()}
-        worst = max(gaps, key=gaps.__getitem__, default='')
-        open_by = gaps.get(worst, 0.0)
+        gaps = map(length, self._gaps(self._place_links(values)))
+        names = [loop.name for loop in self._closed]
+        open_by, worst = max(zip(gaps, names, strict=True), default=(0.0, ''))
         if open_by > _MET * self._size:
             reason = (
                 f'the loop {worst} of {self._urdf.file} is open by {open_by:.3g} m in the pose'
@@ -347,7 +383,7 @@ class _Robot:
             if loop.kind == 'fixed':
                 kept, gone = sorted((on[end.link] for end in loop.ends), key=GROUND.__ne__)
                 on = {link: kept if of == gone else of for link, of in on.items()}
-        made = SpaceLinkage({}, {}, {}, {}, {}, self._driven, (), open_by=open_by)
+        made = _Parts({}, {}, {}, {})
         for name in self._moving:
             joint, frame = joints[name], frames[joints[name].child]
             turns, limits = joint.kind != 'prismatic', joint.limits
@@ -362,15 +398,18 @@ class _Robot:
             self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
         published = [k for k in self._moving if k in found and k not in self._driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
-        return replace(
-            made,
+        return SpaceLinkage(
+            *made,
+            struts={},
+            driven=self._driven,
             published=(*(self._driven if publish_inputs else ()), *published),
             ratios={name: of for name, of in ratios.items() if name in found},
             left_out=(*left_out, *(f'mimic of {name}' for name in without)),
+            open_by=open_by,
         )
 
     def _add_loop(
-        self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: SpaceLinkage
+        self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: _Parts
     ) -> None:
         """Add what closes a loop to a linkage."""
         places, axes = zip(
@@ -378,8 +417,6 @@ class _Robot:
               for its in loop.ends for end in [_end_frame(its, frames)]), strict=True,
         )  # fmt: skip
         name = loop.name
-        while name in (*self._urdf.joints, *self._urdf.links):
-            name += '_'
         if on[0] == on[1] or loop.kind == 'fixed':
             return
         if loop.kind in ('hinge', 'slide'):

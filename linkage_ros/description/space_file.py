@@ -86,7 +86,8 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     return SpaceLinkage(
         points=points,
         links=links,
-        **joints,
+        hinges=joints['hinges'],
+        slides=joints['slides'],
         struts=struts,
         driven=driven,
         published=(*driven, *published) if publish_inputs else published,

@@ -169,6 +169,7 @@ from linkage_ros.kinematics.space.vectors import (
     SpaceFrame as SpaceFrame,
     turn_about as turn_about,
     Vector as Vector,
+    ZERO as ZERO,
 )
 from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status

@@ -317,6 +317,11 @@ LARGE = {
         f'<link name="k{n}"/>'
         for n in range(2000)
     ),
+    'CHAIN': ''.join(
+        f'<joint name="j{n}" type="continuous"><parent link="{f"k{n}" if n else "chassis"}"/>'
+        f'<child link="k{n + 1}"/><axis xyz="0 1 0"/></joint><link name="k{n + 1}"/>'
+        for n in range(101)
+    ),
 }
 
 
