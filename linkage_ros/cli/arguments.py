@@ -50,7 +50,7 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
     pose = 'value of a joint, if not 0, at which the loops close, in radians or metres'
     for option, name, kind, text in (
         ('--input', 'JOINT', str, 'joint that is driven; may be repeated, as the next two'),
-        ('--close', 'FRAME=FRAME[:KIND]', str, close),
+        ('--close', 'FRAME=FRAME', str, close),
         ('--pose', 'JOINT=VALUE', read_joint_value, pose),
     ):
         given: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}

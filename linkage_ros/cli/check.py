@@ -522,7 +522,10 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         met = 'equations, met within the worst residual'
         yield 'redundant', f'{account["redundant_equations"]} {met}'
     if account['robot_open_by_m'] is not None:
-        yield 'loops open by', f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose'
+        yield (
+            'loops open by',
+            f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose',
+        )
     if account['left_out']:
         yield 'left out, in no loop', ', '.join(account['left_out'])
     yield from _reach_facts(account, units)

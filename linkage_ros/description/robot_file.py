@@ -144,7 +144,7 @@ def read_robot_closure(
         raise FileError(urdf.file, where if part else '', error.reason, remedy) from None
 
 
-class _Parts(NamedTuple):
+class _LinkageParts(NamedTuple):
     """What a linkage is made of."""
 
     points: dict[str, Vector]
@@ -269,7 +269,7 @@ class _Robot:
         """Return the frame of each link at values of the joints, in that of the root."""
         frames = {self._urdf.root: GROUND_FRAME}
         for joint in self._urdf.joints.values():
-            base = _within(frames[joint.parent], self._bases[joint.name])
+            base = _compose_frames(frames[joint.parent], self._bases[joint.name])
             if value := values.get(joint.name, 0.0):
                 axis = base.turn(direction_of(joint.axis))
                 if joint.kind == 'prismatic':
@@ -383,7 +383,7 @@ class _Robot:
             if loop.kind == 'fixed':
                 kept, gone = sorted((on[end.link] for end in loop.ends), key=GROUND.__ne__)
                 on = {link: kept if of == gone else of for link, of in on.items()}
-        made = _Parts({}, {}, {}, {})
+        made = _LinkageParts({}, {}, {}, {})
         for name in self._moving:
             joint, frame = joints[name], frames[joints[name].child]
             turns, limits = joint.kind != 'prismatic', joint.limits
@@ -409,7 +409,7 @@ class _Robot:
         )
 
     def _add_loop(
-        self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: _Parts
+        self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: _LinkageParts
     ) -> None:
         """Add what closes a loop to a linkage."""
         places, axes = zip(
@@ -441,10 +441,10 @@ def _product(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def _end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
-    return _within(frames[end.link], _frame(end.xyz, end.rpy))
+    return _compose_frames(frames[end.link], _frame(end.xyz, end.rpy))
 
 
-def _within(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
+def _compose_frames(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
     """Return a frame that is given in another one."""
     x, y, z = map(outer.turn, inner[:3])
     return SpaceFrame(x, y, z, outer.place(inner.origin))

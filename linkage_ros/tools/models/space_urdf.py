@@ -53,10 +53,10 @@ def space_urdf(name: str, linkage: SpaceLinkage) -> bytes:
     for strut in linkage.struts:
         reason, remedy = 'is a length, for which a URDF has no joint', 'write slides and balls'
         raise DefinitionError(f'struts.{strut}', reason, remedy)
-    return _Tree(name, linkage).write()
+    return _SpaceTree(name, linkage).write()
 
 
-class _Tree:
+class _SpaceTree:
     def __init__(self, name: str, linkage: SpaceLinkage) -> None:
         self._linkage = linkage
         self._robot = ET.Element('robot', name=name)
