@@ -47,11 +47,11 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare what may be told of a robot, if the linkage file is a URDF; see `robot_of`."""
     robot = parser.add_argument_group('of a robot', 'FILE is a URDF; more in docs/how_to/loops.md')
     close = 'links whose origins meet, or places LINK.x,y,z in metres: by a ball, :hinge or :fixed'
-    pose = 'value of a joint, if not 0, at which the loops close, in radians or metres'
+    start = 'value of a joint, if not 0, at which the loops close, in radians or metres'
     for option, name, kind, text in (
         ('--input', 'JOINT', str, 'joint that is driven; may be repeated, as the next two'),
         ('--close', 'FRAME=FRAME', str, close),
-        ('--pose', 'JOINT=VALUE', read_joint_value, pose),
+        ('--start', 'JOINT=VALUE', read_joint_value, start),
     ):
         given: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}
         robot.add_argument(option, action='append', **given)
@@ -59,7 +59,7 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
 
 def robot_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what is told of a robot, by the keys of a scene."""
-    told = {'input': arguments.input, 'close': arguments.close, 'at': dict(arguments.pose)}
+    told = {'input': arguments.input, 'close': arguments.close, 'at': dict(arguments.start)}
     return {key: value for key, value in told.items() if value}
 
 
