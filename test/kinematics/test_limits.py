@@ -357,3 +357,5 @@ def test_with_several_inputs_the_limits_of_each_joint_hold():
         assert by in ('left_joint', 'rod_joint')
         assert InputSweep(closure, (1.5, 1.5)).position_at(end + outward * 1e-6).status is LIMITED
     assert remainder(rod, tau) == rod
+    both = closed(symmetric_five_bar(', limits: [1, 2]', ', limits: [1, 2]'))
+    assert both.input_ranges == ()
