@@ -166,37 +166,67 @@ class _Robot:
                 name += '_'
             taken.add(name)
             self._loops.append(loop._replace(name=name))
-        self._closed = [loop for loop in self._loops if loop.kind != 'rod']
         self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
         for joint in urdf.joints.values():
             self._above[joint.child] = (joint, *self._above[joint.parent])
-        ways = (self._ways(*(end.link for end in loop.ends)) for loop in self._loops)
-        looped = {joint.name for way in chain(*ways) for joint in way}
-        self._driven = tuple(driven) or tuple(name for name in urdf.inputs if name in looped)
+        self._driven = tuple(driven) or urdf.inputs
         self._ratios = dict(self._find_ratios())
-        pairs = [{name, ratio.of} for name, ratio in self._ratios.items()]
-        kept = looped.union(*(pair for pair in pairs if pair & looped))
+        groups = [group for group in self._find_groups() if group[1]]
+        # The other leg of a robot, which another linkage may move, is left out.
+        chosen = [group for group in groups if not self._driven or group[0] & {*self._driven}]
+        self._loops = [loop for _, loops in chosen for loop in loops]
+        self._closed = [loop for loop in self._loops if loop.kind != 'rod']
+        looped = {name for loop in self._loops for name in self._names_of(loop)}
         self.needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
         """Joints that follow others in loops, which may move them as well."""
         moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
+        kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
-        self._check(moving, kept, told)
+        self._check(moving, known, kept, told)
         self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
         frames = self._place_links({})
         places = [frames[urdf.joints[name].child].origin for name in self._moving]
         places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
         self._size = max(max(one) - min(one) for one in zip(*places, strict=True)) or 1.0
 
-    def _check(self, moving: list[str], kept: set[str], told: Mapping[str, float]) -> None:
-        names, unread = self._moving, self._urdf.unread
-        if not names:
+    def _find_groups(self) -> list[tuple[set[str], list[UrdfLoop]]]:
+        """Return the joints that loops and ratios tie together, with the loops."""
+        groups: list[tuple[set[str], list[UrdfLoop]]] = []
+        found = [(self._names_of(loop), [loop]) for loop in self._loops]
+        for names, loops in (*found, *(({k, of.of}, []) for k, of in self._ratios.items())):
+            tied = [group for group in groups if group[0] & names]
+            groups = [group for group in groups if group not in tied]
+            tied_names = names.union(*(group[0] for group in tied))
+            groups.append((tied_names, [*(one for _, of in tied for one in of), *loops]))
+        return groups
+
+    def _names_of(self, loop: UrdfLoop) -> set[str]:
+        ways = self._ways(*(end.link for end in loop.ends))
+        return {joint.name for joint in chain(*ways) if joint.kind != 'fixed'}
+
+    def _check(
+        self, moving: list[str], known: set[str], kept: set[str], told: Mapping[str, float]
+    ) -> None:
+        """Refuse names of no joint, inputs in no loop, and what cannot be in a loop."""
+        if not known:
+            unread = self._urdf.unread
             reason = f'closes no loop{"; not read: " if unread else ""}{list_names(unread)}'
             raise self._error(
                 '', reason, 'write a <loop_joint>, or name frames that meet: close: [FRAME=FRAME] '
                 'in a scene, --close FRAME=FRAME',
             )  # fmt: skip
-        if len(names) > _MOST_LOOPED:
-            reason = f'has {len(names)} joints in loops'
+        for key, name in (*(('input', name) for name in self._driven), *(('at', k) for k in told)):
+            if name not in moving:
+                remedy = did_you_mean(name, moving, f'name one of {list_names(moving)}')
+                raise DefinitionError(key, f'there is no moving joint {quote(name)}', remedy)
+        for name in self._driven or ('',):
+            if name not in known:
+                reason = f'{self._urdf.file} does not say which joint drives it'
+                reason = f'{quote(name)} is in no loop' if name else reason
+                remedy = f'name one of {list_names(name for name in moving if name in known)}'
+                raise DefinitionError('input', reason, remedy)
+        if len(kept) > _MOST_LOOPED:
+            reason = f'has {len(kept)} joints in loops'
             raise self._error('', reason, f'keep {_MOST_LOOPED} of them at most')
         for loop in self._loops:
             if loop.kind not in LOOP_KINDS.values():
@@ -204,18 +234,9 @@ class _Robot:
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
         for joint in map(self._urdf.joints.__getitem__, kept):
-            if joint.kind not in (*MOVING, 'fixed'):
+            if joint.kind not in MOVING:
                 reason, remedy = f'type {joint.kind} cannot be in a loop', list_names(MOVING)
                 raise self._error(f'joint {joint.name}', reason, f'write {remedy} or fixed')
-        for key, name in (*(('input', name) for name in self._driven), *(('at', k) for k in told)):
-            if name not in moving:
-                remedy = did_you_mean(name, moving, f'name one of {list_names(moving)}')
-                raise DefinitionError(key, f'there is no moving joint {quote(name)}', remedy)
-        for name in self._driven or ('',):
-            if name not in names:
-                reason = f'{self._urdf.file} does not say which joint drives it'
-                reason = f'{quote(name)} is in no loop' if name else reason
-                raise DefinitionError('input', reason, f'name one of {list_names(names)}')
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)

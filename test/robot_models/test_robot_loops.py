@@ -259,6 +259,23 @@ def test_a_mimic_that_loops_make_needless_is_left_out(tmp_path):
     assert closure.linkage.left_out == ('mimic of rocker_joint',)
 
 
+def test_loops_that_no_input_moves_are_left_out(tmp_path):
+    """A scene may move one leg of a robot, and another linkage of it the other."""
+    text = (ROBOTS / 'ankle.urdf').read_text()
+    inner = re.search(r'<robot name="ankle">(.*)</robot>', text, re.DOTALL)[1]
+    other = re.sub(r'(name|link|joint)="(?!pelvis)(\w+)"', r'\1="right_\2"', inner)
+    other = other.replace('<link name="pelvis"/>', '')
+    both = text.replace('</robot>', f'{other}</robot>')
+    one = load(ROBOTS / 'ankle.urdf', {'input': ['pitch', 'roll']})
+    for side in ('', 'right_'):
+        leg = read(tmp_path, both, input=[f'{side}pitch', f'{side}roll'])
+        assert leg.joint_names == tuple(f'{side}{name}' for name in one.joint_names)
+        assert {'m1', 'right_m1'} & {*leg.linkage.left_out} == {{'': 'right_m1'}.get(side, 'm1')}
+        for inputs in near_pose(one, 0.3, 5):
+            joints = one.position(*inputs).joints
+            assert leg.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
+
+
 def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
     """CAD writes five digits: no link changes, and each angle is that at which the loops close."""
     text = (ROBOTS / 'ankle.urdf').read_text().replace('0.040 0 0.215', '0.04001 0 0.21502')
