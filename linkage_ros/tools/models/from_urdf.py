@@ -191,6 +191,13 @@ class _Import:
         close = (*urdf.closings, *find_pinned(urdf), *close)
         self._urdf = urdf = add_places(urdf, close)
         self._closings, alone = find_closings(urdf, close)
+        for joint in urdf.joints.values():
+            if joint.kind in ('floating', 'planar'):
+                raise self._file_error(
+                    f'joint {joint.name}',
+                    f'type {joint.kind} cannot be a pin or slider of a planar linkage',
+                    f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
+                )
         moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
         for option, names in (('--input', inputs), ('--at', at)):
             for name in names:
@@ -200,13 +207,6 @@ class _Import:
                         'is not a moving joint',
                         did_you_mean(name, moving, f'name one of {list_names(moving)}'),
                     )
-        for joint in urdf.joints.values():
-            if joint.kind in ('floating', 'planar'):
-                raise self._file_error(
-                    f'joint {joint.name}',
-                    f'type {joint.kind} cannot be a pin or slider of a planar linkage',
-                    f'write {list_names(MOVING)} or fixed, or leave it out with what hangs on it',
-                )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
         followed = [joint.mimics for joint in urdf.joints.values() if joint.mimics]
