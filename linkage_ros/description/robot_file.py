@@ -78,10 +78,13 @@ _MET = 1e-3
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
 
-_DAMPING, _MOST_STEPS, _MOST_LOOPED = 1e-10, 20, 100
-"""Of Newton's method: damping relative to the size, most steps, most joints in loops."""
+_DAMPING, _MOST_STEPS = 1e-10, 12
+"""Of Newton's method: damping relative to the size, and most steps."""
 
-_NUDGES = (0.0, 0.5, -0.5)
+_MOST_JOINTS, _MOST_LOOPS = 100, 20
+"""Most joints in loops, and most loops: a pose is sought in seconds."""
+
+_NUDGES = (0.0, 0.5)
 """How much joints are moved before a pose is sought, which a stretched one does not lead to."""
 
 ROBOT = Keys(
@@ -225,9 +228,9 @@ class _Robot:
                 reason = f'{quote(name)} is in no loop' if name else reason
                 remedy = f'name one of {list_names(name for name in moving if name in known)}'
                 raise DefinitionError('input', reason, remedy)
-        if len(kept) > _MOST_LOOPED:
-            reason = f'has {len(kept)} joints in loops'
-            raise self._error('', reason, f'keep {_MOST_LOOPED} of them at most')
+        if len(kept) > _MOST_JOINTS or len(self._loops) > _MOST_LOOPS:
+            reason = f'has {len(kept)} joints in {len(self._loops)} loops that move together'
+            raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
         for loop in self._loops:
             if loop.kind not in LOOP_KINDS.values():
                 reason = f'{quote(loop.kind)} is no type of what closes a loop'
@@ -349,13 +352,16 @@ class _Robot:
         for _ in range(_MOST_STEPS):
             frames = self._place_links(values)
             left = [*chain(*self._gaps(frames))]
-            if hypot(*left) <= _ROUNDED * self._size:
+            if hypot(*left) <= _ROUNDED * self._size or not free:
                 break
-            slopes = self._slopes(frames, free, ratios)
-            matrix = [[_product(one, other) for other in slopes] for one in slopes]
+            columns = self._slopes(frames, free, ratios)
+            rows = [*zip(*columns, strict=True)]
+            # The shortest step: J·Jᵀ is smaller than Jᵀ·J.
+            matrix = [[_product(one, other) for other in rows] for one in rows]
             for number, row in enumerate(matrix):
                 row[number] += _DAMPING * self._size**2
-            steps = Elimination(matrix, ()).solve([-_product(row, left) for row in slopes])
+            pulls = Elimination(matrix, ()).solve([-gap for gap in left])
+            steps = [_product(column, pulls) for column in columns]
             values = self._move(values, dict(zip(free, steps, strict=True)), ratios)
         return values, hypot(*left)
 
