@@ -1,0 +1,244 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Solutions of links that close only together, as a function of their inputs, without history.
+
+A grid lies over the inputs. A cell has the solution at its centre, and its slopes. It is made when
+it is first met, from its neighbour on the straight line to the pose, and that one likewise: there
+is one way to each cell, so the order of visits cannot matter. A cell is accepted if the theorem of
+Kantorovich proves, at each quarter of the way and at the corners of the cell, that the prediction
+leads to one solution::
+
+    η·ω ≤ 1/4    η = |J⁻¹F|, the first step of Newton's method    ω a bound of |J⁻¹·J'|
+
+(≤ 1/2 is needed.) Otherwise the way and the cell are halved, four times at most. What no cell
+covers lies next to a singularity, or beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain, product
+from math import ldexp
+from typing import Any, NamedTuple, Protocol
+
+from linkage_ros.kinematics.arithmetic import call, has_result
+from linkage_ros.kinematics.built_once import BUILD_LOCK
+
+_WIDTH = 0.125
+"""Width of the widest cells, in [rad] or lengths."""
+
+_LEVELS = 5
+"""Number of widths; each is half the one before."""
+
+_KEPT = 4096
+"""Most cells that are kept: any other is made again, to the same bits."""
+
+_FARTHEST = 128
+"""Widest cells from the pose to the farthest state: some 16 rad, or lengths."""
+
+_PROVEN = 0.25
+"""Largest η·ω that is accepted."""
+
+_MOST_CORNERED = 3
+"""Of more inputs only the ends of the axes and two diagonals are tested: 64 corners take long."""
+
+_DIGITS = 28
+"""Binary digits after the point of the numbers of a cell: a start needs no more."""
+
+_SHORTEST = 2.0**-50
+"""Shortest step beyond the cells, as a part of the way."""
+
+Key = tuple[int, ...]
+
+
+class GridCell(NamedTuple):
+    """A solution at certain inputs, and for each input the slopes of the unknowns there."""
+
+    inputs: tuple[float, ...]
+    unknowns: tuple[float, ...]
+    slopes: tuple[tuple[float, ...], ...]
+
+    def predict(self, inputs: Sequence[float]) -> list[float]:
+        """Return the unknowns at inputs nearby."""
+        found = list(self.unknowns)
+        for value, at, slopes in zip(inputs, self.inputs, self.slopes, strict=True):
+            off = value - at
+            found = [one + off * slope for one, slope in zip(found, slopes, strict=True)]
+        return found
+
+
+class _Found(NamedTuple):
+    """A cell, or None if it is not proven; and the last proven one on the way to it."""
+
+    cell: GridCell | None
+    last: GridCell
+    numbers: tuple[float, ...] | None  # Of the cell: inputs, unknowns, slopes
+
+
+class GridGroup(Protocol):
+    """The equations of a group of links, at its inputs."""
+
+    def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
+        """Return η·ω of Kantorovich's theorem; infinite where there is none."""
+
+    def solve_from(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[float] | None:
+        """Return the solution that Newton's method leads to."""
+
+    def slopes_at(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[Sequence[float]] | None:
+        """Return for each input the slopes of the unknowns at a solution."""
+
+
+class Grid:
+    """The cells of a group of links about a pose, whose inputs and unknowns are given."""
+
+    def __init__(
+        self, group: GridGroup, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> None:
+        self._group = group
+        count = len(inputs)
+        level_slopes = ((0.0,) * len(unknowns),) * count
+        self._start = GridCell(tuple(inputs), tuple(unknowns), level_slopes)
+        self._kept: dict[tuple[int, Key], _Found] = {}
+        self._widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
+        self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
+        if count > _MOST_CORNERED:
+            axes = [
+                tuple(sign * (k == axis) for k in range(count))
+                for axis in range(count)
+                for sign in (-0.5, 0.5)
+            ]
+            self._corners = [*axes, self._corners[0], self._corners[-1]]
+
+    def __call__(self, *inputs: float) -> tuple[float, ...] | None:
+        """
+        Return inputs, unknowns and slopes of the widest proven cell at inputs; None if none is.
+
+        This is what `find_start` calls in compiled code.
+        """
+        home, kept = self._start.inputs, self._kept
+        for level, width in enumerate(self._widths):
+            key = tuple([round((x - at) / width) for x, at in zip(inputs, home, strict=True)])
+            found = kept.get((level, key))
+            if found is None:
+                with BUILD_LOCK:
+                    found = self._follow(level, key)
+            if found.numbers is not None:
+                return found.numbers
+        return None
+
+    def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
+        """Return where Newton's method starts, with symbols too; None if no cell is there."""
+        found, n, m = call(self, *inputs), len(inputs), len(self._start.unknowns)
+        if not has_result(found):
+            return None
+        unknowns = [found[n + k] for k in range(m)]
+        for i, value in enumerate(inputs):
+            off, first = value - found[i], n + m * (i + 1)
+            unknowns = [one + off * found[first + k] for k, one in enumerate(unknowns)]
+        return unknowns
+
+    def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
+        """
+        Follow the straight line from the last cell to inputs, in proven steps.
+
+        Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
+        them.
+        """
+        home, width = self._start.inputs, self._widths[-1]
+        key = tuple(round((x - at) / width) for x, at in zip(inputs, home, strict=True))
+        with BUILD_LOCK:
+            begin = cell = self._follow(_LEVELS - 1, key).last
+            done, step = 0.0, 1.0
+            while done < 1.0 and step > _SHORTEST:
+                part = min(1.0, done + step)
+                found = self._step_to(cell, _between(begin.inputs, inputs, part))
+                if found is None:
+                    step *= 0.5
+                else:
+                    cell, done, step = found, part, 2.0 * step
+        left = max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
+        return cell, left if done < 1.0 else 0.0
+
+    def _follow(self, level: int, key: Key) -> _Found:
+        """Return a cell, made from its neighbour on the straight line to the pose."""
+        way: list[Key] = []
+        while (found := self._kept.get((level, key))) is None:
+            way.append(key)
+            count = max(map(abs, key))
+            if count > _FARTHEST << level:
+                return _Found(None, self._start, None)
+            if not count:
+                found = _Found(self._start, self._start, None)
+                break
+            key = tuple(round(k * (count - 1) / count) for k in key)
+        for key in reversed(way):
+            if found.cell is None:
+                break
+            # Wider cells lead to where they are no longer proven.
+            wider = None if key is way[0] else self._wider_cell(level, key)
+            cell = wider or self._make_cell(level, key, found.cell)
+            numbers = cell and (*cell.inputs, *cell.unknowns, *chain(*cell.slopes))
+            found = _Found(cell, cell or found.last, numbers)
+            if wider is None:
+                if len(self._kept) >= _KEPT:
+                    del self._kept[next(iter(self._kept))]
+                self._kept[level, key] = found
+        return found
+
+    def _wider_cell(self, level: int, key: Key) -> GridCell | None:
+        """Return the widest proven cell, of wider ones, at the centre of a cell."""
+        for wider in range(level):
+            at = tuple(round(k / (1 << level - wider)) for k in key)
+            cell = self._follow(wider, at).cell
+            if cell is not None:
+                return cell
+        return None
+
+    def _make_cell(self, level: int, key: Key, known: GridCell) -> GridCell | None:
+        """Return a cell, if it is proven from a known one."""
+        width = self._widths[level]
+        centre = [at + k * width for at, k in zip(self._start.inputs, key, strict=True)]
+        found = self._step_to(known, centre)
+        if found is None:
+            return None
+        # The last digits of functions differ from machine to machine.
+        cell = GridCell(found.inputs, _rounded(found.unknowns), tuple(map(_rounded, found.slopes)))
+        for corner in self._corners:
+            at = [c + part * width for c, part in zip(centre, corner, strict=True)]
+            if not self._group.proof(at, cell.predict(at)) <= _PROVEN:
+                return None
+        return cell
+
+    def _step_to(self, known: GridCell, inputs: Sequence[float]) -> GridCell | None:
+        """Return the solution that a known one is proven to lead to."""
+        group = self._group
+        for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
+            at = _between(known.inputs, inputs, part)
+            if not group.proof(at, known.predict(at)) <= _PROVEN:
+                return None
+        unknowns = group.solve_from(inputs, known.predict(inputs))
+        slopes = None if unknowns is None else group.slopes_at(inputs, unknowns)
+        if unknowns is None or slopes is None:
+            return None
+        return GridCell(tuple(inputs), tuple(unknowns), tuple(map(tuple, slopes)))
+
+
+def _between(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
+    """Return inputs at a part of the way; the other end itself at 1."""
+    if part == 1.0:
+        return other
+    return [a + part * (b - a) for a, b in zip(one, other, strict=True)]
+
+
+def _rounded(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(ldexp(float(round(ldexp(value, _DIGITS))), -_DIGITS) for value in values)
