@@ -26,6 +26,7 @@ the pose is followed again for each state, with the same proof that no other ass
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import hypot, inf, isnan, nan, prod
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -41,7 +42,7 @@ from linkage_ros.kinematics.arithmetic import (
 )
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling import Tape
+from linkage_ros.kinematics.descent import descend, reciprocal_condition
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
@@ -57,6 +58,7 @@ from linkage_ros.kinematics.rough_pose import guess_unknowns
 from linkage_ros.kinematics.start_table import make_start_table, StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.kinematics.steps_before import StepsBefore
 from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
 import numpy as np
 
@@ -123,7 +125,7 @@ class Iteration:
     ) -> None:
         self._constraints = constraints
         self._slides = slides
-        self._before = before
+        self._before = StepsBefore(before, inputs)
         self.inputs = inputs
         self._sliding = sliding
         self._far = far
@@ -211,30 +213,23 @@ class Iteration:
 
     def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
         """Return where Newton's method starts with several inputs, and how far it may lead."""
-        start, known = self._along_a_line(inputs), self._known_at(inputs)
+        start, known = self._along_a_line(inputs), self._before.known_at(inputs)
         if start is None or known is None:
             return None
         jacobian = self._evaluate_system(known, start.unknowns)[1]
-        if _reciprocal_condition(jacobian) <= _SINGULAR:
+        if reciprocal_condition(jacobian) <= _SINGULAR:
             return None
         values = start.unknowns.tolist()
         return (*(values[k] for k in self._equations.free), start.farthest)
 
     def _trace_examples(self) -> dict[str, LinkState]:
         """Return the states at the pose as symbols; nothing if it is at a toggle."""
-        tape, n, inputs = Tape(), self.equation_count, self.inputs
-        states: list[Any] = [
-            [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(inputs))]
-            for name in 'qwa'
-        ]
-        known, velocities, accelerations = (LinkState(state, []) for state in states)
+        n = self.equation_count
         try:
-            for step in self._before:
-                closed = step.close(known)
-                if not closed.status.has_rates:
-                    return {}
-                found = step.rates(closed, known, velocities)
-                step.accelerations(closed, found, known, velocities, accelerations)
+            traced = self._before.trace()
+            if traced is None:
+                return {}
+            known, velocities, accelerations = traced[1]
             pose = LinkState(self._straight_solution(known)[:n], [])
             rates = LinkState(self._straight_rates(pose, known, velocities)[:n], [])
         except UndecidedError:
@@ -260,7 +255,7 @@ class Iteration:
             return None if found is None else found[free]
 
         def converges(x: float, values: Array) -> bool:
-            known = self._known_at((x,))
+            known = self._before.known_at((x,))
             if known is None:
                 return False
             unknowns = np.array(self._equations.place_bodies(values.tolist(), known))
@@ -286,7 +281,7 @@ class Iteration:
         if corrected is None:
             return self._not_closed(solved)
         unknowns, jacobian = corrected
-        if len(inputs) > 1 and _reciprocal_condition(jacobian) <= _SINGULAR:
+        if len(inputs) > 1 and reciprocal_condition(jacobian) <= _SINGULAR:
             return self._not_closed(solved)
         return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
 
@@ -326,8 +321,8 @@ class Iteration:
         return Branch(
             Continuation(
                 self._constraints,
-                lambda x: self._known_at((x,)),
-                lambda x: self._moving_at((x,)),
+                lambda x: self._before.known_at((x,)),
+                lambda x: self._before.moving_at((x,), (1.0,)),
                 self._evaluate_moving,
             ),
             solution,
@@ -337,7 +332,7 @@ class Iteration:
         )
 
     def _solution_of_pose(self) -> Array | None:
-        solved = self._known_at(self.inputs)
+        solved = self._before.known_at(self.inputs)
         corrected = self._solve_newton(solved, self._start, inf) if solved is not None else None
         return corrected[0] if corrected is not None else None
 
@@ -403,7 +398,7 @@ class Iteration:
 
     def conditioning(self, pose: IteratedPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
+        return reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -411,7 +406,7 @@ class Iteration:
 
         The constraints are linear in the places, which start at the least-squares solution.
         """
-        solved = self._known_at(self.inputs)
+        solved = self._before.known_at(self.inputs)
         if solved is None:
             return None
         start = np.zeros_like(self._start)
@@ -424,7 +419,7 @@ class Iteration:
 
     def solution_at(self, x: float) -> Array | None:
         """Return the unknowns at a value of the single input; None outside the branch."""
-        start, known = self._start_at((x,)), self._known_at((x,))
+        start, known = self._start_at((x,)), self._before.known_at((x,))
         if start is None or known is None:
             return None
         corrected = self._solve_newton(known, start.unknowns, start.farthest)
@@ -481,26 +476,6 @@ class Iteration:
         coordinates, pins = self._known_sizes
         return LinkState(state.coordinates[:coordinates], state.pins[:pins])
 
-    def _known_at(self, inputs: Sequence[float]) -> LinkState | None:
-        """Return the state of the links solved before this step, or None."""
-        solved = LinkState([0.0, *inputs], [])
-        for step in self._before:
-            if not step.close(solved).status.has_pose:
-                return None
-        return solved
-
-    def _moving_at(
-        self, inputs: Sequence[float], rates: Sequence[float] = (1.0,)
-    ) -> tuple[LinkState, LinkState] | None:
-        """Return the state of the links solved before and its rates, or None."""
-        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
-        for step in self._before:
-            pose = step.close(known)
-            if not pose.status.has_rates:
-                return None
-            step.rates(pose, known, speeds)
-        return known, speeds
-
     def _start_at(self, inputs: Sequence[float]) -> Start | None:
         """Return where Newton's method starts; None if the assembly does not lead there."""
         if len(inputs) > 1:
@@ -525,8 +500,8 @@ class Iteration:
 
         continuation = Continuation(
             self._constraints,
-            lambda x: self._known_at(inputs_at(x)),
-            lambda x: self._moving_at(inputs_at(x), rates),
+            lambda x: self._before.known_at(inputs_at(x)),
+            lambda x: self._before.moving_at(inputs_at(x), rates),
             self._evaluate_moving,
         )
         node = continuation.first_node(solution, 0.0)
@@ -574,16 +549,8 @@ class Iteration:
         branch = self.branch() if len(inputs) == 1 else None
         end = None if branch is None else branch.nearest_end(inputs[0])
         unknowns = self._start if end is None else end
-        errors, jacobian = self._evaluate_system(solved, unknowns)
-        first = float(np.abs(errors).max())
-        for _ in range(20):
-            step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
-            step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial, slope = self._evaluate_system(solved, unknowns + step)
-            if np.abs(trial).max() >= np.abs(errors).max():
-                break
-            unknowns, errors, jacobian = unknowns + step, trial, slope
-        gap = float(np.abs(errors).max())
+        first = float(np.abs(self._evaluate_system(solved, unknowns)[0]).max())
+        unknowns, gap = descend(partial(self._evaluate_system, solved), unknowns)
         return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), solved)
 
 
@@ -594,11 +561,6 @@ def _greatest_magnitude(values: Sequence[float]) -> float:
 
 def _body_places(values: Sequence[float]) -> list[complex]:
     return list(map(make_vector, values[1::3], values[2::3]))
-
-
-def _reciprocal_condition(jacobian: Array) -> float:
-    values = np.linalg.svd(jacobian, compute_uv=False)
-    return float(values[-1] / values[0])
 
 
 def make_iteration(

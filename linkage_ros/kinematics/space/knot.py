@@ -1,0 +1,565 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Links in space that close only together: Newton's method on the joints of a tree.
+
+Each rod is one equation, ½(|C − B|² − L²) = 0, between places on two links. Three rods of length 1
+hold a ball: they lead to one place from three others on the link that it is part of. The residual
+and its derivatives are written once, for numbers and symbols; rates and accelerations solve the
+same matrix. Where the method starts is on a `Grid`: so a state depends on its inputs alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from math import inf, prod
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.built_once import BuiltProperty, keep_results
+from linkage_ros.kinematics.elimination import Elimination
+from linkage_ros.kinematics.grid import Grid
+from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
+from linkage_ros.kinematics.space.steps import Rod
+from linkage_ros.kinematics.space.vectors import (
+    dot,
+    length,
+    minus,
+    plus,
+    SpaceFrame,
+    subtract,
+    Twist,
+    Vector,
+)
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.kinematics.steps_before import StepsBefore
+from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
+
+_LAST_STEP = 2.0**-36
+"""Sum of the last changes by Newton's method, in [rad] and lengths: the next is a rounding."""
+
+_LEAST_STEP = 2.0**-20
+"""The same of a solution next to a singularity, where the rounding is greater."""
+
+_SINGULAR = 1e-11
+"""Least ratio of smallest to largest singular value at which rates exist."""
+
+_TOGGLE = 2.0**-44
+"""How far the inputs of a toggle may be from where the way to them ends, relative to their size."""
+
+_AMID = 1.3
+"""Longest that a rod may be between two solutions, relative to its length."""
+
+_SLID = 0.25
+"""How far a slide may move between two solutions, in lengths."""
+
+_MOVED = 2.0**-20
+"""A gap that shrinks to less, relative to itself, is closed by another assembly."""
+
+
+class Mover(NamedTuple):
+    """A joint of the tree: the frame of its child follows those of the movers before it."""
+
+    joint: LowerPair
+    unknown: int  # Number of its value among the unknowns, or −1
+    coordinate: int = 0  # If it is known, its index among the coordinates
+
+    def value(self, unknowns: Sequence[float], state: LinkState) -> float:
+        """Return its value, or a derivative of it."""
+        return unknowns[self.unknown] if self.unknown >= 0 else state.coordinates[self.coordinate]
+
+
+class RodEnd(NamedTuple):
+    """A place on the link that a mover moves; or, if that is −1, beside a known point."""
+
+    mover: int
+    pin: int  # Index, among the pins, of the frame of the link, or of the point
+    place: Vector
+
+    def locate(self, state: LinkState) -> Vector:
+        """Return the place in the frame of the ground."""
+        pin = state.pins[self.pin]
+        return plus(pin, self.place) if self.mover < 0 else pin.place(self.place)
+
+    def arm(self, state: LinkState) -> Vector:
+        """Return the place from the origin of its link."""
+        frame: SpaceFrame = state.pins[self.pin]
+        return frame.turn(self.place)
+
+
+class KnotRod(NamedTuple):
+    """Two places at a known distance."""
+
+    start: RodEnd
+    end: RodEnd
+    rod: Rod
+
+
+class KnotPose(NamedTuple):
+    """The links at one state."""
+
+    status: Status
+    gap: float
+    unknowns: Sequence[float]
+    solved: LinkState  # The state that they were appended to
+
+
+class Knot:
+    """
+    Links on a tree of joints, closed by as many rods as there are unknown joints.
+
+    ``known`` is the state of the steps ``before`` in the pose, ``driven`` the number of inputs,
+    and ``start`` has the unknowns there.
+    """
+
+    def __init__(
+        self,
+        movers: Sequence[Mover],
+        rods: Sequence[KnotRod],
+        before: tuple[Step, ...],
+        known: LinkState,
+        driven: int,
+        start: Sequence[float],
+    ) -> None:
+        self._movers, self._rods, self._start = tuple(movers), tuple(rods), tuple(start)
+        end = 1 + driven
+        self._before = StepsBefore(before, tuple(known.coordinates[1:end]))
+        self._coordinates, self._first = len(known.coordinates), len(known.pins)
+        self._chains = [self._moving_chains(rod) for rod in rods]
+        pins = [mover.joint.parent for mover in movers]
+        pins += [end.pin for rod in rods for end in (rod.start, rod.end)]
+        self._pins = sorted({pin for pin in pins if pin < self._first})
+        self._framed = [isinstance(known.pins[pin], SpaceFrame) for pin in self._pins]
+        self._traced = keep_results(self._trace)
+        self._solution_line = StraightLine(self._of_flat(self._straight_solution), self._examples(0))
+        self._system_line = StraightLine(self._of_flat(self._list_system), self._examples(0, 3))
+        self._rates_line = StraightLine(
+            self._of_flat(self._straight_rates), self._examples(0, 3, 1)
+        )
+        self._changes_line = StraightLine(
+            self._of_flat(self._straight_changes), self._examples(0, 3, 1, 4, 2)
+        )
+
+    @property
+    def equation_count(self) -> int:
+        """Return the number of equations solved at once."""
+        return len(self._rods)
+
+    @BuiltProperty
+    def inputs(self) -> tuple[int, ...]:
+        """Return the numbers of the inputs that the links depend on."""
+        traced = self._traced()
+        if traced is None:
+            return tuple(range(len(self._before.inputs)))
+        known = traced[0]
+        numbers = [*known.coordinates[1 + len(self._before.inputs) :], *known.pins]
+        rods = (rod.rod.strut for rod in self._rods)
+        used = {*rods, *(mover.coordinate for mover in self._movers)}
+        numbers += [known.coordinates[k] for k in used]
+        waiting = [number.operation for number in numbers if hasattr(number, 'operation')]
+        seen: set[Any] = set()
+        while waiting:
+            operation = waiting.pop()
+            if operation not in seen:
+                seen.add(operation)
+                waiting += operation.operands()
+        names = {operation.name for operation in seen if operation.is_input}
+        return tuple(k for k in range(len(self._before.inputs)) if f'q{k}' in names)
+
+    @BuiltProperty
+    def grid(self) -> Grid:
+        """Return the cells from which the links are solved."""
+        return Grid(self, [self._before.inputs[k] for k in self.inputs], self._start)
+
+    # A step of the closure
+
+    def close(self, solved: LinkState) -> KnotPose:
+        """Append the unknown joints, and the frames of the links."""
+        if has_symbols(solved):
+            values: Sequence[float] | None = self._straight_solution(solved)
+        else:
+            values = self._solution_line(self._flatten(solved))
+        if values is None:
+            return self._close_slowly(solved)
+        return self._append(Status.CLOSED, solved, values)
+
+    def rates(
+        self, pose: KnotPose, solved: LinkState, velocities: LinkState
+    ) -> Sequence[float]:
+        """Append the rates of the joints, and the motions of the links."""
+        unknowns = LinkState([*pose.unknowns], [])
+        if has_symbols(solved, velocities):
+            rates: Sequence[float] = self._straight_rates(solved, unknowns, velocities)
+        else:
+            flat = self._flatten(solved), unknowns, self._flatten(velocities)
+            rates = self._rates_line(*flat) or []
+        moving = self._moving(solved, velocities, rates)
+        velocities.coordinates.extend(rates)
+        velocities.pins.extend(islice(moving.pins, self._first, None))
+        return rates
+
+    def accelerations(
+        self,
+        pose: KnotPose,
+        rates: Sequence[float],
+        solved: LinkState,
+        velocities: LinkState,
+        changes: LinkState,
+    ) -> None:
+        """Append the accelerations of the joints, and the derivatives of the motions."""
+        unknowns, speeds = LinkState([*pose.unknowns], []), LinkState([*rates], [])
+        if has_symbols(solved, velocities, changes):
+            found: Sequence[float] = self._straight_changes(
+                solved, unknowns, velocities, speeds, changes
+            )
+        else:
+            known, moving, changing = map(self._flatten, (solved, velocities, changes))
+            found = self._changes_line(known, unknowns, moving, speeds, changing) or []
+        changed = self._changing(solved, velocities, changes, rates, found)
+        changes.coordinates.extend(found)
+        changes.pins.extend(islice(changed.pins, self._first, None))
+
+    def conditioning(self, pose: KnotPose) -> float:
+        """Return the ratio of the Jacobian's smallest singular value to its largest."""
+        return self._conditioning_at(pose.solved, pose.unknowns)
+
+    def _append(
+        self, status: Status, solved: LinkState, unknowns: Sequence[float]
+    ) -> KnotPose:
+        moved = self._moved(solved, unknowns)
+        solved.coordinates.extend(unknowns)
+        solved.pins.extend(islice(moved.pins, self._first, None))
+        return KnotPose(status, 0.0, unknowns, solved)
+
+    def _close_slowly(self, solved: LinkState) -> KnotPose:
+        """Close the links where no cell is proven: next to a singularity, or beyond it."""
+        import numpy as np  # local import: few states need it
+
+        from linkage_ros.kinematics.descent import descend  # local import: as above
+
+        inputs = [solved.coordinates[1 + k] for k in self.inputs]
+        cell, left = self.grid.reach(inputs)
+        if not left:
+            status = Status.CLOSED
+            if self._conditioning_at(solved, cell.unknowns) <= _SINGULAR:
+                status = Status.TOGGLE
+            return self._append(status, solved, cell.unknowns)
+        sizes = np.array([rod.rod.length(solved) for rod in self._rods])
+
+        def system(unknowns: Any) -> Any:
+            errors, rows = self._system(self._moved(solved, unknowns.tolist()))
+            return np.array(errors) / sizes, np.array(rows) / sizes[:, None]
+
+        begin = np.array(cell.unknowns)
+        first = float(np.abs(system(begin)[0]).max())
+        unknowns, gap = descend(system, begin)
+        if left <= _TOGGLE * (1.0 + max(map(abs, inputs))):
+            return self._append(Status.TOGGLE, solved, unknowns.tolist())
+        return KnotPose(Status.OPEN, gap if gap > _MOVED * first else first, cell.unknowns, solved)
+
+    # Straight lines, for numbers and symbols
+
+    def _straight_solution(self, known: LinkState) -> list[float]:
+        """Return the unknowns: two steps of Newton's method, and one with the second's slopes."""
+        values = self.grid.find_start([known.coordinates[1 + k] for k in self.inputs])
+        if values is None:
+            raise UndecidedError
+        step: Sequence[float] = ()
+        for last in (False, False, True):
+            errors, rows = self._system(self._moved(known, values))
+            if not last:
+                eliminated = _eliminate(rows)
+            step = eliminated.solve(errors)
+            values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
+        if not sum(map(abs, step[1:]), abs(step[0])) <= _LAST_STEP:
+            raise UndecidedError
+        return values
+
+    def _list_system(self, known: LinkState, pose: LinkState) -> list[float]:
+        """Return what Newton's method subtracts, and the inverse of the matrix by columns."""
+        errors, rows = self._system(self._moved(known, pose.coordinates))
+        eliminated = _eliminate(rows)
+        found = eliminated.solve(errors)
+        for k in range(len(rows)):
+            found += eliminated.solve([float(i == k) for i in range(len(rows))])
+        return found
+
+    def _straight_rates(
+        self, known: LinkState, pose: LinkState, velocities: LinkState
+    ) -> list[float]:
+        """Return the rates of the unknowns: (C − B)·(Ċ − Ḃ) = L·L̇ for each rod."""
+        state = self._moved(known, pose.coordinates)
+        still = self._moving(state, velocities, [0.0] * len(self._rods))
+        right = [
+            subtract(rod.rod.power(state, velocities), dot(vector, slip))
+            for rod, vector, slip in self._slips(state, still)
+        ]
+        return _eliminate(self._system(state)[1]).solve(right)
+
+    def _straight_changes(
+        self,
+        known: LinkState,
+        pose: LinkState,
+        velocities: LinkState,
+        speeds: LinkState,
+        changes: LinkState,
+    ) -> list[float]:
+        """Return the accelerations: (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² = L·L̈ + L̇² for each rod."""
+        state, rates = self._moved(known, pose.coordinates), speeds.coordinates
+        moving = self._moving(state, velocities, rates)
+        before = self._changing(state, moving, changes, rates, [0.0] * len(self._rods))
+        right = []
+        for rod, vector, slip in self._slips(state, moving):
+            one, other = (
+                before.pins[end.pin]
+                if end.mover < 0
+                else moving.pins[end.pin].acceleration(before.pins[end.pin], end.arm(state))
+                for end in (rod.start, rod.end)
+            )
+            bend = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
+            right.append(subtract(bend, dot(vector, minus(other, one))))
+        return _eliminate(self._system(state)[1]).solve(right)
+
+    def _moved(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
+        """Return the state with the frames of the links."""
+        first = self._first
+        state = LinkState(known.coordinates, known.pins[:first])
+        for mover in self._movers:
+            value = mover.value(unknowns, known)
+            state.pins.append(mover.joint.child_frame(mover.joint.base(state), value))
+        return state
+
+    def _moving(
+        self, state: LinkState, velocities: LinkState, rates: Sequence[float]
+    ) -> LinkState:
+        """Return the velocities with the motions of the links."""
+        first = self._first
+        moving = LinkState(velocities.coordinates, velocities.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            rate = mover.value(rates, velocities)
+            moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
+        return moving
+
+    def _changing(
+        self,
+        state: LinkState,
+        moving: LinkState,
+        changes: LinkState,
+        rates: Sequence[float],
+        accelerations: Sequence[float],
+    ) -> LinkState:
+        """Return the accelerations with the derivatives of the motions."""
+        first = self._first
+        changing = LinkState(changes.coordinates, changes.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            given = mover.value(rates, moving), mover.value(accelerations, changes)
+            frame = state.pins[number]
+            changing.pins.append(mover.joint.change(state, moving, changing, frame, *given))
+        return changing
+
+    def _slips(
+        self, state: LinkState, moving: LinkState
+    ) -> Iterator[tuple[KnotRod, Vector, Vector]]:
+        """Yield each rod, its vector, and the velocity of its end relative to its start."""
+        for rod in self._rods:
+            one, other = (
+                moving.pins[end.pin]
+                if end.mover < 0
+                else moving.pins[end.pin].velocity(end.arm(state))
+                for end in (rod.start, rod.end)
+            )
+            vector = minus(rod.end.locate(state), rod.start.locate(state))
+            yield rod, vector, minus(other, one)
+
+    def _system(self, state: LinkState) -> tuple[list[float], list[list[float]]]:
+        """Return the residuals, and their derivatives by the unknowns."""
+        errors, rows = [], []
+        for rod, chains in zip(self._rods, self._chains, strict=True):
+            places = rod.start.locate(state), rod.end.locate(state)
+            vector, size = minus(places[1], places[0]), rod.rod.length(state)
+            errors.append(0.5 * (dot(vector, vector) - size * size))
+            row = [0.0] * len(self._rods)
+            for sign, place, chain in zip((-1.0, 1.0), places, chains, strict=True):
+                for number in chain:
+                    joint, unknown, _ = self._movers[number]
+                    frame = state.pins[self._first + number]
+                    slope = dot(vector, joint.slope(frame.z, minus(place, frame.origin)))
+                    if unknown >= 0:
+                        row[unknown] = slope if sign > 0.0 else subtract(0.0, slope)
+            rows.append(row)
+        return errors, rows
+
+    def _moving_chains(self, rod: KnotRod) -> tuple[list[int], list[int]]:
+        """Return the movers that move one end of a rod only, for both ends, the last first."""
+        chains: list[list[int]] = []
+        for end in (rod.start, rod.end):
+            chain, number = [], end.mover
+            while number >= 0:
+                chain.append(number)
+                number = max(self._movers[number].joint.parent - self._first, -1)
+            chains.append(chain)
+        one, other = chains
+        return [k for k in one if k not in other], [k for k in other if k not in one]
+
+    # Numbers of a state, which compiled lines take
+
+    def _flatten(self, state: LinkState) -> LinkState:
+        """Return what the knot needs of a state, as numbers."""
+        numbers: list[float] = []
+        for pin in self._pins:
+            for part in state.pins[pin]:
+                if isinstance(part, tuple):
+                    numbers += part
+                else:
+                    numbers.append(part)
+        end = self._coordinates
+        return LinkState(state.coordinates[:end], numbers)
+
+    def _of_flat(self, function: Callable[..., list[float]]) -> Callable[..., list[float]]:
+        """Return a function of states as one of flat states."""
+        return lambda *states: function(*map(self._unflatten, states))
+
+    def _unflatten(self, flat: LinkState) -> LinkState:
+        """Return the state of flat numbers; unknowns stay as they are."""
+        if not flat.pins:
+            return flat
+        numbers = iter(flat.pins)
+        vectors = list(zip(numbers, numbers, numbers, strict=True))
+        points = len(self._pins) - sum(self._framed)
+        # A frame has four vectors, its derivatives have two.
+        each = (len(vectors) - points) // max(1, sum(self._framed))
+        kind, left = SpaceFrame if each == 4 else Twist, iter(vectors)
+        pins: list[Any] = [None] * self._first
+        for pin, framed in zip(self._pins, self._framed, strict=True):
+            pins[pin] = kind(*islice(left, each)) if framed else next(left)
+        return LinkState(flat.coordinates, pins)
+
+    def _trace(self) -> list[LinkState] | None:
+        """Return state, rates, accelerations, unknowns and their rates in the pose, as symbols."""
+        try:
+            traced = self._before.trace()
+        except UndecidedError:
+            return None
+        if traced is None:
+            return None
+        tape, states = traced
+        return states + [
+            LinkState(
+                [tape.add_input(f'{name}{k}', value) for k, value in enumerate(self._start)], []
+            )
+            for name in 'uv'
+        ]
+
+    def _examples(self, *numbers: int) -> Callable[[], Sequence[LinkState] | None]:
+        def examples() -> Sequence[LinkState] | None:
+            traced = self._traced()
+            return traced and [self._flatten(traced[k]) if k < 3 else traced[k] for k in numbers]
+
+        return examples
+
+    # What the grid asks for
+
+    def _inputs_with(self, inputs: Sequence[float]) -> list[float]:
+        """Return all inputs; those on which nothing depends are as in the pose."""
+        given = list(self._before.inputs)
+        for k, value in zip(self.inputs, inputs, strict=True):
+            given[k] = value
+        return given
+
+    def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
+        """Return η·ω of Kantorovich's theorem; infinite where there is none."""
+        known = self._before.known_at(self._inputs_with(inputs))
+        if known is None:
+            return inf
+        found = self._system_line(self._flatten(known), LinkState([*unknowns], []))
+        if found is None:
+            return inf
+        bounds = [self._bound_bend(k, known, unknowns) for k in range(len(self._rods))]
+        count = len(bounds)
+        totals = [0.0] * count
+        # The inverse follows the step, column by column.
+        for k, bound in enumerate(bounds, 1):
+            for i in range(count):
+                totals[i] += abs(found[k * count + i]) * bound
+        return max(map(abs, found[:count])) * max(totals)
+
+    def solve_from(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[float] | None:
+        """Return the solution that Newton's method leads to, until no step is shorter."""
+        known = self._before.known_at(self._inputs_with(inputs))
+        if known is None:
+            return None
+        flat, values, last = self._flatten(known), [*unknowns], inf
+        while True:
+            found = self._system_line(flat, LinkState(values, []))
+            size = sum(map(abs, found[: len(values)])) if found else inf
+            if found is None or not size < last:
+                return values if last <= _LEAST_STEP else None
+            values, last = [a - b for a, b in zip(values, found, strict=False)], size
+
+    def slopes_at(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[Sequence[float]] | None:
+        """Return for each input the slopes of the unknowns at a solution."""
+        given, slopes = self._inputs_with(inputs), []
+        for k in self.inputs:
+            moving = self._before.moving_at(given, [float(i == k) for i in range(len(given))])
+            if moving is None:
+                return None
+            known, speeds = map(self._flatten, moving)
+            found = self._rates_line(known, LinkState([*unknowns], []), speeds)
+            if found is None:
+                return None
+            slopes.append(found)
+        return slopes
+
+    def _bound_bend(self, number: int, known: LinkState, unknowns: Sequence[float]) -> float:
+        """
+        Return a bound of the sum of all second derivatives of a rod's equation.
+
+        An end is never farther from an axis than the links between reach. It moves by no more for
+        a turn, and by 1 for a slide; only what is nearer to the ground turns that.
+        """
+        _, _, rod = self._rods[number]
+        size, total = _AMID * rod.length(known), 0.0
+        moves: list[float] = []
+        ends = (self._rods[number].start, self._rods[number].end)
+        for end, chain in zip(ends, self._chains[number], strict=True):
+            reach, own = length(end.place), []
+            for k in chain:
+                mover = self._movers[k]
+                slides = isinstance(mover.joint, SlidePair)
+                if mover.unknown >= 0:
+                    own.append(1.0 if slides else reach)
+                    # A turn nearer to the ground turns what the others move, and itself.
+                    total += 0.0 if slides else size * (2.0 * sum(own) - own[-1])
+                reach += length(mover.joint.seat.origin)
+                reach += abs(mover.value(unknowns, known)) + _SLID if slides else 0.0
+            moves += own
+        return total + sum(moves) ** 2
+
+    def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
+        import numpy as np  # local import: few states need it
+
+        from linkage_ros.kinematics.descent import (
+            reciprocal_condition,  # local import: it loads numpy
+        )
+
+        return reciprocal_condition(np.array(self._system(self._moved(known, unknowns))[1]))
+
+
+def _eliminate(rows: Sequence[Sequence[float]]) -> Elimination:
+    """Return a matrix, eliminated; UndecidedError is raised if it is singular."""
+    eliminated = Elimination(rows, ())
+    divisors = eliminated.divisors
+    if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+        raise UndecidedError
+    return eliminated
