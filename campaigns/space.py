@@ -27,9 +27,11 @@ from bench.report import Table
 from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
 from campaigns.space_reference import (
     angle_to_meet,
+    dot,
     errors_of,
     exact_distance,
     hinge_angle,
+    less,
     moved,
     slide_length,
     three_spheres,
@@ -262,6 +264,47 @@ def ankle_case(random: Random) -> Case:
     return Case([max(each) for each in zip(*errors, strict=True)], states)
 
 
+def ankle_motors_case(random: Random) -> Case:
+    """Return the shipped ankle from its motors: pitch and roll close only together."""
+    closure = load(ROOT / 'config' / 'linkages' / 'space' / 'ankle_motors.yaml')
+    linkage: SpaceLinkage = closure.linkage
+    while True:
+        states = [[random.uniform(-reach, reach) for _ in range(2)] for reach in (0.6, 1.0, 1.0)]
+        position = closure.position(*states[0])
+        if position.status.has_rates:
+            break
+    ends = list(_ANKLE.values())
+    hinges = [linkage.hinges[name] for name in ('pitch', 'roll', *_ANKLE)]
+    places = [linkage.points[point] for pair in ends for point in pair]
+    rods = [exact_distance(*(linkage.points[point] for point in pair)) for pair in ends]
+    places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
+    numbers = [*(n for place in places for n in place), *rods]
+    numbers += [part for state in states for part in state]
+
+    @cache
+    def angles(given: tuple[Any, ...], t: Any) -> Any:
+        points = [_three(given, 3 * n) for n in range(4)]
+        joints = [(_three(given, 12 + 6 * n), _three(given, 15 + 6 * n)) for n in range(4)]
+        motors = [given[38 + n] + given[40 + n] * t + given[42 + n] * t * t / 2 for n in range(2)]
+
+        def gaps(pitch: Any, roll: Any) -> list[Any]:
+            found = []
+            for n in range(2):
+                bar = turned_about(points[2 * n], *joints[2 + n], motors[n])
+                foot = turned_about(points[2 * n + 1], *joints[1], roll)
+                arm = less(turned_about(foot, *joints[0], pitch), bar)
+                found.append(dot(arm, arm) - given[36 + n] ** 2)
+            return found
+
+        return mp.findroot(gaps, position.joints)
+
+    errors = [
+        errors_of(lambda given, t, k=k: angles(tuple(given), t)[k], numbers, orders, floor=pi)
+        for k, orders in enumerate(joint_orders(closure, *states))
+    ]
+    return Case([max(each) for each in zip(*errors, strict=True)], states)
+
+
 def joint_orders(
     closure: Any, inputs: Sequence[float], rates: Sequence[float], changes: Sequence[float]
 ) -> list[tuple[float, float, float]]:
@@ -288,6 +331,7 @@ FAMILIES: dict[str, Callable[[Random], Case]] = {
     'three distances, near': partial(three_distances_case, near=True),
     'RSSR': rssr_case,
     'ankle, joints to motors': ankle_case,
+    'ankle, motors to joints': ankle_motors_case,
 }
 
 

@@ -18,7 +18,8 @@ points to both of its links. In the order of the file, again and again:
   all such pairs the one is taken whose rod meets the motion of its point least squarely off;
 - a link with three known points has a frame;
 - a point at known distances from three known points is placed; a link that hangs on three slides
-  only moves without turning, and is one point.
+  only moves without turning, and is one point;
+- if there is none of these, the smallest set of joints that close together is a knot.
 
 The pose gives the sign of each closed step.
 """
@@ -35,6 +36,8 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
+from linkage_ros.kinematics.space.knot import Knot, KnotRod, Mover, RodEnd
+from linkage_ros.kinematics.space.knot_plan import KnotPlanner, PlannedEnd
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.steps import (
     AimedHinge,
@@ -100,7 +103,7 @@ class SpacePlan:
     """Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres."""
 
     def __init__(self, linkage: SpaceLinkage) -> None:
-        self._linkage = linkage
+        self.linkage = linkage
         self.scale = ldexp(1.0, frexp(size_of(linkage))[1])
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
@@ -124,14 +127,14 @@ class SpacePlan:
         self.idle = tuple(
             link
             for link in self.rods
-            if link in unknown and all(map(self._is_known, self.carried[link]))
+            if link in unknown and all(map(self.is_known, self.carried[link]))
         )
         """Rods whose ends are known: nothing holds their turn about themselves."""
         self._measure_published()
 
     def _collect_points(self) -> None:
         """Collect the places in the pose, and which links carry each point."""
-        linkage, unit = self._linkage, 1.0 / self.scale
+        linkage, unit = self.linkage, 1.0 / self.scale
         self.places: dict[str, Vector] = {
             name: scale(unit, place) for name, place in linkage.points.items()
         }
@@ -196,7 +199,7 @@ class SpacePlan:
     @property
     def rods(self) -> list[str]:
         """Return the links of points on one line that no joint holds: they may spin."""
-        joints = self._linkage.pair_joints.values()
+        joints = self.linkage.pair_joints.values()
         held = {end for joint in joints for end in (joint.parent, joint.child)}
         return [
             link
@@ -214,9 +217,10 @@ class SpacePlan:
         )
 
     def _unknown_links(self) -> list[str]:
-        return [link for link in self._linkage.link_names if link not in self.frames]
+        return [link for link in self.linkage.link_names if link not in self.frames]
 
-    def _is_known(self, point: str) -> bool:
+    def is_known(self, point: str) -> bool:
+        """Return whether a point is placed, or on a link that is."""
         return point in self.points or any(link in self.frames for link in self.carriers[point])
 
     def _point_index(self, point: str) -> int:
@@ -231,20 +235,21 @@ class SpacePlan:
     def _find_next(self) -> bool:
         """Add the next step; False if there is none."""
         return (
-            any(map(self._follow, self._linkage.ratios))
-            or any(map(self._give, self._linkage.pair_joints))
-            or any(map(self._aim, self._linkage.pair_joints))
-            or any(map(self._close, self._linkage.pair_joints))
+            any(map(self._follow, self.linkage.ratios))
+            or any(map(self._give, self.linkage.pair_joints))
+            or any(map(self._aim, self.linkage.pair_joints))
+            or any(map(self._close, self.linkage.pair_joints))
             or any(map(self._frame, self._unknown_links()))
             or any(map(self._place_point, self.carriers))
             or any(map(self._translate, self._unknown_links()))
+            or self._tie()
         )
 
     # Joints
 
     def _ends(self, name: str) -> tuple[str, str] | None:
         """Return the known and the unknown link of a joint; None if there are not one of each."""
-        joint = self._linkage.pair_joints[name]
+        joint = self.linkage.pair_joints[name]
         ends = sorted((joint.parent, joint.child), key=lambda link: link not in self.frames)
         known, unknown = ends
         if known in self.frames and unknown not in self.frames:
@@ -253,24 +258,24 @@ class SpacePlan:
 
     def _axis_to(self, name: str, child: str) -> Vector:
         """Return the axis of a joint, reversed if the child is its parent in the file."""
-        joint = self._linkage.pair_joints[name]
+        joint = self.linkage.pair_joints[name]
         return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
 
     def _value(self, name: str) -> float:
         """Return the value of a joint in the pose, in the unit of the steps."""
-        value = self._linkage.pose_value(name)
+        value = self.linkage.pose_value(name)
         return value / self.scale if self._slides(name) else value
 
     def _slides(self, name: str) -> bool:
-        return name not in self._linkage.hinges
+        return name not in self.linkage.hinges
 
     def _make_joint(
         self, name: str, parent: str, child: str, toward: Vector | None = None
     ) -> tuple[LowerPair, SpaceFrame]:
         """Return a joint on a known link, and the frame of its child in the pose."""
         z = self._axis_to(name, child)
-        if name in self._linkage.hinges:
-            at = scale(1.0 / self.scale, self._linkage.hinges[name].at)
+        if name in self.linkage.hinges:
+            at = scale(1.0 / self.scale, self.linkage.hinges[name].at)
         else:
             at = self.places[self.carried[child][0]] if self.carried[child] else ZERO
         x = _across(z)
@@ -302,7 +307,7 @@ class SpacePlan:
         joint, frame = self._make_joint(name, *ends)
         index = self._set_frame(ends[1], frame)
         self._add(GivenJoint(joint, self.coordinates[name], index))
-        kind = 'input' if name in self._linkage.driven else 'joint'
+        kind = 'input' if name in self.linkage.driven else 'joint'
         self._end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
         return True
 
@@ -313,7 +318,7 @@ class SpacePlan:
 
     def _follow(self, name: str) -> bool:
         """Give a joint that follows a known one its value."""
-        ratio = self._linkage.ratios[name]
+        ratio = self.linkage.ratios[name]
         if name in self.coordinates or ratio.of not in self.coordinates:
             return False
         own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
@@ -330,8 +335,8 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         slides, axis = self._slides(name), self._axis_to(name, ends[1])
-        at = self._linkage.pair_joints[name].at
-        for point in filter(self._is_known, self.carried[ends[1]]):
+        at = self.linkage.pair_joints[name].at
+        for point in filter(self.is_known, self.carried[ends[1]]):
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             if not slides and length(cross(axis, arm)) < _SQUARE * length(arm):
                 continue
@@ -363,13 +368,13 @@ class SpacePlan:
         for link in self.carriers[point]:
             for other in self.carried[link]:
                 size = dist(self.places[point], self.places[other])
-                if other != point and size and self._is_known(other):
+                if other != point and size and self.is_known(other):
                     yield _Pair(point, other, Rod(size), link)
-        for name, points in self._linkage.struts.items():
+        for name, points in self.linkage.struts.items():
             ends = [self.same[end] for end in points]
             if name in self.coordinates and point in ends:
                 other = ends[1 - ends.index(point)]
-                if self._is_known(other):
+                if self.is_known(other):
                     yield _Pair(point, other, Rod(0.0, self.coordinates[name]), name)
 
     def _close(self, name: str) -> bool:
@@ -378,7 +383,7 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         best, choice = _SQUARE, None
-        axis, at = self._axis_to(name, ends[1]), self._linkage.pair_joints[name].at
+        axis, at = self._axis_to(name, ends[1]), self.linkage.pair_joints[name].at
         for point in self.carried[ends[1]]:
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             slope = axis if self._slides(name) else cross(axis, arm)
@@ -415,7 +420,7 @@ class SpacePlan:
 
     def _frame(self, link: str) -> bool:
         """Find the frame of a link with three known points."""
-        known = list(filter(self._is_known, self.carried[link]))
+        known = list(filter(self.is_known, self.carried[link]))
         for names in combinations(known, 3):
             start, *ends = (self.places[name] for name in names)
             one, other = (minus(end, start) for end in ends)
@@ -429,7 +434,7 @@ class SpacePlan:
 
     def _place_point(self, point: str) -> bool:
         """Place a point at three known distances."""
-        if self._is_known(point):
+        if self.is_known(point):
             return False
         return self._meet(point, list(self._distances(point)), {})
 
@@ -475,7 +480,7 @@ class SpacePlan:
         while link not in self.frames:
             ways = [
                 (name, joint)
-                for name, joint in self._linkage.slides.items()
+                for name, joint in self.linkage.slides.items()
                 if link in (joint.parent, joint.child) and name not in chain
             ]
             # A chain, not a tree: the first slide that leads on.
@@ -505,7 +510,7 @@ class SpacePlan:
 
     def _add_resolved(self, names: tuple[str, ...], root: str, point: int, place: Vector) -> None:
         """Measure the slides that lead from a link to a point."""
-        on, chain = self.pose_frames[root], self._linkage.pair_joints
+        on, chain = self.pose_frames[root], self.linkage.pair_joints
         link, axes = root, []
         for name in names:
             joint = chain[name]
@@ -520,11 +525,48 @@ class SpacePlan:
         directions = tuple(_clean(on.resolve(dual)) for dual in duals)
         self._add(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
 
+    # What closes only together
+
+    def _tie(self) -> bool:
+        """Solve the smallest set of joints that close together."""
+        found = KnotPlanner(self).find_knot()
+        if found is None:
+            return False
+        for rod in found.rods:
+            for end in (rod.start, rod.end):
+                if not end.link:
+                    self._point_index(end.point)
+        coordinates, first = len(self._state.coordinates), self._next_pin
+        movers = []
+        for link, (name, on) in found.links.items():
+            joint, frame = self._make_joint(name, on, link)
+            self.frames[link], self.pose_frames[link] = first + len(movers), frame
+            unknown = found.unknown.index(name) if name in found.unknown else -1
+            movers.append(Mover(joint, unknown, self.coordinates.get(name, 0)))
+        for number, name in enumerate(found.unknown):
+            self.coordinates[name] = coordinates + number
+
+        def make_end(end: PlannedEnd) -> RodEnd:
+            if not end.link:
+                return RodEnd(-1, self.points[end.point], end.beside)
+            place = plus(self.places[end.point], end.beside)
+            place = _clean(self.pose_frames[end.link].locate(place))
+            return RodEnd(list(found.links).index(end.link), self.frames[end.link], place)
+
+        rods = [KnotRod(make_end(one), make_end(other), rod) for one, other, rod, _ in found.rods]
+        known = LinkState([*self._state.coordinates], [*self._state.pins])
+        start = list(map(self._value, found.unknown))
+        self._add(Knot(movers, rods, tuple(self.steps), known, len(self.linkage.driven), start))
+        by = list_names(dict.fromkeys(rod.by for rod in found.rods))
+        method = f'iterated: {len(rods)} equations, {list_names(found.unknown)} by {by}'
+        self._end_group('knot', tuple(found.links), method, 'as in the pose')
+        return True
+
     # What is published
 
     def _measure_published(self) -> None:
         """Measure published joints that no step found."""
-        linkage = self._linkage
+        linkage = self.linkage
         wanted = [*linkage.published, *(ratio.of for ratio in linkage.ratios.values())]
         self.lost: list[str] = []
         """Published joints that no step can find."""
@@ -533,7 +575,7 @@ class SpacePlan:
                 continue
             if name in linkage.struts:
                 ends = [self.same[point] for point in linkage.struts[name]]
-                if not all(map(self._is_known, ends)):
+                if not all(map(self.is_known, ends)):
                     self.lost.append(name)
                     continue
                 one, other = map(self._point_index, ends)
@@ -556,7 +598,7 @@ class SpacePlan:
                     self._add(MeasuredHinge(pair, mark, self.frames[joint.child]))
             self._end_group('measured', (), name)
         for point in linkage.traced:
-            if self._is_known(self.same[point]):
+            if self.is_known(self.same[point]):
                 self._point_index(self.same[point])
         self.step_groups = [min(number, len(self.groups) - 1) for number in self.step_groups]
 
@@ -572,12 +614,12 @@ class SpacePlan:
     def ratio_turns(self) -> int:
         """Return the turns of a single input after which the joints that follow it repeat."""
         turns = 1
-        for name in self._linkage.ratios:
+        for name in self.linkage.ratios:
             total, of = 1.0, name
-            while of in self._linkage.ratios:
-                total *= self._linkage.ratios[of].ratio
-                of = self._linkage.ratios[of].of
-            if of in self._linkage.driven and not (self._slides(of) or self._slides(name)):
+            while of in self.linkage.ratios:
+                total *= self.linkage.ratios[of].ratio
+                of = self.linkage.ratios[of].of
+            if of in self.linkage.driven and not (self._slides(of) or self._slides(name)):
                 turns = lcm(turns, count_turns(total))
         return turns
 

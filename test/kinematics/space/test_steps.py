@@ -29,7 +29,8 @@ from ...support.sampling import sample_count
 @pytest.mark.parametrize('family', FAMILIES)
 def test_what_is_closed_is_as_exact_as_its_numbers(family):
     random, draw = Random(family), FAMILIES[family]
-    for _ in range(sample_count(1000, 30)):
+    # Newton's method with 80 digits takes long.
+    for _ in range(sample_count(1000, 2 if family == 'ankle, motors to joints' else 30)):
         case = draw(random)
         for order, error in zip(ORDERS, case.errors, strict=True):
             assert error <= LIMIT, (order, case.given)

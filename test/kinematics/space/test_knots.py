@@ -1,0 +1,163 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""Links that close only together: they depend on the inputs alone, and are exact."""
+
+from math import dist, remainder, tau
+from pathlib import Path
+from random import Random
+
+import linkage_ros as lr
+from linkage_ros.description import load
+from linkage_ros.kinematics import compile_program, Status
+import numpy as np
+import pytest
+
+from ...support.sampling import sample_count
+
+FOLDER = Path(__file__).parent / 'linkages'
+BOTH_WAYS = {'ankle': 'ankle_motors', 'hexapod_inverse': 'hexapod'}
+
+
+def closure_of(name):
+    own = FOLDER / f'{name}.yaml'
+    return load(own if own.is_file() else name)
+
+
+def random_inputs(closure, count, reach):
+    random = Random(closure.name)
+    pose = closure.linkage.pose.inputs
+    return [
+        [
+            value + reach * random.uniform(-1.0, 1.0) * (0.1 if given.slider else 1.0)
+            for value, given in zip(pose, closure.linkage.inputs, strict=True)
+        ]
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize('name', BOTH_WAYS)
+def test_there_and_back_is_the_identity(name):
+    there, back = closure_of(name), closure_of(BOTH_WAYS[name])
+    met = 0
+    for inputs in random_inputs(there, 50, 0.3):
+        position = there.position(*inputs)
+        if position.status is not Status.CLOSED:
+            continue
+        met += 1
+        found = back.position(*position.joints)
+        assert found.status is Status.CLOSED
+        assert found.joints == pytest.approx(inputs, abs=1e-14)
+        product = back.jacobian(found) @ there.jacobian(position)
+        assert product == pytest.approx(np.eye(len(inputs)), abs=1e-11)
+    assert met > 25
+
+
+def test_the_order_of_visits_does_not_matter():
+    states = random_inputs(closure_of('ankle_motors'), sample_count(10_000, 300), 0.7)
+    one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
+    forward = [one.close_unlimited(*inputs).joints for inputs in states]
+    assert [other.close_unlimited(*inputs).joints for inputs in reversed(states)] == forward[::-1]
+    assert sum(map(bool, forward)) > 0.9 * len(states)
+
+
+def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypatch):
+    from linkage_ros.kinematics import grid
+
+    states = random_inputs(closure_of('ankle_motors'), 60, 0.6)
+    expected = [closure_of('ankle_motors').position(*inputs).joints for inputs in states[:1]]
+    whole = closure_of('ankle_motors')
+    expected = [whole.position(*inputs).joints for inputs in states]
+    monkeypatch.setattr(grid, '_KEPT', 4)
+    few = closure_of('ankle_motors')
+    assert [few.position(*inputs).joints for inputs in states] == expected
+
+
+def test_a_state_is_where_a_walk_from_the_pose_ends():
+    """The motors are closed forms of the joints; the walk inverts these by Newton's method."""
+    motors, joints = closure_of('ankle'), closure_of('ankle_motors')
+    for inputs in random_inputs(joints, sample_count(10_000, 5), 0.6):
+        found = joints.close_unlimited(*inputs)
+        now, steps = np.zeros(2), 4000 if len(inputs) else 0
+        for step in range(1, steps + 1):
+            wanted = np.array(inputs) * step / steps
+            for _ in range(2):
+                position = motors.close_unlimited(*now)
+                off = wanted - position.joints
+                now = now + np.linalg.solve(motors.jacobian(position), off)
+        assert found.joints == pytest.approx(now, abs=1e-13)
+
+
+def fold_of(closure, inputs):
+    """Return the parts of the way to inputs between which the linkage ceases to close."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if closure.close_unlimited(*(middle * value for value in inputs)).status.has_pose:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
+    closure = closure_of('ankle_motors')
+    far = [3.0, 3.0]
+    end = fold_of(closure, far)
+    assert 0.0 < end < 1.0
+    parts = np.linspace(0.0, min(1.0, 1.2 * end), 60).tolist()
+    there = [closure.close_unlimited(*(part * value for value in far)) for part in parts]
+    back = [closure.close_unlimited(*(part * value for value in far)) for part in parts[::-1]]
+    assert [one.joints for one in there] == [one.joints for one in back[::-1]]
+    statuses = {one.status for one in there}
+    assert {Status.CLOSED, Status.OPEN} <= statuses
+
+
+def test_a_toggle_from_both_sides():
+    closure = closure_of('ankle_motors')
+    far = np.array([3.0, 3.0])
+    end = fold_of(closure, far.tolist())
+    gaps = []
+    for power in range(-12, -2):
+        apart = 10.0**power
+        inside = closure.close_unlimited(*(far * (end - apart)))
+        outside = closure.close_unlimited(*(far * (end + apart)))
+        assert inside.status is Status.CLOSED, power
+        assert closure.residual(inside) < 1e-14
+        assert outside.status is Status.OPEN, power
+        gaps.append(outside.gap / apart)
+    # The gap grows with the distance.
+    assert gaps == pytest.approx([gaps[-1]] * len(gaps), rel=0.2)
+
+
+def test_a_knot_is_named_and_its_equations_counted():
+    groups = [group for group in closure_of('ankle_motors').groups if group.kind == 'knot']
+    assert [(group.links, group.assembly) for group in groups] == [
+        (('cross', 'foot'), 'as in the pose')
+    ]
+    assert '2 equations' in groups[0].method
+    assert 'pitch and roll' in groups[0].method
+
+
+def test_a_knot_is_not_written_in_c():
+    with pytest.raises(lr.DefinitionError, match='iterated in space'):
+        compile_program(closure_of('ankle_motors'), 0, lambda motion: [motion.position.joints])
+
+
+def test_a_knot_follows_closed_steps_and_others_follow_it():
+    """Two legs: each knot depends on its own motors."""
+    closure = closure_of('two_ankles')
+    kinds = [group.kind for group in closure.groups]
+    assert kinds.count('knot') == 2
+    knots = [step for step in closure.steps if hasattr(type(step), 'grid')]
+    assert [step.inputs for step in knots] == [(0, 1), (2, 3)]
+    one = closure_of('ankle_motors')
+    found = closure.position(0.1, -0.2, 0.3, 0.1)
+    assert found.joints[:2] == pytest.approx(one.position(0.1, -0.2).joints, abs=1e-15)
+    assert found.joints[2:] == pytest.approx(one.position(0.3, 0.1).joints, abs=1e-14)
+    assert remainder(found.joints[0], tau) == found.joints[0]
+    assert dist(found.points['c1'], found.points['left_c1']) > 0.1
