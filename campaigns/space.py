@@ -50,6 +50,7 @@ from linkage_ros.kinematics.space.steps import (
     STILL,
     ThreeDistances,
 )
+from mpmath import mp
 
 LIMIT = 4.0
 """In u·κ."""

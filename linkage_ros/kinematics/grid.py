@@ -166,15 +166,16 @@ class Grid:
                     step *= 0.5
                 else:
                     cell, done, step = found, part, 2.0 * step
-        left = max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
-        return cell, left if done < 1.0 else 0.0
+        if done == 1.0:
+            return cell, 0.0
+        return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
 
     def _follow(self, level: int, key: Key) -> _Found:
         """Return a cell, made from its neighbour on the straight line to the pose."""
         way: list[Key] = []
         while (found := self._kept.get((level, key))) is None:
             way.append(key)
-            count = max(map(abs, key))
+            count = max(map(abs, key), default=0)
             if count > _FARTHEST << level:
                 return _Found(None, self._start, None)
             if not count:
@@ -187,7 +188,7 @@ class Grid:
             # Wider cells lead to where they are no longer proven.
             wider = None if key is way[0] else self._wider_cell(level, key)
             cell = wider or self._make_cell(level, key, found.cell)
-            numbers = cell and (*cell.inputs, *cell.unknowns, *chain(*cell.slopes))
+            numbers = (*cell.inputs, *cell.unknowns, *chain(*cell.slopes)) if cell else None
             found = _Found(cell, cell or found.last, numbers)
             if wider is None:
                 if len(self._kept) >= _KEPT:

@@ -34,13 +34,12 @@ from linkage_ros.kinematics.space.vectors import (
     plus,
     SpaceFrame,
     subtract,
-    Twist,
     Vector,
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
 from linkage_ros.kinematics.steps_before import StepsBefore
-from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
+from linkage_ros.kinematics.straight_line import has_symbols, list_numbers, StraightLine
 
 _LAST_STEP = 2.0**-36
 """Sum of the last changes by Newton's method, in [rad] and lengths: the next is a rounding."""
@@ -135,16 +134,13 @@ class Knot:
         self._chains = [self._moving_chains(rod) for rod in rods]
         pins = [mover.joint.parent for mover in movers]
         pins += [end.pin for rod in rods for end in (rod.start, rod.end)]
-        self._pins = sorted({pin for pin in pins if pin < self._first})
-        self._framed = [isinstance(known.pins[pin], SpaceFrame) for pin in self._pins]
+        self._pins = set(pins)
         self._traced = keep_results(self._trace)
-        self._solution_line = StraightLine(self._of_flat(self._straight_solution), self._examples(0))
-        self._system_line = StraightLine(self._of_flat(self._list_system), self._examples(0, 3))
-        self._rates_line = StraightLine(
-            self._of_flat(self._straight_rates), self._examples(0, 3, 1)
-        )
+        self._solution_line = StraightLine(self._straight_solution, self._examples(0))
+        self._system_line = StraightLine(self._list_system, self._examples(0, 3))
+        self._rates_line = StraightLine(self._straight_rates, self._examples(0, 3, 1))
         self._changes_line = StraightLine(
-            self._of_flat(self._straight_changes), self._examples(0, 3, 1, 4, 2)
+            self._straight_changes, self._examples(0, 3, 1, 4, 2)
         )
 
     @property
@@ -158,11 +154,9 @@ class Knot:
         traced = self._traced()
         if traced is None:
             return tuple(range(len(self._before.inputs)))
-        known = traced[0]
-        numbers = [*known.coordinates[1 + len(self._before.inputs) :], *known.pins]
-        rods = (rod.rod.strut for rod in self._rods)
-        used = {*rods, *(mover.coordinate for mover in self._movers)}
-        numbers += [known.coordinates[k] for k in used]
+        known = self._needed(traced[0])
+        used = {rod.rod.strut for rod in self._rods} | {one.coordinate for one in self._movers}
+        numbers = list_numbers([known.pins, *(known.coordinates[k] for k in used)])
         waiting = [number.operation for number in numbers if hasattr(number, 'operation')]
         seen: set[Any] = set()
         while waiting:
@@ -185,7 +179,7 @@ class Knot:
         if has_symbols(solved):
             values: Sequence[float] | None = self._straight_solution(solved)
         else:
-            values = self._solution_line(self._flatten(solved))
+            values = self._solution_line(self._needed(solved))
         if values is None:
             return self._close_slowly(solved)
         return self._append(Status.CLOSED, solved, values)
@@ -198,8 +192,8 @@ class Knot:
         if has_symbols(solved, velocities):
             rates: Sequence[float] = self._straight_rates(solved, unknowns, velocities)
         else:
-            flat = self._flatten(solved), unknowns, self._flatten(velocities)
-            rates = self._rates_line(*flat) or []
+            states = self._needed(solved), unknowns, self._needed(velocities)
+            rates = self._rates_line(*states) or []
         moving = self._moving(solved, velocities, rates)
         velocities.coordinates.extend(rates)
         velocities.pins.extend(islice(moving.pins, self._first, None))
@@ -220,7 +214,7 @@ class Knot:
                 solved, unknowns, velocities, speeds, changes
             )
         else:
-            known, moving, changing = map(self._flatten, (solved, velocities, changes))
+            known, moving, changing = map(self._needed, (solved, velocities, changes))
             found = self._changes_line(known, unknowns, moving, speeds, changing) or []
         changed = self._changing(solved, velocities, changes, rates, found)
         changes.coordinates.extend(found)
@@ -408,38 +402,12 @@ class Knot:
         one, other = chains
         return [k for k in one if k not in other], [k for k in other if k not in one]
 
-    # Numbers of a state, which compiled lines take
-
-    def _flatten(self, state: LinkState) -> LinkState:
-        """Return what the knot needs of a state, as numbers."""
-        numbers: list[float] = []
-        for pin in self._pins:
-            for part in state.pins[pin]:
-                if isinstance(part, tuple):
-                    numbers += part
-                else:
-                    numbers.append(part)
+    def _needed(self, state: LinkState) -> LinkState:
+        """Return of a state what the links before have, and of their pins what the knot needs."""
         end = self._coordinates
-        return LinkState(state.coordinates[:end], numbers)
-
-    def _of_flat(self, function: Callable[..., list[float]]) -> Callable[..., list[float]]:
-        """Return a function of states as one of flat states."""
-        return lambda *states: function(*map(self._unflatten, states))
-
-    def _unflatten(self, flat: LinkState) -> LinkState:
-        """Return the state of flat numbers; unknowns stay as they are."""
-        if not flat.pins:
-            return flat
-        numbers = iter(flat.pins)
-        vectors = list(zip(numbers, numbers, numbers, strict=True))
-        points = len(self._pins) - sum(self._framed)
-        # A frame has four vectors, its derivatives have two.
-        each = (len(vectors) - points) // max(1, sum(self._framed))
-        kind, left = SpaceFrame if each == 4 else Twist, iter(vectors)
-        pins: list[Any] = [None] * self._first
-        for pin, framed in zip(self._pins, self._framed, strict=True):
-            pins[pin] = kind(*islice(left, each)) if framed else next(left)
-        return LinkState(flat.coordinates, pins)
+        pins = [pin if k in self._pins else () for k, pin in enumerate(state.pins)]
+        first = self._first
+        return LinkState(state.coordinates[:end], pins[:first])
 
     def _trace(self) -> list[LinkState] | None:
         """Return state, rates, accelerations, unknowns and their rates in the pose, as symbols."""
@@ -460,7 +428,7 @@ class Knot:
     def _examples(self, *numbers: int) -> Callable[[], Sequence[LinkState] | None]:
         def examples() -> Sequence[LinkState] | None:
             traced = self._traced()
-            return traced and [self._flatten(traced[k]) if k < 3 else traced[k] for k in numbers]
+            return traced and [self._needed(traced[k]) if k < 3 else traced[k] for k in numbers]
 
         return examples
 
@@ -478,7 +446,7 @@ class Knot:
         known = self._before.known_at(self._inputs_with(inputs))
         if known is None:
             return inf
-        found = self._system_line(self._flatten(known), LinkState([*unknowns], []))
+        found = self._system_line(self._needed(known), LinkState([*unknowns], []))
         if found is None:
             return inf
         bounds = [self._bound_bend(k, known, unknowns) for k in range(len(self._rods))]
@@ -497,9 +465,9 @@ class Knot:
         known = self._before.known_at(self._inputs_with(inputs))
         if known is None:
             return None
-        flat, values, last = self._flatten(known), [*unknowns], inf
+        state, values, last = self._needed(known), [*unknowns], inf
         while True:
-            found = self._system_line(flat, LinkState(values, []))
+            found = self._system_line(state, LinkState(values, []))
             size = sum(map(abs, found[: len(values)])) if found else inf
             if found is None or not size < last:
                 return values if last <= _LEAST_STEP else None
@@ -514,7 +482,7 @@ class Knot:
             moving = self._before.moving_at(given, [float(i == k) for i in range(len(given))])
             if moving is None:
                 return None
-            known, speeds = map(self._flatten, moving)
+            known, speeds = map(self._needed, moving)
             found = self._rates_line(known, LinkState([*unknowns], []), speeds)
             if found is None:
                 return None
