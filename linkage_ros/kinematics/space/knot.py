@@ -26,7 +26,7 @@ from linkage_ros.kinematics.built_once import BuiltProperty, keep_results
 from linkage_ros.kinematics.elimination import Elimination
 from linkage_ros.kinematics.grid import Grid
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
-from linkage_ros.kinematics.space.steps import Rod
+from linkage_ros.kinematics.space.steps import missing_length, Rod
 from linkage_ros.kinematics.space.vectors import (
     dot,
     length,
@@ -176,6 +176,9 @@ class Knot:
 
     def close(self, solved: LinkState) -> KnotPose:
         """Append the unknown joints, and the frames of the links."""
+        missing = missing_length([rod.rod for rod in self._rods], solved)
+        if missing is not None:
+            return KnotPose(Status.OPEN, missing, self._start, solved)
         if has_symbols(solved):
             values: Sequence[float] | None = self._straight_solution(solved)
         else:
@@ -234,9 +237,8 @@ class Knot:
 
     def _close_slowly(self, solved: LinkState) -> KnotPose:
         """Close the links where no cell is proven: next to a singularity, or beyond it."""
+        from linkage_ros.kinematics.descent import descend  # local import: it loads numpy
         import numpy as np  # local import: few states need it
-
-        from linkage_ros.kinematics.descent import descend  # local import: as above
 
         inputs = [solved.coordinates[1 + k] for k in self.inputs]
         cell, left = self.grid.reach(inputs)
@@ -515,11 +517,10 @@ class Knot:
         return total + sum(moves) ** 2
 
     def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
-        import numpy as np  # local import: few states need it
-
         from linkage_ros.kinematics.descent import (
             reciprocal_condition,  # local import: it loads numpy
         )
+        import numpy as np  # local import: few states need it
 
         return reciprocal_condition(np.array(self._system(self._moved(known, unknowns))[1]))
 

@@ -36,8 +36,6 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
-from linkage_ros.kinematics.space.knot import Knot, KnotRod, Mover, RodEnd
-from linkage_ros.kinematics.space.knot_plan import KnotPlanner, PlannedEnd
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.steps import (
     AimedHinge,
@@ -529,7 +527,16 @@ class SpacePlan:
 
     def _tie(self) -> bool:
         """Solve the smallest set of joints that close together."""
-        found = KnotPlanner(self).find_knot()
+        joints = self.linkage.pair_joints.values()
+        held = {end for joint in joints for end in (joint.parent, joint.child)}
+        if held.isdisjoint(self._unknown_links()):
+            return False
+        from linkage_ros.kinematics.space import (
+            knot,  # local import: most linkages have none
+            knot_plan,  # local import: likewise
+        )
+
+        found = knot_plan.KnotPlanner(self).find_knot()
         if found is None:
             return False
         for rod in found.rods:
@@ -542,21 +549,25 @@ class SpacePlan:
             joint, frame = self._make_joint(name, on, link)
             self.frames[link], self.pose_frames[link] = first + len(movers), frame
             unknown = found.unknown.index(name) if name in found.unknown else -1
-            movers.append(Mover(joint, unknown, self.coordinates.get(name, 0)))
+            movers.append(knot.Mover(joint, unknown, self.coordinates.get(name, 0)))
         for number, name in enumerate(found.unknown):
             self.coordinates[name] = coordinates + number
 
-        def make_end(end: PlannedEnd) -> RodEnd:
+        def make_end(end: knot_plan.PlannedEnd) -> knot.RodEnd:
             if not end.link:
-                return RodEnd(-1, self.points[end.point], end.beside)
+                return knot.RodEnd(-1, self.points[end.point], end.beside)
             place = plus(self.places[end.point], end.beside)
             place = _clean(self.pose_frames[end.link].locate(place))
-            return RodEnd(list(found.links).index(end.link), self.frames[end.link], place)
+            return knot.RodEnd(list(found.links).index(end.link), self.frames[end.link], place)
 
-        rods = [KnotRod(make_end(one), make_end(other), rod) for one, other, rod, _ in found.rods]
+        rods = [
+            knot.KnotRod(make_end(one), make_end(other), rod)
+            for one, other, rod, _ in found.rods
+        ]
         known = LinkState([*self._state.coordinates], [*self._state.pins])
         start = list(map(self._value, found.unknown))
-        self._add(Knot(movers, rods, tuple(self.steps), known, len(self.linkage.driven), start))
+        driven = len(self.linkage.driven)
+        self._add(knot.Knot(movers, rods, tuple(self.steps), known, driven, start))
         by = list_names(dict.fromkeys(rod.by for rod in found.rods))
         method = f'iterated: {len(rods)} equations, {list_names(found.unknown)} by {by}'
         self._end_group('knot', tuple(found.links), method, 'as in the pose')
