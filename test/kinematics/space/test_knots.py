@@ -13,7 +13,8 @@ from random import Random
 
 import linkage_ros as lr
 from linkage_ros.description import load
-from linkage_ros.kinematics import compile_program, Status
+from linkage_ros.kinematics import Status
+from linkage_ros.kinematics.compiling import compile_program
 import numpy as np
 import pytest
 
