@@ -51,7 +51,7 @@ _SINGULAR = 1e-11
 """Least ratio of smallest to largest singular value at which rates exist."""
 
 _TOGGLE = 2.0**-44
-"""How far the inputs of a toggle may be from where the way to them ends, relative to their size."""
+"""How far a toggle may be from where the way to its inputs ends, relative to their size."""
 
 _AMID = 1.3
 """Longest that a rod may be between two solutions, relative to its length."""
@@ -139,9 +139,7 @@ class Knot:
         self._solution_line = StraightLine(self._straight_solution, self._examples(0))
         self._system_line = StraightLine(self._list_system, self._examples(0, 3))
         self._rates_line = StraightLine(self._straight_rates, self._examples(0, 3, 1))
-        self._changes_line = StraightLine(
-            self._straight_changes, self._examples(0, 3, 1, 4, 2)
-        )
+        self._changes_line = StraightLine(self._straight_changes, self._examples(0, 3, 1, 4, 2))
 
     @property
     def equation_count(self) -> int:
@@ -187,9 +185,7 @@ class Knot:
             return self._close_slowly(solved)
         return self._append(Status.CLOSED, solved, values)
 
-    def rates(
-        self, pose: KnotPose, solved: LinkState, velocities: LinkState
-    ) -> Sequence[float]:
+    def rates(self, pose: KnotPose, solved: LinkState, velocities: LinkState) -> Sequence[float]:
         """Append the rates of the joints, and the motions of the links."""
         unknowns = LinkState([*pose.unknowns], [])
         if has_symbols(solved, velocities):
@@ -227,9 +223,7 @@ class Knot:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
         return self._conditioning_at(pose.solved, pose.unknowns)
 
-    def _append(
-        self, status: Status, solved: LinkState, unknowns: Sequence[float]
-    ) -> KnotPose:
+    def _append(self, status: Status, solved: LinkState, unknowns: Sequence[float]) -> KnotPose:
         moved = self._moved(solved, unknowns)
         solved.coordinates.extend(unknowns)
         solved.pins.extend(islice(moved.pins, self._first, None))

@@ -561,8 +561,7 @@ class SpacePlan:
             return knot.RodEnd(list(found.links).index(end.link), self.frames[end.link], place)
 
         rods = [
-            knot.KnotRod(make_end(one), make_end(other), rod)
-            for one, other, rod, _ in found.rods
+            knot.KnotRod(make_end(one), make_end(other), rod) for one, other, rod, _ in found.rods
         ]
         known = LinkState([*self._state.coordinates], [*self._state.pins])
         start = list(map(self._value, found.unknown))
