@@ -54,6 +54,9 @@ _DIGITS = 28
 _SHORTEST = 2.0**-50
 """Shortest step beyond the cells, as a part of the way."""
 
+_HOPELESS = 2.0**-12
+"""The same, as a part of what is left: a way that needs shorter ones ends before the inputs."""
+
 Key = tuple[int, ...]
 
 
@@ -159,7 +162,7 @@ class Grid:
         with BUILD_LOCK:
             begin = cell = self._follow(_LEVELS - 1, key).last
             done, step = 0.0, 1.0
-            while done < 1.0 and step > _SHORTEST:
+            while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
                 part = min(1.0, done + step)
                 found = self._step_to(cell, _between(begin.inputs, inputs, part))
                 if found is None:

@@ -568,7 +568,8 @@ class SpacePlan:
         driven = len(self.linkage.driven)
         self._add(knot.Knot(movers, rods, tuple(self.steps), known, driven, start))
         by = list_names(dict.fromkeys(rod.by for rod in found.rods))
-        method = f'iterated: {len(rods)} equations, {list_names(found.unknown)} by {by}'
+        what = f'{len(rods)} equations for {list_names(found.unknown)}'
+        method = f"iterated: Newton's method, {what}: {by}"
         self._end_group('knot', tuple(found.links), method, 'as in the pose')
         return True
 
