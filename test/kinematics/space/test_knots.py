@@ -160,3 +160,20 @@ def test_a_knot_follows_closed_steps_and_others_follow_it():
     assert found.joints[2:] == pytest.approx(one.position(0.3, 0.1).joints, abs=1e-13)
     assert remainder(found.joints[0], tau) == found.joints[0]
     assert dist(found.points['c1'], found.points['left_c1']) > 0.1
+
+
+@pytest.mark.parametrize(
+    ('name', 'unknown'), [('three_arms', ('b1', 'c1')), ('three_elbows', ('a1', 'c1'))]
+)
+def test_a_knot_closed_by_hinges_with_known_joints_within(name, unknown):
+    closure = closure_of(name)
+    (knot,) = (group for group in closure.groups if group.kind == 'knot')
+    assert '4 equations' in knot.method
+    assert all(joint in knot.method for joint in unknown)
+    other = closure_of('three_arms' if name == 'three_elbows' else 'three_elbows')
+    for inputs in random_inputs(closure, 20, 0.2):
+        position = closure.position(*inputs)
+        assert position.status is Status.CLOSED
+        back = other.position(*(position[joint] for joint in other.input_names))
+        for joint, value in zip(closure.input_names, inputs, strict=True):
+            assert back[joint] == pytest.approx(value, abs=1e-13)
