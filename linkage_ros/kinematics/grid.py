@@ -22,7 +22,7 @@ covers lies next to a singularity, or beyond it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain, product
 from math import ldexp
 from typing import Any, NamedTuple, Protocol
@@ -149,6 +149,18 @@ class Grid:
             off, first = value - found[i], n + m * (i + 1)
             unknowns = [one + off * found[first + k] for k, one in enumerate(unknowns)]
         return unknowns
+
+    def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
+        """Yield the corners of the cell about the pose, with the unknowns predicted there."""
+        home = tuple(0 for _ in self._start.inputs)
+        for level, width in enumerate(self._widths):
+            with BUILD_LOCK:
+                cell = self._follow(level, home).cell
+            if cell is not None:
+                for corner in self._corners:
+                    at = [c + part * width for c, part in zip(cell.inputs, corner, strict=True)]
+                    yield at, cell.predict(at)
+                return
 
     def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
         """

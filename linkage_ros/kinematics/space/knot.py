@@ -44,6 +44,9 @@ from linkage_ros.kinematics.straight_line import has_symbols, list_numbers, Stra
 _LAST_STEP = 2.0**-36
 """Sum of the last changes by Newton's method, in [rad] and lengths: the next is a rounding."""
 
+_HALFWAY, _MOST_STEPS = 2.0**-21, 6
+"""Sum of the last changes but one, whose square is a last one; and how many steps are unrolled."""
+
 _LEAST_STEP = 2.0**-20
 """The same of a solution next to a singularity, where the rounding is greater."""
 
@@ -170,6 +173,22 @@ class Knot:
         """Return the cells from which the links are solved."""
         return Grid(self, [self._before.inputs[k] for k in self.inputs], self._start)
 
+    @BuiltProperty
+    def _step_count(self) -> int:
+        """Return how many steps of Newton's method suffice at the corners about the pose."""
+        most = 2
+        for corner in self.grid.home_corners():
+            count, size, (inputs, values) = 0, inf, corner
+            known = self._before.known_at(self._inputs_with(inputs))
+            while known is not None and size > _HALFWAY and count < _MOST_STEPS:
+                found = self._system_line(self._needed(known), LinkState([*values], []))
+                if found is None:
+                    break
+                size, count = sum(map(abs, found[: len(values)])), count + 1
+                values = [a - b for a, b in zip(values, found, strict=False)]
+            most = max(most, count)
+        return most
+
     # A step of the closure
 
     def close(self, solved: LinkState) -> KnotPose:
@@ -235,6 +254,9 @@ class Knot:
         import numpy as np  # local import: few states need it
 
         inputs = [solved.coordinates[1 + k] for k in self.inputs]
+        start = self.grid.find_start(inputs)
+        if start is not None and (found := self.solve_from(inputs, start)) is not None:
+            return self._append(Status.CLOSED, solved, found)
         cell, left = self.grid.reach(inputs)
         if not left:
             status = Status.CLOSED
@@ -257,14 +279,14 @@ class Knot:
     # Straight lines, for numbers and symbols
 
     def _straight_solution(self, known: LinkState) -> list[float]:
-        """Return the unknowns: two steps of Newton's method, and one with the second's slopes."""
+        """Return the unknowns: steps of Newton's method, and one more with the last slopes."""
         values = self.grid.find_start([known.coordinates[1 + k] for k in self.inputs])
         if values is None:
             raise UndecidedError
         step: Sequence[float] = ()
-        for last in (False, False, True):
+        for left in reversed(range(1 + self._step_count)):
             errors, rows = self._system(self._moved(known, values))
-            if not last:
+            if left:
                 eliminated = _eliminate(rows)
             step = eliminated.solve(errors)
             values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
