@@ -44,6 +44,9 @@ from linkage_ros.kinematics.straight_line import has_symbols, list_numbers, Stra
 _LAST_STEP = 2.0**-36
 """Sum of the last changes by Newton's method, in [rad] and lengths: the next is a rounding."""
 
+_SECOND = 8.0
+"""How often the next step at most is in the unit of an unknown."""
+
 _HALFWAY, _MOST_STEPS = 2.0**-21, 6
 """Sum of the last changes but one, whose square is a last one; and how many steps are unrolled."""
 
@@ -460,21 +463,37 @@ class Knot:
         return given
 
     def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
-        """Return η·ω of Kantorovich's theorem; infinite where there is none."""
+        """
+        Return η·ω of Kantorovich's theorem; infinite where there is none.
+
+        The norm is the largest change of an unknown: all in one unit, the largest step; or each in
+        its own, its step and some times what the next may be at most. The better one counts.
+        """
         known = self._before.known_at(self._inputs_with(inputs))
         if known is None:
             return inf
         found = self._system_line(self._needed(known), LinkState([*unknowns], []))
         if found is None:
             return inf
-        bounds = [self._bound_bend(k, known, unknowns) for k in range(len(self._rods))]
-        count = len(bounds)
-        totals = [0.0] * count
-        # The inverse follows the step, column by column.
-        for k, bound in enumerate(bounds, 1):
-            for i in range(count):
-                totals[i] += abs(found[k * count + i]) * bound
-        return max(map(abs, found[:count])) * max(totals)
+        count = len(self._rods)
+        steps = [abs(step) + SMALLEST for step in found[:count]]
+
+        def changes_within(units: Sequence[float]) -> list[float]:
+            """Return how much the matrix, and so the step, may change by these changes."""
+            totals = [0.0] * count
+            # The inverse follows the step, column by column.
+            for k in range(count):
+                bound = self._bound_bend(k, known, unknowns, units)
+                for i in range(count):
+                    totals[i] += abs(found[(k + 1) * count + i]) * bound
+            return totals
+
+        even = [max(steps)] * count
+        fitted = [a + _SECOND * b for a, b in zip(steps, changes_within(steps), strict=True)]
+        return min(
+            max(a / b for a, b in zip(changes_within(units), units, strict=True))
+            for units in (even, fitted)
+        )
 
     def solve_from(
         self, inputs: Sequence[float], unknowns: Sequence[float]
@@ -507,30 +526,52 @@ class Knot:
             slopes.append(found)
         return slopes
 
-    def _bound_bend(self, number: int, known: LinkState, unknowns: Sequence[float]) -> float:
+    @BuiltProperty
+    def _aligned(self) -> dict[tuple[int, int], float]:
+        """Return the |cosines| between the axes of slides that no hinge turns against another."""
+        found: dict[tuple[int, int], float] = {}
+        for one, mover in enumerate(self._movers):
+            other, axis = one, mover.joint.seat.z
+            while other >= 0 and isinstance(self._movers[other].joint, SlidePair):
+                joint = self._movers[other].joint
+                if other != one:
+                    # The axis in the frame of the child of the other.
+                    found[one, other] = abs(dot(axis, (0.0, 0.0, 1.0)))
+                axis, other = joint.seat.turn(axis), joint.parent - self._first
+        return found
+
+    def _bound_bend(
+        self, number: int, known: LinkState, unknowns: Sequence[float], units: Sequence[float]
+    ) -> float:
         """
-        Return a bound of the sum of all second derivatives of a rod's equation.
+        Return a bound of a rod's second derivative, for changes of the unknowns by their units.
 
         An end is never farther from an axis than the links between reach. It moves by no more for
         a turn, and by 1 for a slide; only what is nearer to the ground turns that.
         """
-        _, _, rod = self._rods[number]
+        start, end, rod = self._rods[number]
         size, total = _AMID * rod.length(known), 0.0
-        moves: list[float] = []
-        ends = (self._rods[number].start, self._rods[number].end)
-        for end, chain in zip(ends, self._chains[number], strict=True):
-            reach, own = length(end.place), []
+        moves: list[tuple[int, float]] = []
+        for at, chain in zip((start, end), self._chains[number], strict=True):
+            reach, outer = length(at.place), 0.0
             for k in chain:
                 mover = self._movers[k]
                 slides = isinstance(mover.joint, SlidePair)
                 if mover.unknown >= 0:
-                    own.append(1.0 if slides else reach)
+                    unit = units[mover.unknown]
+                    move = unit if slides else unit * reach
                     # A turn nearer to the ground turns what the others move, and itself.
-                    total += 0.0 if slides else size * (2.0 * sum(own) - own[-1])
+                    total += 0.0 if slides else size * unit * (2.0 * outer + move)
+                    moves.append((k, move))
+                    outer += move
                 reach += length(mover.joint.seat.origin)
                 reach += abs(mover.value(unknowns, known)) + _SLID if slides else 0.0
-            moves += own
-        return total + sum(moves) ** 2
+        aligned = self._aligned
+        return total + sum(
+            one * other * aligned.get((max(i, k), min(i, k)), 1.0)
+            for i, one in moves
+            for k, other in moves
+        )
 
     def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
         from linkage_ros.kinematics.descent import (
