@@ -8,7 +8,8 @@
 """
 Solutions of links that close only together, as a function of their inputs, without history.
 
-A grid lies over the inputs. A cell has the solution at its centre, and its slopes. It is made when
+A grid lies over the inputs. A cell has the solution at its centre, and the form of second
+order about it. It is made when
 it is first met, from its neighbour on the straight line to the pose, and that one likewise: there
 is one way to each cell, so the order of visits cannot matter. A cell is accepted if the theorem of
 Kantorovich proves, at each quarter of the way and at the corners of the cell, that the prediction
@@ -23,7 +24,7 @@ covers lies next to a singularity, or beyond it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import chain, product
+from itertools import chain, islice, product
 from math import ldexp
 from typing import Any, NamedTuple, Protocol
 
@@ -61,19 +62,23 @@ Key = tuple[int, ...]
 
 
 class GridCell(NamedTuple):
-    """A solution at certain inputs, and for each input the slopes of the unknowns there."""
+    """A solution at certain inputs, and the quadratic form of the unknowns about it."""
 
     inputs: tuple[float, ...]
     unknowns: tuple[float, ...]
-    slopes: tuple[tuple[float, ...], ...]
+    slopes: tuple[tuple[float, ...], ...]  # For each input
+
+    # For each input, and each from it on, the factors of the product of both.
+    bends: tuple[tuple[float, ...], ...]
 
     def predict(self, inputs: Sequence[float]) -> list[float]:
         """Return the unknowns at inputs nearby."""
-        found = list(self.unknowns)
-        for value, at, slopes in zip(inputs, self.inputs, self.slopes, strict=True):
-            off = value - at
-            found = [one + off * slope for one, slope in zip(found, slopes, strict=True)]
-        return found
+        return _predict(self.numbers, inputs, len(self.unknowns))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Return all numbers, one after the other."""
+        return (*self.inputs, *self.unknowns, *chain(*self.slopes, *self.bends))
 
 
 class _Found(NamedTuple):
@@ -95,10 +100,10 @@ class GridGroup(Protocol):
     ) -> Sequence[float] | None:
         """Return the solution that Newton's method leads to."""
 
-    def slopes_at(
+    def forms_at(
         self, inputs: Sequence[float], unknowns: Sequence[float]
-    ) -> Sequence[Sequence[float]] | None:
-        """Return for each input the slopes of the unknowns at a solution."""
+    ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
+        """Return slopes and bends at a solution, as a cell has them."""
 
 
 class Grid:
@@ -109,8 +114,9 @@ class Grid:
     ) -> None:
         self._group = group
         count = len(inputs)
-        level_slopes = ((0.0,) * len(unknowns),) * count
-        self._start = GridCell(tuple(inputs), tuple(unknowns), level_slopes)
+        level = (0.0,) * len(unknowns)
+        bends = (level,) * (count * (count + 1) // 2)
+        self._start = GridCell(tuple(inputs), tuple(unknowns), (level,) * count, bends)
         self._kept: dict[tuple[int, Key], _Found] = {}
         self._widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
@@ -141,14 +147,8 @@ class Grid:
 
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
-        found, n, m = call(self, *inputs), len(inputs), len(self._start.unknowns)
-        if not has_result(found):
-            return None
-        unknowns = [found[n + k] for k in range(m)]
-        for i, value in enumerate(inputs):
-            off, first = value - found[i], n + m * (i + 1)
-            unknowns = [one + off * found[first + k] for k, one in enumerate(unknowns)]
-        return unknowns
+        found = call(self, *inputs)
+        return _predict(found, inputs, len(self._start.unknowns)) if has_result(found) else None
 
     def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
         """Yield the corners of the cell about the pose, with the unknowns predicted there."""
@@ -203,8 +203,7 @@ class Grid:
             # Wider cells lead to where they are no longer proven.
             wider = None if key is way[0] else self._wider_cell(level, key)
             cell = wider or self._make_cell(level, key, found.cell)
-            numbers = (*cell.inputs, *cell.unknowns, *chain(*cell.slopes)) if cell else None
-            found = _Found(cell, cell or found.last, numbers)
+            found = _Found(cell, cell or found.last, cell.numbers if cell else None)
             if wider is None:
                 if len(self._kept) >= _KEPT:
                     del self._kept[next(iter(self._kept))]
@@ -228,7 +227,8 @@ class Grid:
         if found is None:
             return None
         # The last digits of functions differ from machine to machine.
-        cell = GridCell(found.inputs, _rounded(found.unknowns), tuple(map(_rounded, found.slopes)))
+        forms = (tuple(map(_rounded, each)) for each in (found.slopes, found.bends))
+        cell = GridCell(found.inputs, _rounded(found.unknowns), *forms)
         for corner in self._corners:
             at = [c + part * width for c, part in zip(centre, corner, strict=True)]
             if not self._group.proof(at, cell.predict(at)) <= _PROVEN:
@@ -243,10 +243,25 @@ class Grid:
             if not group.proof(at, known.predict(at)) <= _PROVEN:
                 return None
         unknowns = group.solve_from(inputs, known.predict(inputs))
-        slopes = None if unknowns is None else group.slopes_at(inputs, unknowns)
-        if unknowns is None or slopes is None:
+        forms = None if unknowns is None else group.forms_at(inputs, unknowns)
+        if unknowns is None or forms is None:
             return None
-        return GridCell(tuple(inputs), tuple(unknowns), tuple(map(tuple, slopes)))
+        slopes, bends = (tuple(map(tuple, each)) for each in forms)
+        return GridCell(tuple(inputs), tuple(unknowns), slopes, bends)
+
+
+def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:
+    """Return the unknowns by the numbers of a cell; both may be symbols."""
+    n, number = len(inputs), len(inputs) * (1 + count) + count
+    offs = [value - numbers[i] for i, value in enumerate(inputs)]
+    unknowns = [numbers[n + k] for k in range(count)]
+    for i, off in enumerate(offs):
+        slopes = [numbers[n + count * (1 + i) + k] for k in range(count)]
+        for other in islice(offs, i, None):
+            slopes = [slope + other * numbers[number + k] for k, slope in enumerate(slopes)]
+            number += count
+        unknowns = [one + off * slope for one, slope in zip(unknowns, slopes, strict=True)]
+    return unknowns
 
 
 def _between(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:

@@ -45,6 +45,20 @@ class StepsBefore:
             step.rates(pose, known, speeds)
         return known, speeds
 
+    def changing_at(
+        self, inputs: Sequence[float], rates: Sequence[float]
+    ) -> tuple[LinkState, LinkState, LinkState] | None:
+        """Return the state of their links, its rates and accelerations at constant rates."""
+        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
+        changes = LinkState([0.0] * len(known.coordinates), [])
+        for step in self.steps:
+            pose = step.close(known)
+            if not pose.status.has_rates:
+                return None
+            found: Any = step.rates(pose, known, speeds)
+            step.accelerations(pose, found, known, speeds, changes)
+        return known, speeds, changes
+
     def trace(self) -> tuple[Tape, list[LinkState]] | None:
         """
         Return their state at the pose, its rates and accelerations, as symbols of a tape.

@@ -17,7 +17,7 @@ same matrix. Where the method starts is on a `Grid`: so a state depends on its i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import islice
+from itertools import combinations_with_replacement, islice
 from math import inf, prod
 from typing import Any, NamedTuple
 
@@ -510,21 +510,39 @@ class Knot:
                 return values if last <= _LEAST_STEP else None
             values, last = [a - b for a, b in zip(values, found, strict=False)], size
 
-    def slopes_at(
+    def forms_at(
         self, inputs: Sequence[float], unknowns: Sequence[float]
-    ) -> Sequence[Sequence[float]] | None:
-        """Return for each input the slopes of the unknowns at a solution."""
-        given, slopes = self._inputs_with(inputs), []
-        for k in self.inputs:
-            moving = self._before.moving_at(given, [float(i == k) for i in range(len(given))])
+    ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
+        """Return slopes and bends at a solution, as a cell has them: by rates, accelerations."""
+        given, pose = self._inputs_with(inputs), LinkState([*unknowns], [])
+        slopes: list[Sequence[float]] = []
+        squares: dict[tuple[int, int], list[float]] = {}
+        for one, other in combinations_with_replacement(self.inputs, 2):
+            rates = [float(k in (one, other)) for k in range(len(given))]
+            moving = self._before.changing_at(given, rates)
             if moving is None:
                 return None
-            known, speeds = map(self._needed, moving)
-            found = self._rates_line(known, LinkState([*unknowns], []), speeds)
-            if found is None:
+            known, speeds, changes = map(self._needed, moving)
+            found = self._rates_line(known, pose, speeds)
+            turned = found and self._changes_line(
+                known, pose, speeds, LinkState(found, []), changes
+            )
+            if found is None or turned is None:
                 return None
-            slopes.append(found)
-        return slopes
+            squares[one, other] = turned
+            if one == other:
+                slopes.append(found)
+        bends: list[Sequence[float]] = []
+        for (one, other), both in squares.items():
+            if one == other:
+                bends.append([0.5 * value for value in both])
+            else:
+                # Along both inputs at once: twice what is mixed, and what each has alone.
+                alone = zip(squares[one, one], squares[other, other], strict=True)
+                bends.append(
+                    [0.5 * (value - a - b) for value, (a, b) in zip(both, alone, strict=True)]
+                )
+        return slopes, bends
 
     @BuiltProperty
     def _aligned(self) -> dict[tuple[int, int], float]:
