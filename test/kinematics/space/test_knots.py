@@ -81,7 +81,7 @@ def test_a_state_is_where_a_walk_from_the_pose_ends():
     """The motors are closed forms of the joints; the walk inverts these by Newton's method."""
     motors = Compiled(closure_of('ankle'), 1, within_limits=False)
     joints = closure_of('ankle_motors')
-    for inputs in random_inputs(joints, sample_count(10_000, 30), 0.6):
+    for inputs in random_inputs(joints, sample_count(10_000, 10), 0.6):
         now, steps = np.zeros(2), 4000
         for step in range(1, steps + 1):
             wanted = np.array(inputs) * (step / steps)
@@ -171,9 +171,9 @@ def test_a_knot_closed_by_hinges_with_known_joints_within(name, unknown):
     assert '4 equations' in knot.method
     assert all(joint in knot.method for joint in unknown)
     other = closure_of('three_arms' if name == 'three_elbows' else 'three_elbows')
-    for inputs in random_inputs(closure, 20, 0.2):
+    for inputs in random_inputs(closure, 20, 0.1):
         position = closure.position(*inputs)
         assert position.status is Status.CLOSED
-        back = other.position(*(position[joint] for joint in other.input_names))
+        back = other.close_unlimited(*(position[joint] for joint in other.input_names))
         for joint, value in zip(closure.input_names, inputs, strict=True):
             assert back[joint] == pytest.approx(value, abs=1e-13)
