@@ -65,13 +65,10 @@ class StepsBefore:
 
         None if they are at a toggle there.
         """
-        tape = Tape()
-        states = [
-            LinkState(
-                [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs))], []
-            )
-            for name in 'qwa'
-        ]
+        tape, states = Tape(), []
+        for name in 'qwa':
+            given: list[Any] = [tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs)]
+            states.append(LinkState([0.0, *given], []))
         known, velocities, accelerations = states
         for step in self.steps:
             closed = step.close(known)

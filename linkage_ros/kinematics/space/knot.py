@@ -439,12 +439,10 @@ class Knot:
         if traced is None:
             return None
         tape, states = traced
-        return states + [
-            LinkState(
-                [tape.add_input(f'{name}{k}', value) for k, value in enumerate(self._start)], []
-            )
-            for name in 'uv'
-        ]
+        for name in 'uv':
+            given: list[Any] = [tape.add_input(f'{name}{k}', x) for k, x in enumerate(self._start)]
+            states.append(LinkState(given, []))
+        return states
 
     def _examples(self, *numbers: int) -> Callable[[], Sequence[LinkState] | None]:
         def examples() -> Sequence[LinkState] | None:

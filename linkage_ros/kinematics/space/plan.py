@@ -544,7 +544,7 @@ class SpacePlan:
                 if not end.link:
                     self._point_index(end.point)
         coordinates, first = len(self._state.coordinates), self._next_pin
-        movers = []
+        movers: list[knot.Mover] = []
         for link, (name, on) in found.links.items():
             joint, frame = self._make_joint(name, on, link)
             self.frames[link], self.pose_frames[link] = first + len(movers), frame
