@@ -176,7 +176,7 @@ class Grid:
             done, step = 0.0, 1.0
             while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
                 part = min(1.0, done + step)
-                found = self._step_to(cell, _between(begin.inputs, inputs, part))
+                found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
                 if found is None:
                     step *= 0.5
                 else:
@@ -227,8 +227,8 @@ class Grid:
         if found is None:
             return None
         # The last digits of functions differ from machine to machine.
-        forms = (tuple(map(_rounded, each)) for each in (found.slopes, found.bends))
-        cell = GridCell(found.inputs, _rounded(found.unknowns), *forms)
+        forms = (tuple(map(_round_binary, each)) for each in (found.slopes, found.bends))
+        cell = GridCell(found.inputs, _round_binary(found.unknowns), *forms)
         for corner in self._corners:
             at = [c + part * width for c, part in zip(centre, corner, strict=True)]
             if not self._group.proof(at, cell.predict(at)) <= _PROVEN:
@@ -239,7 +239,7 @@ class Grid:
         """Return the solution that a known one is proven to lead to."""
         group = self._group
         for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
-            at = _between(known.inputs, inputs, part)
+            at = _part_of_way(known.inputs, inputs, part)
             if not group.proof(at, known.predict(at)) <= _PROVEN:
                 return None
         unknowns = group.solve_from(inputs, known.predict(inputs))
@@ -264,12 +264,12 @@ def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:
     return unknowns
 
 
-def _between(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
+def _part_of_way(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
     """Return inputs at a part of the way; the other end itself at 1."""
     if part == 1.0:
         return other
     return [a + part * (b - a) for a, b in zip(one, other, strict=True)]
 
 
-def _rounded(values: Sequence[float]) -> tuple[float, ...]:
+def _round_binary(values: Sequence[float]) -> tuple[float, ...]:
     return tuple(ldexp(float(round(ldexp(value, _DIGITS))), -_DIGITS) for value in values)

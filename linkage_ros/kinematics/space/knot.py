@@ -158,7 +158,7 @@ class Knot:
         traced = self._traced()
         if traced is None:
             return tuple(range(len(self._before.inputs)))
-        known = self._needed(traced[0])
+        known = self._select_needed(traced[0])
         used = {rod.rod.strut for rod in self._rods} | {one.coordinate for one in self._movers}
         numbers = list_numbers([known.pins, *(known.coordinates[k] for k in used)])
         waiting = [number.operation for number in numbers if hasattr(number, 'operation')]
@@ -184,7 +184,7 @@ class Knot:
             count, size, (inputs, values) = 0, inf, corner
             known = self._before.known_at(self._inputs_with(inputs))
             while known is not None and size > _HALFWAY and count < _MOST_STEPS:
-                found = self._system_line(self._needed(known), LinkState([*values], []))
+                found = self._system_line(self._select_needed(known), LinkState([*values], []))
                 if found is None:
                     break
                 size, count = sum(map(abs, found[: len(values)])), count + 1
@@ -202,7 +202,7 @@ class Knot:
         if has_symbols(solved):
             values: Sequence[float] | None = self._straight_solution(solved)
         else:
-            values = self._solution_line(self._needed(solved))
+            values = self._solution_line(self._select_needed(solved))
         if values is None:
             return self._close_slowly(solved)
         return self._append(Status.CLOSED, solved, values)
@@ -213,9 +213,9 @@ class Knot:
         if has_symbols(solved, velocities):
             rates: Sequence[float] = self._straight_rates(solved, unknowns, velocities)
         else:
-            states = self._needed(solved), unknowns, self._needed(velocities)
+            states = self._select_needed(solved), unknowns, self._select_needed(velocities)
             rates = self._rates_line(*states) or []
-        moving = self._moving(solved, velocities, rates)
+        moving = self._add_motions(solved, velocities, rates)
         velocities.coordinates.extend(rates)
         velocities.pins.extend(islice(moving.pins, self._first, None))
         return rates
@@ -235,9 +235,9 @@ class Knot:
                 solved, unknowns, velocities, speeds, changes
             )
         else:
-            known, moving, changing = map(self._needed, (solved, velocities, changes))
+            known, moving, changing = map(self._select_needed, (solved, velocities, changes))
             found = self._changes_line(known, unknowns, moving, speeds, changing) or []
-        changed = self._changing(solved, velocities, changes, rates, found)
+        changed = self._add_changes(solved, velocities, changes, rates, found)
         changes.coordinates.extend(found)
         changes.pins.extend(islice(changed.pins, self._first, None))
 
@@ -246,7 +246,7 @@ class Knot:
         return self._conditioning_at(pose.solved, pose.unknowns)
 
     def _append(self, status: Status, solved: LinkState, unknowns: Sequence[float]) -> KnotPose:
-        moved = self._moved(solved, unknowns)
+        moved = self._place_links(solved, unknowns)
         solved.coordinates.extend(unknowns)
         solved.pins.extend(islice(moved.pins, self._first, None))
         return KnotPose(status, 0.0, unknowns, solved)
@@ -269,7 +269,7 @@ class Knot:
         sizes = np.array([rod.rod.length(solved) for rod in self._rods])
 
         def system(unknowns: Any) -> Any:
-            errors, rows = self._system(self._moved(solved, unknowns.tolist()))
+            errors, rows = self._system(self._place_links(solved, unknowns.tolist()))
             return np.array(errors) / sizes, np.array(rows) / sizes[:, None]
 
         begin = np.array(cell.unknowns)
@@ -288,7 +288,7 @@ class Knot:
             raise UndecidedError
         step: Sequence[float] = ()
         for left in reversed(range(1 + self._step_count)):
-            errors, rows = self._system(self._moved(known, values))
+            errors, rows = self._system(self._place_links(known, values))
             if left:
                 eliminated = _eliminate(rows)
             step = eliminated.solve(errors)
@@ -299,7 +299,7 @@ class Knot:
 
     def _list_system(self, known: LinkState, pose: LinkState) -> list[float]:
         """Return what Newton's method subtracts, and the inverse of the matrix by columns."""
-        errors, rows = self._system(self._moved(known, pose.coordinates))
+        errors, rows = self._system(self._place_links(known, pose.coordinates))
         eliminated = _eliminate(rows)
         found = eliminated.solve(errors)
         for k in range(len(rows)):
@@ -310,8 +310,8 @@ class Knot:
         self, known: LinkState, pose: LinkState, velocities: LinkState
     ) -> list[float]:
         """Return the rates of the unknowns: (C − B)·(Ċ − Ḃ) = L·L̇ for each rod."""
-        state = self._moved(known, pose.coordinates)
-        still = self._moving(state, velocities, [0.0] * len(self._rods))
+        state = self._place_links(known, pose.coordinates)
+        still = self._add_motions(state, velocities, [0.0] * len(self._rods))
         right = [
             subtract(rod.rod.power(state, velocities), dot(vector, slip))
             for rod, vector, slip in self._slips(state, still)
@@ -327,9 +327,9 @@ class Knot:
         changes: LinkState,
     ) -> list[float]:
         """Return the accelerations: (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² = L·L̈ + L̇² for each rod."""
-        state, rates = self._moved(known, pose.coordinates), speeds.coordinates
-        moving = self._moving(state, velocities, rates)
-        before = self._changing(state, moving, changes, rates, [0.0] * len(self._rods))
+        state, rates = self._place_links(known, pose.coordinates), speeds.coordinates
+        moving = self._add_motions(state, velocities, rates)
+        before = self._add_changes(state, moving, changes, rates, [0.0] * len(self._rods))
         right = []
         for rod, vector, slip in self._slips(state, moving):
             one, other = (
@@ -342,7 +342,7 @@ class Knot:
             right.append(subtract(bend, dot(vector, minus(other, one))))
         return _eliminate(self._system(state)[1]).solve(right)
 
-    def _moved(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
+    def _place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
         """Return the state with the frames of the links."""
         first = self._first
         state = LinkState(known.coordinates, known.pins[:first])
@@ -351,7 +351,7 @@ class Knot:
             state.pins.append(mover.joint.child_frame(mover.joint.base(state), value))
         return state
 
-    def _moving(
+    def _add_motions(
         self, state: LinkState, velocities: LinkState, rates: Sequence[float]
     ) -> LinkState:
         """Return the velocities with the motions of the links."""
@@ -362,7 +362,7 @@ class Knot:
             moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
         return moving
 
-    def _changing(
+    def _add_changes(
         self,
         state: LinkState,
         moving: LinkState,
@@ -423,7 +423,7 @@ class Knot:
         one, other = chains
         return [k for k in one if k not in other], [k for k in other if k not in one]
 
-    def _needed(self, state: LinkState) -> LinkState:
+    def _select_needed(self, state: LinkState) -> LinkState:
         """Return of a state what the links before have, and of their pins what the knot needs."""
         end = self._coordinates
         pins = [pin if k in self._pins else () for k, pin in enumerate(state.pins)]
@@ -447,7 +447,9 @@ class Knot:
     def _examples(self, *numbers: int) -> Callable[[], Sequence[LinkState] | None]:
         def examples() -> Sequence[LinkState] | None:
             traced = self._traced()
-            return traced and [self._needed(traced[k]) if k < 3 else traced[k] for k in numbers]
+            return traced and [
+                self._select_needed(traced[k]) if k < 3 else traced[k] for k in numbers
+            ]
 
         return examples
 
@@ -470,7 +472,7 @@ class Knot:
         known = self._before.known_at(self._inputs_with(inputs))
         if known is None:
             return inf
-        found = self._system_line(self._needed(known), LinkState([*unknowns], []))
+        found = self._system_line(self._select_needed(known), LinkState([*unknowns], []))
         if found is None:
             return inf
         count = len(self._rods)
@@ -500,7 +502,7 @@ class Knot:
         known = self._before.known_at(self._inputs_with(inputs))
         if known is None:
             return None
-        state, values, last = self._needed(known), [*unknowns], inf
+        state, values, last = self._select_needed(known), [*unknowns], inf
         while True:
             found = self._system_line(state, LinkState(values, []))
             size = sum(map(abs, found[: len(values)])) if found else inf
@@ -520,7 +522,7 @@ class Knot:
             moving = self._before.changing_at(given, rates)
             if moving is None:
                 return None
-            known, speeds, changes = map(self._needed, moving)
+            known, speeds, changes = map(self._select_needed, moving)
             found = self._rates_line(known, pose, speeds)
             turned = found and self._changes_line(
                 known, pose, speeds, LinkState(found, []), changes
@@ -543,7 +545,7 @@ class Knot:
         return slopes, bends
 
     @BuiltProperty
-    def _aligned(self) -> dict[tuple[int, int], float]:
+    def _axis_cosines(self) -> dict[tuple[int, int], float]:
         """Return the |cosines| between the axes of slides that no hinge turns against another."""
         found: dict[tuple[int, int], float] = {}
         for one, mover in enumerate(self._movers):
@@ -582,7 +584,7 @@ class Knot:
                     outer += move
                 reach += length(mover.joint.seat.origin)
                 reach += abs(mover.value(unknowns, known)) + _SLID if slides else 0.0
-        aligned = self._aligned
+        aligned = self._axis_cosines
         return total + sum(
             one * other * aligned.get((max(i, k), min(i, k)), 1.0)
             for i, one in moves
@@ -595,7 +597,7 @@ class Knot:
         )
         import numpy as np  # local import: few states need it
 
-        return reciprocal_condition(np.array(self._system(self._moved(known, unknowns))[1]))
+        return reciprocal_condition(np.array(self._system(self._place_links(known, unknowns))[1]))
 
 
 def _eliminate(rows: Sequence[Sequence[float]]) -> Elimination:
