@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations_with_replacement, islice
-from math import inf, prod
+from math import hypot, inf, prod
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
@@ -29,7 +29,6 @@ from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import missing_length, Rod
 from linkage_ros.kinematics.space.vectors import (
     dot,
-    length,
     minus,
     plus,
     SpaceFrame,
@@ -56,7 +55,7 @@ _LEAST_STEP = 2.0**-20
 _SINGULAR = 1e-11
 """Least ratio of smallest to largest singular value at which rates exist."""
 
-_TOGGLE = 2.0**-44
+_TOGGLE = 2.0**-43
 """How far a toggle may be from where the way to its inputs ends, relative to their size."""
 
 _AMID = 1.3
@@ -571,7 +570,7 @@ class Knot:
         size, total = _AMID * rod.length(known), 0.0
         moves: list[tuple[int, float]] = []
         for at, chain in zip((start, end), self._chains[number], strict=True):
-            reach, outer = length(at.place), 0.0
+            reach, outer = hypot(*at.place), 0.0
             for k in chain:
                 mover = self._movers[k]
                 slides = isinstance(mover.joint, SlidePair)
@@ -582,7 +581,7 @@ class Knot:
                     total += 0.0 if slides else size * unit * (2.0 * outer + move)
                     moves.append((k, move))
                     outer += move
-                reach += length(mover.joint.seat.origin)
+                reach += hypot(*mover.joint.seat.origin)
                 reach += abs(mover.value(unknowns, known)) + _SLID if slides else 0.0
         aligned = self._axis_cosines
         return total + sum(

@@ -92,12 +92,13 @@ def test_a_state_is_where_a_walk_from_the_pose_ends():
         assert joints.close_unlimited(*inputs).joints == pytest.approx(now, abs=1e-13)
 
 
-def fold_of(closure, inputs):
-    """Return the parts of the way to inputs between which the linkage ceases to close."""
+def last_with(attribute, closure, inputs):
+    """Return the part of the way to inputs up to which the linkage has a pose, or rates."""
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if closure.close_unlimited(*(middle * value for value in inputs)).status.has_pose:
+        status = closure.close_unlimited(*(middle * value for value in inputs)).status
+        if getattr(status, attribute):
             low = middle
         else:
             high = middle
@@ -107,7 +108,7 @@ def fold_of(closure, inputs):
 def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
     closure = closure_of('ankle_motors')
     far = [3.0, 3.0]
-    end = fold_of(closure, far)
+    end = last_with('has_pose', closure, far)
     assert 0.0 < end < 1.0
     parts = np.linspace(0.0, min(1.0, 1.2 * end), 60).tolist()
     there = [closure.close_unlimited(*(part * value for value in far)) for part in parts]
@@ -120,7 +121,11 @@ def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
 def test_a_toggle_from_both_sides():
     closure = closure_of('ankle_motors')
     far = np.array([3.0, 3.0])
-    end = fold_of(closure, far.tolist())
+    begin, end = (last_with(what, closure, far) for what in ('has_rates', 'has_pose'))
+    # Within the rounding of the equations, the pose is valid and its rates are not.
+    assert 0.0 < end - begin < 2e-13
+    for part in np.linspace(begin, end, 7)[1:-1].tolist():
+        assert closure.close_unlimited(*(far * part)).status is Status.TOGGLE
     gaps = []
     for power in range(-12, -2):
         apart = 10.0**power
