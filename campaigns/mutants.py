@@ -63,7 +63,7 @@ DYNAMICS = 'dynamics', 'drives', 'effects/test_effort.py', 'effects/test_pin_for
 TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py'
 BAG = ('bag',)
 TESTS: dict[str, Sequence[str]] = {
-    'kinematics/closure': KINEMATICS,
+    'kinematics/stepwise_closure': KINEMATICS,
     'kinematics/plan': KINEMATICS,
     'kinematics/topology': KINEMATICS,
     'kinematics/diagonals': KINEMATICS,
@@ -71,6 +71,8 @@ TESTS: dict[str, Sequence[str]] = {
     'kinematics/ranges': ('kinematics/test_ranges.py', *KINEMATICS),
     'kinematics/newton_group': ('kinematics/test_iteration.py', *KINEMATICS),
     'kinematics/branch': ('kinematics/test_branches.py', *KINEMATICS),
+    'kinematics/space/plan': ('kinematics/space',),
+    'kinematics/space/steps': ('kinematics/space',),
     'dynamics/motion': ('dynamics/test_motion.py', *DYNAMICS),
     'dynamics/mechanics': DYNAMICS,
     'dynamics/reactions': ('dynamics/test_reactions.py', *DYNAMICS),

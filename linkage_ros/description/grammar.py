@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -147,3 +147,24 @@ class OnlyWith(Rule):
     def json_schema(self) -> Schema:
         absent = {'properties': {self.key: False}}
         return {'if': {'required': [self.other]}, 'else': absent}
+
+
+@dataclass(frozen=True, slots=True)
+class InsteadOf(Rule):
+    """A key that stands in place of others, which are needed without it."""
+
+    key: str
+    others: tuple[str, ...]
+
+    def needed_keys(self, content: Section) -> Sequence[str]:
+        return (self.key,) if self.key in content else self.others
+
+    def unknown_keys(self, content: Section) -> Sequence[str]:
+        return self.others if self.key in content else ()
+
+    def json_schema(self) -> Schema:
+        return {
+            'if': {'required': [self.key]},
+            'then': {'properties': dict.fromkeys(self.others, False)},
+            'else': {'required': list(self.others)},
+        }

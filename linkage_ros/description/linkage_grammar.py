@@ -18,6 +18,7 @@ from math import inf
 from typing import Any
 
 from linkage_ros.description.grammar import (
+    InsteadOf,
     LENGTH_UNIT,
     LimitPair,
     ListOf,
@@ -74,24 +75,11 @@ STRONGEST = 1e12
 _Values = dict[str, Any]
 
 
-class _SliderOrLinks(Rule):
-    """A joint is a slider, or it turns a child relative to its parent."""
+class _SlidesOnSlider(Rule):
+    """A joint with a slider slides."""
 
     def check(self, content: Section) -> None:
         content.units = replace(content.units, slides='slider' in content)
-
-    def needed_keys(self, content: Section) -> Sequence[str]:
-        return ('slider',) if 'slider' in content else ('parent', 'child')
-
-    def unknown_keys(self, content: Section) -> Sequence[str]:
-        return ('parent', 'child') if 'slider' in content else ()
-
-    def json_schema(self) -> Schema:
-        return {
-            'if': {'required': ['slider']},
-            'then': {'properties': {'parent': False, 'child': False}},
-            'else': {'required': ['parent', 'child']},
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,17 +173,18 @@ _ENDS = {
     'slider': text('the slider, instead of parent and child', None),
     **LIMITS,
 }
+_SLIDER_OR_LINKS = (InsteadOf('slider', ('parent', 'child')), _SlidesOnSlider())
 _INPUT = Keys(
     'The driven joint; several in a list.',
     _build_input,
     {'joint': text('a name for the driven joint, as in crank messages'), **_ENDS},
-    (_SliderOrLinks(),),
+    _SLIDER_OR_LINKS,
 )
 _JOINT = Keys(
     "The child's angle less the parent's [rad], or the slide of a slider [m].",
     _build_joint,
     _ENDS,
-    (_SliderOrLinks(),),
+    _SLIDER_OR_LINKS,
 )
 _SLIDER = Keys(
     'A point that stays on a line of the link `along`.',

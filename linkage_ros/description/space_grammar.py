@@ -9,11 +9,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from linkage_ros.description.grammar import DIALECT, ListOf, Named
+from linkage_ros.description.grammar import DIALECT, InsteadOf, ListOf, Named
 from linkage_ros.description.linkage_grammar import (
     FARTHEST,
     LIMITS,
@@ -33,7 +32,6 @@ from linkage_ros.description.parameters import (
     ParameterGroup,
     parameters_schema,
     Parts,
-    Rule,
     Schema,
     text,
     TextOf,
@@ -84,23 +82,6 @@ class _NameOrNames(ListOf):
         return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
 
 
-class _AtOrThrough(Rule):
-    """A hinge has a point and the direction of its axis, or two points on it."""
-
-    def needed_keys(self, content: Section) -> Sequence[str]:
-        return () if 'through' in content else ('at', 'axis')
-
-    def unknown_keys(self, content: Section) -> Sequence[str]:
-        return ('at', 'axis') if 'through' in content else ()
-
-    def json_schema(self) -> Schema:
-        return {
-            'if': {'required': ['through']},
-            'then': {'properties': {'at': False, 'axis': False}},
-            'else': {'required': ['at', 'axis']},
-        }
-
-
 def _joint(**values: Any) -> dict[str, Any]:
     limits = split_limits(values)
     return {**values, 'limits': limits}
@@ -133,7 +114,7 @@ _HINGE = Keys(
         'value': number('its angle in the pose', 0.0, unit='rad', least=-FARTHEST, most=FARTHEST),
         **LIMITS,
     },
-    (_AtOrThrough(), Moves(False)),
+    (InsteadOf('through', ('at', 'axis')), Moves(False)),
 )  # fmt: skip
 _SLIDE = Keys(
     'A direction along which the child moves on the parent, and does not turn.',

@@ -10,6 +10,7 @@
 
 import ast
 from collections import defaultdict
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 import sys
@@ -164,6 +165,12 @@ def _trees(root):
         yield module, ast.parse(path.read_text('utf-8'), str(path))
 
 
+@cache
+def _from_imports(path):
+    nodes = ast.walk(ast.parse(path.read_text('utf-8')))
+    return [node for node in nodes if isinstance(node, ast.ImportFrom)]
+
+
 def _named(module, node):
     """Yield what a node of a module imports, or may import later: names and texts of ours."""
     if isinstance(node, ast.Import | ast.ImportFrom):
@@ -226,8 +233,8 @@ def test_other_folders_and_tests_import_from_faces():
         for path in sorted((ROOT / folder).rglob('*.py')):
             file = path.relative_to(ROOT)
             importer = '.'.join(file.with_suffix('').parts)
-            for node in ast.walk(ast.parse(path.read_text('utf-8'))):
-                if not isinstance(node, ast.ImportFrom) or node.level:
+            for node in _from_imports(path):
+                if node.level:
                     continue
                 face = _face_beyond(node.module, importer)
                 if face and not node.module.startswith(BY_PATH):
@@ -241,8 +248,8 @@ def test_a_face_lists_what_others_import(root):
     used = defaultdict(set)
     for folder in (PACKAGE, 'test', 'campaigns', 'bench', 'docs', 'examples'):
         for path in (root / folder).rglob('*.py'):
-            for node in ast.walk(ast.parse(path.read_text('utf-8'))):
-                if isinstance(node, ast.ImportFrom) and node.module in FACES:
+            for node in _from_imports(path):
+                if node.module in FACES:
                     used[node.module] |= {alias.name for alias in node.names}
     public = {face: {*names} for face, names in FACES.items() if face != PACKAGE}
     assert {face: names - used[face] for face, names in public.items() if names - used[face]} == {}

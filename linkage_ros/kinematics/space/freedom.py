@@ -15,13 +15,14 @@ if its dimensions meet them everywhere.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.batch import Array
-from linkage_ros.kinematics.space.linkage import SpaceLinkage
+from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.plan import SpacePlan
-from linkage_ros.kinematics.space.vectors import Vector
+from linkage_ros.kinematics.space.vectors import scale, Vector, ZERO
 import numpy as np
 
 _RANK = 1e-9
@@ -43,33 +44,45 @@ class Freedom(NamedTuple):
     dependent: int  # Inputs beyond the degrees of freedom
 
 
-def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
-    """Return the degrees of freedom in the pose."""
-    links = {name: number for number, name in enumerate(linkage.link_names)}
-    places, count = plan.places, 6 * len(links)
-    rows: list[Array] = []
+class _MotionEquations:
+    """The linear equations of the spins and velocities of all links; a motion has six numbers."""
 
-    def spin(link: str) -> Array:
-        first, found = 6 * links[link], np.zeros((3, count))
-        found[:, first:][:, :3] = np.eye(3)
-        return found
+    def __init__(self, linkage: SpaceLinkage, plan: SpacePlan) -> None:
+        self._linkage, self._plan = linkage, plan
+        self._links = {name: number for number, name in enumerate(linkage.link_names)}
+        self.size = 6 * len(self._links)
+        rows = [np.eye(6, self.size)]  # The ground is the first of the links
+        for name, joint in linkage.pair_joints.items():
+            rows += self._joint_rows(joint, name in linkage.hinges)
+        self.needed = 6 + 5 * len(linkage.pair_joints)
+        balls = [row for point in linkage.points for row in self._ball_rows(point)]
+        ratios = [
+            (self.rate(name) - ratio.ratio * self.rate(ratio.of))[None]
+            for name, ratio in linkage.ratios.items()
+        ]
+        self.needed += 3 * len(balls) + len(ratios)
+        self.constraints: Array = np.vstack([*rows, *balls, *ratios])
 
-    def velocity(link: str, place: Vector) -> Array:
+    def spin(self, link: str) -> Array:
+        """Return the rows of the spin of a link."""
+        return np.eye(3, self.size, 6 * self._links[link])
+
+    def velocity(self, link: str, place: Vector) -> Array:
+        """Return the rows of the velocity of a place on a link: v + ω × place."""
         x, y, z = place
-        first = 6 * links[link]
-        found = np.zeros((3, count))
-        # v + ω × place
+        first = 6 * self._links[link]
+        found = np.eye(3, self.size, first + 3)
         found[:, first:][:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-        found[:, first:][:, 3:6] = np.eye(3)
         return found
 
-    def rate(name: str) -> Array:
+    def rate(self, name: str) -> Array:
         """Return the row of a joint's rate, in the unit of the file."""
+        linkage, plan = self._linkage, self._plan
         if name in linkage.struts:
             one, other = linkage.struts[name]
-            between = np.subtract(places[other], places[one])
+            between = np.subtract(plan.places[other], plan.places[one])
             at_other, at_one = (
-                velocity(plan.carriers[plan.same[point]][0], places[point])
+                self.velocity(plan.carriers[plan.same[point]][0], plan.places[point])
                 for point in (other, one)
             )
             along: Array = plan.scale * between / np.linalg.norm(between)
@@ -77,53 +90,56 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         joint = linkage.pair_joints[name]
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         if name in linkage.hinges:
-            return np.asarray(axis @ (spin(joint.child) - spin(joint.parent)))
-        at = (0.0, 0.0, 0.0)
-        moving = velocity(joint.child, at) - velocity(joint.parent, at)
-        return np.asarray(plan.scale * axis @ moving)
+            return np.asarray(axis @ self._relative_spin(joint))
+        return np.asarray(plan.scale * axis @ self._relative_velocity(joint, ZERO))
 
-    for name, joint in linkage.pair_joints.items():
+    def _joint_rows(self, joint: SpatialJoint, turns: bool) -> list[Array]:
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         across = np.eye(3) - np.outer(axis, axis)
-        turning = spin(joint.child) - spin(joint.parent)
-        x, y, z = joint.at
-        at = (x / plan.scale, y / plan.scale, z / plan.scale)
-        moving = velocity(joint.child, at) - velocity(joint.parent, at)
-        hinge = name in linkage.hinges
-        rows += [across @ turning, moving] if hinge else [turning, across @ moving]
-    needed = 5 * len(linkage.pair_joints)
-    for point, links_at in plan.carriers.items():
-        if point not in linkage.points:
-            continue
-        for link in links_at[1:]:
-            if _is_on_hinge(linkage, plan, point, {links_at[0], link}):
-                continue
-            rows.append(velocity(link, places[point]) - velocity(links_at[0], places[point]))
-            needed += 3
-    for name, ratio in linkage.ratios.items():
-        rows.append((rate(name) - ratio.ratio * rate(ratio.of))[None])
-        needed += 1
-    ground = np.zeros((6, count))
-    ground[:, :6] = np.eye(6)  # The first of the links
-    constraints = np.vstack([*rows, ground])
-    everything = np.vstack([constraints, np.vstack([rate(name) for name in linkage.driven])])
+        spin = self._relative_spin(joint)
+        velocity = self._relative_velocity(joint, scale(1.0 / self._plan.scale, joint.at))
+        return [across @ spin, velocity] if turns else [spin, across @ velocity]
+
+    def _ball_rows(self, point: str) -> Iterator[Array]:
+        plan, links = self._plan, self._plan.carriers.get(point, [])
+        for link in links[1:]:
+            if not _is_on_hinge(self._linkage, plan, point, {links[0], link}):
+                place = plan.places[point]
+                yield self.velocity(link, place) - self.velocity(links[0], place)
+
+    def _relative_spin(self, joint: SpatialJoint) -> Array:
+        return self.spin(joint.child) - self.spin(joint.parent)
+
+    def _relative_velocity(self, joint: SpatialJoint, place: Vector) -> Array:
+        return self.velocity(joint.child, place) - self.velocity(joint.parent, place)
+
+
+def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
+    """Return the degrees of freedom in the pose."""
+    equations = _MotionEquations(linkage, plan)
+    inputs = np.vstack([equations.rate(name) for name in linkage.driven])
+    driven = np.vstack([equations.constraints, inputs])
     rods = plan.rods
 
     def judge(tolerance: float) -> Freedom:
-        rank, _ = _rank_and_motions(constraints, tolerance)
-        locked, motions = _rank_and_motions(everything, tolerance)
+        rank, _ = _rank_and_motions(equations.constraints, tolerance)
+        locked, motions = _rank_and_motions(driven, tolerance)
 
-        def moves(row: Array) -> bool:
-            return bool(np.abs(row @ motions).max(initial=0.0) > _MOVES)
+        def moves(rows: Array) -> bool:
+            return bool(np.abs(rows @ motions).max(initial=0.0) > _MOVES)
 
         free = [
             link
-            for link in links
-            if any(moves(velocity(link, places[point])) for point in plan.carried[link])
-            or (link not in rods and moves(spin(link)))
+            for link in linkage.link_names
+            if any(moves(equations.velocity(link, plan.places[at])) for at in plan.carried[link])
+            or (link not in rods and moves(equations.spin(link)))
         ]
-        dependent = len(linkage.driven) - (locked - rank)
-        return Freedom(count - rank - len(rods), needed + 6 - rank, tuple(free), dependent)
+        return Freedom(
+            mobility=equations.size - rank - len(rods),
+            redundant=equations.needed - rank,
+            free=tuple(free),
+            dependent=len(linkage.driven) - (locked - rank),
+        )
 
     # Rounded dimensions miss redundant equations: then the range decides whether they are met.
     exact, rounded = judge(_RANK), judge(_ROUNDED)
