@@ -8,12 +8,11 @@
 """
 Solutions of links that close only together, as a function of their inputs, without history.
 
-A grid lies over the inputs. A cell has the solution at its centre, and the form of second
-order about it. It is made when
-it is first met, from its neighbour on the straight line to the pose, and that one likewise: there
-is one way to each cell, so the order of visits cannot matter. A cell is accepted if the theorem of
-Kantorovich proves, at each quarter of the way and at the corners of the cell, that the prediction
-leads to one solution::
+A grid lies over the inputs. A cell has the solution at its centre, and the form of second order
+about it. It is made when it is first met, from its neighbour on the straight line to the pose, and
+that one likewise: there is one way to each cell, so the order of visits cannot matter. A cell is
+accepted if the theorem of Kantorovich proves, at each quarter of the way and at the corners of the
+cell, that the prediction leads to one solution::
 
     η·ω ≤ 1/4    η = |J⁻¹F|, the first step of Newton's method    ω a bound of |J⁻¹·J'|
 
@@ -23,13 +22,14 @@ covers lies next to a singularity, or beyond it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice, product
 from math import ldexp
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import call, has_result
-from linkage_ros.kinematics.built_once import BUILD_LOCK
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
+from linkage_ros.kinematics.compiling import compile_line
 
 _WIDTH = 0.125
 """Width of the widest cells, in [rad] or lengths."""
@@ -70,10 +70,6 @@ class GridCell(NamedTuple):
 
     # For each input, and each from it on, the factors of the product of both.
     bends: tuple[tuple[float, ...], ...]
-
-    def predict(self, inputs: Sequence[float]) -> list[float]:
-        """Return the unknowns at inputs nearby."""
-        return _predict(self.numbers, inputs, len(self.unknowns))
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -150,6 +146,20 @@ class Grid:
         found = call(self, *inputs)
         return _predict(found, inputs, len(self._start.unknowns)) if has_result(found) else None
 
+    def predict(self, cell: GridCell, inputs: Sequence[float]) -> Sequence[float]:
+        """Return the unknowns at inputs near a cell."""
+        (unknowns,) = self._prediction(*inputs, *cell.numbers)
+        return tuple(unknowns)
+
+    @BuiltProperty
+    def _prediction(self) -> Callable[..., Any]:
+        count, unknowns = len(self._start.inputs), len(self._start.unknowns)
+
+        def compute(*numbers: Any) -> list[Any]:
+            return _predict(numbers[count:], numbers[:count], unknowns)
+
+        return compile_line(compute, [*self._start.inputs, *self._start.numbers])
+
     def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
         """Yield the corners of the cell about the pose, with the unknowns predicted there."""
         home = tuple(0 for _ in self._start.inputs)
@@ -159,7 +169,7 @@ class Grid:
             if cell is not None:
                 for corner in self._corners:
                     at = [c + part * width for c, part in zip(cell.inputs, corner, strict=True)]
-                    yield at, cell.predict(at)
+                    yield at, self.predict(cell, at)
                 return
 
     def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
@@ -231,7 +241,7 @@ class Grid:
         cell = GridCell(found.inputs, _round_binary(found.unknowns), *forms)
         for corner in self._corners:
             at = [c + part * width for c, part in zip(centre, corner, strict=True)]
-            if not self._group.proof(at, cell.predict(at)) <= _PROVEN:
+            if not self._group.proof(at, self.predict(cell, at)) <= _PROVEN:
                 return None
         return cell
 
@@ -240,9 +250,9 @@ class Grid:
         group = self._group
         for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
             at = _part_of_way(known.inputs, inputs, part)
-            if not group.proof(at, known.predict(at)) <= _PROVEN:
+            if not group.proof(at, self.predict(known, at)) <= _PROVEN:
                 return None
-        unknowns = group.solve_from(inputs, known.predict(inputs))
+        unknowns = group.solve_from(inputs, self.predict(known, inputs))
         forms = None if unknowns is None else group.forms_at(inputs, unknowns)
         if unknowns is None or forms is None:
             return None

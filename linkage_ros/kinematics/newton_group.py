@@ -229,7 +229,7 @@ class Iteration:
             traced = self._before.trace()
             if traced is None:
                 return {}
-            known, velocities, accelerations = traced[1]
+            known, velocities, accelerations = traced
             pose = LinkState(self._straight_solution(known)[:n], [])
             rates = LinkState(self._straight_rates(pose, known, velocities)[:n], [])
         except UndecidedError:

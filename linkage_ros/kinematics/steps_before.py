@@ -46,11 +46,11 @@ class StepsBefore:
         return known, speeds
 
     def changing_at(
-        self, inputs: Sequence[float], rates: Sequence[float]
+        self, inputs: Sequence[float], rates: Sequence[float], accelerations: Sequence[float]
     ) -> tuple[LinkState, LinkState, LinkState] | None:
-        """Return the state of their links, its rates and accelerations at constant rates."""
-        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
-        changes = LinkState([0.0] * len(known.coordinates), [])
+        """Return the state of their links, its rates and its accelerations, or None."""
+        states = tuple(LinkState([0.0, *each], []) for each in (inputs, rates, accelerations))
+        known, speeds, changes = states
         for step in self.steps:
             pose = step.close(known)
             if not pose.status.has_rates:
@@ -59,21 +59,11 @@ class StepsBefore:
             step.accelerations(pose, found, known, speeds, changes)
         return known, speeds, changes
 
-    def trace(self) -> tuple[Tape, list[LinkState]] | None:
-        """
-        Return their state at the pose, its rates and accelerations, as symbols of a tape.
+    def trace(self) -> tuple[LinkState, LinkState, LinkState] | None:
+        """Return the same at the pose, as symbols; None if they are at a toggle there."""
+        tape = Tape()
 
-        None if they are at a toggle there.
-        """
-        tape, states = Tape(), []
-        for name in 'qwa':
-            given: list[Any] = [tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs)]
-            states.append(LinkState([0.0, *given], []))
-        known, velocities, accelerations = states
-        for step in self.steps:
-            closed = step.close(known)
-            if not closed.status.has_rates:
-                return None
-            found: Any = step.rates(closed, known, velocities)
-            step.accelerations(closed, found, known, velocities, accelerations)
-        return tape, states
+        def add_inputs(name: str) -> list[Any]:
+            return [tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs)]
+
+        return self.changing_at(*map(add_inputs, 'qwa'))

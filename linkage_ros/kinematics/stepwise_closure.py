@@ -413,6 +413,10 @@ class StepwiseClosure:
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         raise NotImplementedError
 
+    def slide_reach(self, _number: int) -> tuple[float, float]:
+        """Return between which values an input that slides is worth a trial, in [m]."""
+        return -self.slide_bound, self.slide_bound
+
     def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
         """Return the ranges of the first input that a user expects."""
         return ranges

@@ -251,6 +251,12 @@ class SpaceClosure(StepwiseClosure):
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         return 4.0 * self.scale
 
+    def slide_reach(self, number: int) -> tuple[float, float]:
+        """Return between which values an input that slides is worth a trial, in [m]."""
+        at, some = self.linkage.pose.inputs[number], 0.125 * self.scale
+        several = len(self.linkage.inputs) > 1
+        return (at - some, at + some) if several else super().slide_reach(number)
+
     def links_of_group(self, number: int) -> list[str]:
         """Return the links of a group."""
         return list(self.groups[number].links)

@@ -21,10 +21,14 @@ from itertools import combinations, count
 from math import dist
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.errors import list_names
+from linkage_ros.kinematics.space.knot import Knot
+from linkage_ros.kinematics.space.knot_equations import KnotEquations, KnotRod, Mover, RodEnd
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
+    drop_rounding,
     GROUND_FRAME,
     length,
     minus,
@@ -33,6 +37,7 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
     ZERO,
 )
+from linkage_ros.kinematics.steps_before import StepsBefore
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.plan import SpacePlan
@@ -70,6 +75,44 @@ class KnotPlan(NamedTuple):
     links: dict[str, tuple[str, str]]
     unknown: tuple[str, ...]  # Names of the joints
     rods: tuple[PlannedRod, ...]
+
+
+def add_knot(plan: SpacePlan) -> bool:
+    """Add the smallest set of joints that closes as the next step; False if there is none."""
+    found = KnotPlanner(plan).find_knot()
+    if found is None:
+        return False
+    for rod in found.rods:
+        for end in (rod.start, rod.end):
+            if not end.link:
+                plan.point_index(end.point)
+    coordinates, first = len(plan.state.coordinates), plan.next_pin
+    movers: list[Mover] = []
+    for link, (name, on) in found.links.items():
+        joint, frame = plan.make_joint(name, on, link)
+        plan.frames[link], plan.pose_frames[link] = first + len(movers), frame
+        unknown = found.unknown.index(name) if name in found.unknown else -1
+        movers.append(Mover(joint, unknown, plan.coordinates.get(name, 0)))
+    for number, name in enumerate(found.unknown):
+        plan.coordinates[name] = coordinates + number
+
+    def make_end(end: PlannedEnd) -> RodEnd:
+        if not end.link:
+            return RodEnd(-1, plan.points[end.point], end.beside)
+        place = plus(plan.places[end.point], end.beside)
+        place = drop_rounding(plan.pose_frames[end.link].locate(place))
+        return RodEnd(list(found.links).index(end.link), plan.frames[end.link], place)
+
+    rods = [KnotRod(make_end(one), make_end(other), rod) for one, other, rod, _ in found.rods]
+    last = 1 + len(plan.linkage.driven)
+    before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
+    start = list(map(plan.pose_value, found.unknown))
+    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start))
+    by = list_names(dict.fromkeys(rod.by for rod in found.rods))
+    what = f'{len(rods)} equations for {list_names(found.unknown)}'
+    method = f"iterated: Newton's method, {what}: {by}"
+    plan.end_group('knot', tuple(found.links), method, 'as in the pose')
+    return True
 
 
 class KnotPlanner:

@@ -55,6 +55,7 @@ from linkage_ros.kinematics.space.steps import (
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
+    drop_rounding,
     GROUND_FRAME,
     length,
     minus,
@@ -74,9 +75,6 @@ _BETTER = 1e-6
 
 _SAME = 1e-9
 """Points of one link nearer to each other than this are one."""
-
-_CLEAN = 2.0**-50
-"""A component of a unit vector below this is rounding."""
 
 
 class SpaceGroup(NamedTuple):
@@ -115,10 +113,10 @@ class SpacePlan:
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
         self._collect_points()
-        self._state = LinkState([0.0, *map(self._value, linkage.driven)], [])
+        self.state = LinkState([0.0, *map(self.pose_value, linkage.driven)], [])
         """The pose as the steps so far find it."""
         self.frames[GROUND] = 0
-        self._add(GroundStep())
+        self.add_step(GroundStep())
         while self._find_next():
             pass
         unknown = self._unknown_links()
@@ -181,8 +179,8 @@ class SpacePlan:
         self.carriers[point].append(link)
         self.carried[link].append(point)
 
-    def _add(self, step: Any) -> None:
-        if not step.close(self._state).status.has_pose:
+    def add_step(self, step: Any) -> None:
+        if not step.close(self.state).status.has_pose:
             raise DefinitionError(
                 'points', 'the linkage is at a toggle in the pose', 'draw another pose'
             )
@@ -190,9 +188,9 @@ class SpacePlan:
         self.step_groups.append(len(self.groups))
 
     @property
-    def _next_pin(self) -> int:
+    def next_pin(self) -> int:
         """Return the index of the pin that the next step appends."""
-        return len(self._state.pins)
+        return len(self.state.pins)
 
     @property
     def rods(self) -> list[str]:
@@ -221,13 +219,13 @@ class SpacePlan:
         """Return whether a point is placed, or on a link that is."""
         return point in self.points or any(link in self.frames for link in self.carriers[point])
 
-    def _point_index(self, point: str) -> int:
+    def point_index(self, point: str) -> int:
         """Return the index of a known point; it is placed when first asked for."""
         if point not in self.points:
             link = next(link for link in self.carriers[point] if link in self.frames)
-            place = _clean(self.pose_frames[link].locate(self.places[point]))
-            self.points[point] = self._next_pin
-            self._add(CarriedPoint(self.frames[link], place, self._next_pin))
+            place = drop_rounding(self.pose_frames[link].locate(self.places[point]))
+            self.points[point] = self.next_pin
+            self.add_step(CarriedPoint(self.frames[link], place, self.next_pin))
         return self.points[point]
 
     def _find_next(self) -> bool:
@@ -242,6 +240,18 @@ class SpacePlan:
             or any(map(self._translate, self._unknown_links()))
             or self._tie()
         )
+
+    def _tie(self) -> bool:
+        """Solve the smallest set of joints that close together."""
+        joints = self.linkage.pair_joints.values()
+        held = {end for joint in joints for end in (joint.parent, joint.child)}
+        if held.isdisjoint(self._unknown_links()):
+            return False
+        from linkage_ros.kinematics.space.knot_plan import (
+            add_knot,  # local import: most linkages have none
+        )
+
+        return add_knot(self)
 
     # Joints
 
@@ -259,7 +269,7 @@ class SpacePlan:
         joint = self.linkage.pair_joints[name]
         return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
 
-    def _value(self, name: str) -> float:
+    def pose_value(self, name: str) -> float:
         """Return the value of a joint in the pose, in the unit of the steps."""
         value = self.linkage.pose_value(name)
         return value / self.scale if self._slides(name) else value
@@ -267,7 +277,7 @@ class SpacePlan:
     def _slides(self, name: str) -> bool:
         return name not in self.linkage.hinges
 
-    def _make_joint(
+    def make_joint(
         self, name: str, parent: str, child: str, toward: Vector | None = None
     ) -> tuple[LowerPair, SpaceFrame]:
         """Return a joint on a known link, and the frame of its child in the pose."""
@@ -284,32 +294,32 @@ class SpacePlan:
             x = max(ways, key=lambda way: dot(way, arm))
         # The seat does not turn with the joint: the child turns or moves from it by the value.
         kind = SlidePair if self._slides(name) else HingePair
-        origin = minus(at, scale(self._value(name), z)) if self._slides(name) else at
+        origin = minus(at, scale(self.pose_value(name), z)) if self._slides(name) else at
         base = SpaceFrame(x, cross(z, x), z, origin)
         on = self.pose_frames[parent]
-        x, y, z = (_clean(on.resolve(axis)) for axis in base[:3])
+        x, y, z = (drop_rounding(on.resolve(axis)) for axis in base[:3])
         seat = SpaceFrame(x, y, z, on.locate(base.origin))
         joint = kind(self.frames[parent], seat)
-        return joint, joint.child_frame(base, self._value(name))
+        return joint, joint.child_frame(base, self.pose_value(name))
 
     def _set_frame(self, link: str, frame: SpaceFrame) -> int:
         """Keep the frame of a link that the next step appends; return its index."""
-        self.frames[link], self.pose_frames[link] = self._next_pin, frame
-        return self._next_pin
+        self.frames[link], self.pose_frames[link] = self.next_pin, frame
+        return self.next_pin
 
     def _give(self, name: str) -> bool:
         """Place the link of a joint whose value is known."""
         ends = self._ends(name)
         if ends is None or name not in self.coordinates:
             return False
-        joint, frame = self._make_joint(name, *ends)
+        joint, frame = self.make_joint(name, *ends)
         index = self._set_frame(ends[1], frame)
-        self._add(GivenJoint(joint, self.coordinates[name], index))
+        self.add_step(GivenJoint(joint, self.coordinates[name], index))
         kind = 'input' if name in self.linkage.driven else 'joint'
-        self._end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
+        self.end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
         return True
 
-    def _end_group(
+    def end_group(
         self, kind: str, links: tuple[str, ...], method: str, assembly: str = ''
     ) -> None:
         self.groups.append(SpaceGroup(kind, links, method, assembly))
@@ -321,10 +331,10 @@ class SpacePlan:
             return False
         own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
         of = self.coordinates[ratio.of]
-        self.coordinates[name] = len(self._state.coordinates)
+        self.coordinates[name] = len(self.state.coordinates)
         factor, offset = ratio.ratio * other / own, ratio.offset / own
-        self._add(FollowerJoint(name, of, 0, 0.0, factor, offset))
-        self._end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
+        self.add_step(FollowerJoint(name, of, 0, 0.0, factor, offset))
+        self.end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
         return True
 
     def _aim(self, name: str) -> bool:
@@ -340,26 +350,26 @@ class SpacePlan:
                 continue
             if not slides and not length(arm):
                 continue
-            to = self._point_index(point)
-            joint, frame = self._make_joint(name, *ends, self.places[point])
+            to = self.point_index(point)
+            joint, frame = self.make_joint(name, *ends, self.places[point])
             place = frame.locate(self.places[point])
             index = self._set_frame(ends[1], frame)
-            self.coordinates[name] = len(self._state.coordinates)
+            self.coordinates[name] = len(self.state.coordinates)
             if isinstance(joint, HingePair):
-                x, y, _ = joint.base(self._state).locate(self.places[point])
+                x, y, _ = joint.base(self.state).locate(self.places[point])
                 direction = self._direction(place, atan2(y, x), name)
-                self._add(AimedHinge(joint, direction, to, index))
+                self.add_step(AimedHinge(joint, direction, to, index))
             else:
                 self._add_resolved((name,), ends[0], to, self.places[point])
-                self._add(GivenJoint(joint, self.coordinates[name], index))
-            self._end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
+                self.add_step(GivenJoint(joint, self.coordinates[name], index))
+            self.end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
             return True
         return False
 
     def _direction(self, place: Vector, found: float, name: str) -> float:
         """Return the direction of a place, with the turns of the pose; it gives `found` with 0."""
         direction = atan2(place[1], place[0])
-        return direction + tau * round((found - direction - self._value(name)) / tau)
+        return direction + tau * round((found - direction - self.pose_value(name)) / tau)
 
     def _distances(self, point: str) -> Iterator[_Pair]:
         """Yield the known points at known distances from a point."""
@@ -393,25 +403,25 @@ class SpacePlan:
         if choice is None:
             return False
         (point, known, bar, by), sign = choice
-        to = self._point_index(known)
-        joint, frame = self._make_joint(name, *ends, self.places[known])
-        place = _clean(frame.locate(self.places[point]))
+        to = self.point_index(known)
+        joint, frame = self.make_joint(name, *ends, self.places[known])
+        place = drop_rounding(frame.locate(self.places[point]))
         index = self._set_frame(ends[1], frame)
-        self.coordinates[name] = len(self._state.coordinates)
+        self.coordinates[name] = len(self.state.coordinates)
         if isinstance(joint, HingePair):
             radius = hypot(place[0], place[1])
             step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
             # Where 0 lies among the whole turns follows from the value in the pose.
-            trial = LinkState([*self._state.coordinates], [*self._state.pins])
+            trial = LinkState([*self.state.coordinates], [*self.state.pins])
             if step.close(trial).status.has_pose:
                 found = trial.coordinates[-1]
                 step = replace(step, direction=self._direction(place, found, name))
         else:
             step = ClosedSlide(joint, place, to, bar, sign, index)
-        self._add(step)
+        self.add_step(step)
         side = '+' if sign > 0.0 else '-'
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
-        self._end_group('closed', (ends[1],), method, f'{side}, as in the pose')
+        self.end_group('closed', (ends[1],), method, f'{side}, as in the pose')
         return True
 
     # Links and points
@@ -423,10 +433,10 @@ class SpacePlan:
             start, *ends = (self.places[name] for name in names)
             one, other = (minus(end, start) for end in ends)
             if length(cross(one, other)) > 1e-3 * length(one) * length(other):
-                indices = tuple(map(self._point_index, names))
+                indices = tuple(map(self.point_index, names))
                 index = self._set_frame(link, frame_of(start, one, other))
-                self._add(FramedLink((indices[0], indices[1], indices[2]), index))
-                self._end_group('framed', (link,), f'by points {list_names(names)}')
+                self.add_step(FramedLink((indices[0], indices[1], indices[2]), index))
+                self.end_group('framed', (link,), f'by points {list_names(names)}')
                 return True
         return False
 
@@ -455,20 +465,20 @@ class SpacePlan:
                 continue
             to = []
             for pair in three:
-                to.append(self._point_index(pair.known))
+                to.append(self.point_index(pair.known))
                 if shifts and length(shifts[pair][1]):
                     root, offset = shifts[pair]
-                    offset = _clean(self.pose_frames[root].resolve(offset))
-                    self._add(CarriedPoint(self.frames[root], offset, self._next_pin, to[-1]))
-                    to[-1] = self._next_pin - 1
+                    offset = drop_rounding(self.pose_frames[root].resolve(offset))
+                    self.add_step(CarriedPoint(self.frames[root], offset, self.next_pin, to[-1]))
+                    to[-1] = self.next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
-            self.points[point] = self._next_pin
+            self.points[point] = self.next_pin
             lengths = tuple(pair.rod for pair in three)
-            self._add(ThreeDistances(tuple(to), lengths, sign, self._next_pin))
+            self.add_step(ThreeDistances(tuple(to), lengths, sign, self.next_pin))
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'
-            self._end_group('three distances', (), method, f'{side}, as in the pose')
+            self.end_group('three distances', (), method, f'{side}, as in the pose')
             return True
         return False
 
@@ -516,62 +526,12 @@ class SpacePlan:
             axes.append(self._axis_to(name, link))
         start = place
         for name, axis in zip(names, axes, strict=True):
-            start = minus(start, scale(self._value(name), axis))
-        first = len(self._state.coordinates)
+            start = minus(start, scale(self.pose_value(name), axis))
+        first = len(self.state.coordinates)
         self.coordinates |= {name: first + number for number, name in enumerate(names)}
         duals = _dual_basis(axes)
-        directions = tuple(_clean(on.resolve(dual)) for dual in duals)
-        self._add(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
-
-    # What closes only together
-
-    def _tie(self) -> bool:
-        """Solve the smallest set of joints that close together."""
-        joints = self.linkage.pair_joints.values()
-        held = {end for joint in joints for end in (joint.parent, joint.child)}
-        if held.isdisjoint(self._unknown_links()):
-            return False
-        from linkage_ros.kinematics.space import (
-            knot,  # local import: most linkages have none
-            knot_plan,  # local import: likewise
-        )
-
-        found = knot_plan.KnotPlanner(self).find_knot()
-        if found is None:
-            return False
-        for rod in found.rods:
-            for end in (rod.start, rod.end):
-                if not end.link:
-                    self._point_index(end.point)
-        coordinates, first = len(self._state.coordinates), self._next_pin
-        movers: list[knot.Mover] = []
-        for link, (name, on) in found.links.items():
-            joint, frame = self._make_joint(name, on, link)
-            self.frames[link], self.pose_frames[link] = first + len(movers), frame
-            unknown = found.unknown.index(name) if name in found.unknown else -1
-            movers.append(knot.Mover(joint, unknown, self.coordinates.get(name, 0)))
-        for number, name in enumerate(found.unknown):
-            self.coordinates[name] = coordinates + number
-
-        def make_end(end: knot_plan.PlannedEnd) -> knot.RodEnd:
-            if not end.link:
-                return knot.RodEnd(-1, self.points[end.point], end.beside)
-            place = plus(self.places[end.point], end.beside)
-            place = _clean(self.pose_frames[end.link].locate(place))
-            return knot.RodEnd(list(found.links).index(end.link), self.frames[end.link], place)
-
-        rods = [
-            knot.KnotRod(make_end(one), make_end(other), rod) for one, other, rod, _ in found.rods
-        ]
-        known = LinkState([*self._state.coordinates], [*self._state.pins])
-        start = list(map(self._value, found.unknown))
-        driven = len(self.linkage.driven)
-        self._add(knot.Knot(movers, rods, tuple(self.steps), known, driven, start))
-        by = list_names(dict.fromkeys(rod.by for rod in found.rods))
-        what = f'{len(rods)} equations for {list_names(found.unknown)}'
-        method = f"iterated: Newton's method, {what}: {by}"
-        self._end_group('knot', tuple(found.links), method, 'as in the pose')
-        return True
+        directions = tuple(drop_rounding(on.resolve(dual)) for dual in duals)
+        self.add_step(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
 
     # What is published
 
@@ -589,10 +549,10 @@ class SpacePlan:
                 if not all(map(self.is_known, ends)):
                     self.lost.append(name)
                     continue
-                one, other = map(self._point_index, ends)
-                self.coordinates[name] = len(self._state.coordinates)
+                one, other = map(self.point_index, ends)
+                self.coordinates[name] = len(self.state.coordinates)
                 step = MeasuredStrut((one, other), self.coordinates[name])
-                self._add(step)
+                self.add_step(step)
             else:
                 joint = linkage.pair_joints[name]
                 if joint.parent not in self.frames or joint.child not in self.frames:
@@ -601,24 +561,24 @@ class SpacePlan:
                 if self._slides(name):
                     self._measure_slide(name, joint)
                 else:
-                    pair, frame = self._make_joint(name, joint.parent, joint.child)
+                    pair, frame = self.make_joint(name, joint.parent, joint.child)
                     assert isinstance(pair, HingePair)
                     # The x axis of the seat, turned with the child.
-                    mark = _clean(self.pose_frames[joint.child].resolve(frame.x))
-                    self.coordinates[name] = len(self._state.coordinates)
-                    self._add(MeasuredHinge(pair, mark, self.frames[joint.child]))
-            self._end_group('measured', (), name)
+                    mark = drop_rounding(self.pose_frames[joint.child].resolve(frame.x))
+                    self.coordinates[name] = len(self.state.coordinates)
+                    self.add_step(MeasuredHinge(pair, mark, self.frames[joint.child]))
+            self.end_group('measured', (), name)
         for point in linkage.traced:
             if self.is_known(self.same[point]):
-                self._point_index(self.same[point])
+                self.point_index(self.same[point])
         self.step_groups = [min(number, len(self.groups) - 1) for number in self.step_groups]
 
     def _measure_slide(self, name: str, joint: SpatialJoint) -> None:
         child = joint.child
         place = self.places[self.carried[child][0]] if self.carried[child] else ZERO
-        point = self._next_pin
+        point = self.next_pin
         local = self.pose_frames[child].locate(place)
-        self._add(CarriedPoint(self.frames[child], local, point))
+        self.add_step(CarriedPoint(self.frames[child], local, point))
         self._add_resolved((name,), joint.parent, point, place)
 
     @property
@@ -638,13 +598,7 @@ class SpacePlan:
 def _unit(vector: Vector) -> Vector:
     size = hypot(*vector)
     x, y, z = (one / size for one in vector)
-    return _clean((x, y, z))
-
-
-def _clean(vector: Vector) -> Vector:
-    """Return a vector without the components that are rounding, and with exact axes."""
-    x, y, z = (0.0 if abs(one) < _CLEAN else one for one in vector)
-    return x, y, z
+    return drop_rounding((x, y, z))
 
 
 def _across(axis: Vector) -> Vector:
@@ -661,6 +615,6 @@ def _dual_basis(axes: list[Vector]) -> list[Vector]:
     one, other, third = axes
     volume = dot(one, cross(other, third))
     return [
-        _clean(scale(1.0 / volume, cross(*two)))
+        drop_rounding(scale(1.0 / volume, cross(*two)))
         for two in ((other, third), (third, one), (one, other))
     ]
