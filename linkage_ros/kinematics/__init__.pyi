@@ -78,6 +78,7 @@ from linkage_ros.kinematics.grashof import (
     GRASHOF as GRASHOF,
     TRIPLE_ROCKERS as TRIPLE_ROCKERS,
 )
+from linkage_ros.kinematics.grid import Grid as Grid
 from linkage_ros.kinematics.inverse_closure import InverseClosure as InverseClosure
 from linkage_ros.kinematics.limits import Bound as Bound
 from linkage_ros.kinematics.link_frames import separate_blocks as separate_blocks

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice, product
-from math import ldexp
+from math import isfinite, ldexp, prod
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import call, has_result
@@ -85,7 +85,7 @@ class _Found(NamedTuple):
     numbers: tuple[float, ...] | None  # Of the cell: inputs, unknowns, slopes
 
 
-class GridGroup(Protocol):
+class GridFunctions(Protocol):
     """The equations of a group of links, at its inputs."""
 
     def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
@@ -103,18 +103,26 @@ class GridGroup(Protocol):
 
 
 class Grid:
-    """The cells of a group of links about a pose, whose inputs and unknowns are given."""
+    """
+    The cells of a group of links about a pose, whose inputs and unknowns are given.
+
+    ``limits`` are those of the inputs; infinite where there are none.
+    """
 
     def __init__(
-        self, group: GridGroup, inputs: Sequence[float], unknowns: Sequence[float]
+        self,
+        group: GridFunctions,
+        inputs: Sequence[float],
+        unknowns: Sequence[float],
+        limits: Sequence[tuple[float, float]],
     ) -> None:
-        self._group = group
+        self._group, self._limits = group, limits
         count = len(inputs)
         level = (0.0,) * len(unknowns)
         bends = (level,) * (count * (count + 1) // 2)
         self._start = GridCell(tuple(inputs), tuple(unknowns), (level,) * count, bends)
         self._kept: dict[tuple[int, Key], _Found] = {}
-        self._widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
+        self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
         if count > _MOST_CORNERED:
             axes = [
@@ -130,8 +138,8 @@ class Grid:
 
         This is what `find_start` calls in compiled code.
         """
-        home, kept = self._start.inputs, self._kept
-        for level, width in enumerate(self._widths):
+        home, kept = self.home, self._kept
+        for level, width in enumerate(self.widths):
             key = tuple([round((x - at) / width) for x, at in zip(inputs, home, strict=True)])
             found = kept.get((level, key))
             if found is None:
@@ -146,6 +154,55 @@ class Grid:
         found = call(self, *inputs)
         return _predict(found, inputs, len(self._start.unknowns)) if has_result(found) else None
 
+    @property
+    def home(self) -> tuple[float, ...]:
+        """Return the inputs of the pose, at the centre of the first cell."""
+        return self._start.inputs
+
+    def fill(self) -> dict[Key, tuple[float, ...]] | None:
+        """
+        Make all cells within the limits of the inputs; return their numbers by level and place.
+
+        None where an input has no limits, or where these are more cells than are kept.
+        """
+        cells: dict[Key, tuple[float, ...]] = {}
+        if not all(map(isfinite, chain(*self._limits))):
+            return None
+        waiting = [(0, self._keys_between(0, self._limits))]
+        while waiting:
+            level, keys = waiting.pop()
+            if len(cells) + prod(map(len, keys)) > _KEPT:
+                return None
+            for key in product(*keys):
+                if (level, *key) in cells:
+                    continue
+                with BUILD_LOCK:
+                    numbers = self._follow(level, key).numbers
+                if numbers is not None:
+                    cells[(level, *key)] = numbers
+                elif level + 1 < _LEVELS:
+                    half = 0.5 * self.widths[level]
+                    within = [
+                        (max(low, x - half), min(high, x + half))
+                        for x, (low, high) in zip(
+                            self._centre(level, key), self._limits, strict=True
+                        )
+                    ]
+                    waiting.append((level + 1, self._keys_between(level + 1, within)))
+        return cells
+
+    def _keys_between(self, level: int, limits: Sequence[tuple[float, float]]) -> list[range]:
+        """Return for each input the places of the cells between two values."""
+        width = self.widths[level]
+        return [
+            range(*(round((end - at) / width) + k for k, end in enumerate(ends)))
+            for at, ends in zip(self.home, limits, strict=True)
+        ]
+
+    def _centre(self, level: int, key: Key) -> list[float]:
+        width = self.widths[level]
+        return [at + k * width for at, k in zip(self.home, key, strict=True)]
+
     def predict(self, cell: GridCell, inputs: Sequence[float]) -> Sequence[float]:
         """Return the unknowns at inputs near a cell."""
         (unknowns,) = self._prediction(*inputs, *cell.numbers)
@@ -153,17 +210,17 @@ class Grid:
 
     @BuiltProperty
     def _prediction(self) -> Callable[..., Any]:
-        count, unknowns = len(self._start.inputs), len(self._start.unknowns)
+        count, unknowns = len(self.home), len(self._start.unknowns)
 
         def compute(*numbers: Any) -> list[Any]:
             return _predict(numbers[count:], numbers[:count], unknowns)
 
-        return compile_line(compute, [*self._start.inputs, *self._start.numbers])
+        return compile_line(compute, [*self.home, *self._start.numbers])
 
     def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
         """Yield the corners of the cell about the pose, with the unknowns predicted there."""
-        home = tuple(0 for _ in self._start.inputs)
-        for level, width in enumerate(self._widths):
+        home = tuple(0 for _ in self.home)
+        for level, width in enumerate(self.widths):
             with BUILD_LOCK:
                 cell = self._follow(level, home).cell
             if cell is not None:
@@ -179,7 +236,7 @@ class Grid:
         Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
         them.
         """
-        home, width = self._start.inputs, self._widths[-1]
+        home, width = self.home, self.widths[-1]
         key = tuple(round((x - at) / width) for x, at in zip(inputs, home, strict=True))
         with BUILD_LOCK:
             begin = cell = self._follow(_LEVELS - 1, key).last
@@ -231,8 +288,7 @@ class Grid:
 
     def _make_cell(self, level: int, key: Key, known: GridCell) -> GridCell | None:
         """Return a cell, if it is proven from a known one."""
-        width = self._widths[level]
-        centre = [at + k * width for at, k in zip(self._start.inputs, key, strict=True)]
+        width, centre = self.widths[level], self._centre(level, key)
         found = self._step_to(known, centre)
         if found is None:
             return None

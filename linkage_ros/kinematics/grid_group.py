@@ -72,9 +72,20 @@ class Equations(Protocol):
 
 
 class GridGroup:
-    """Equations after the steps ``before``; ``start`` has the unknowns in the pose."""
+    """
+    Equations after the steps ``before``.
 
-    def __init__(self, equations: Equations, before: StepsBefore, start: Sequence[float]) -> None:
+    ``start`` has the unknowns in the pose, ``limits`` are those of all inputs, as coordinates.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        before: StepsBefore,
+        start: Sequence[float],
+        limits: Sequence[tuple[float, float]],
+    ) -> None:
+        self._limits = limits
         self._equations, self._before, self._start = equations, before, tuple(start)
         given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
 
@@ -114,7 +125,9 @@ class GridGroup:
     @BuiltProperty
     def grid(self) -> Grid:
         """Return the cells from which the equations are solved."""
-        return Grid(self, [self._before.inputs[k] for k in self.inputs], self._start)
+        home = [self._before.inputs[k] for k in self.inputs]
+        limits = [self._limits[k] for k in self.inputs]
+        return Grid(self, home, self._start, limits)
 
     @BuiltProperty
     def _step_count(self) -> int:

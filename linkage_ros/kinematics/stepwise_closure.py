@@ -41,7 +41,11 @@ from linkage_ros.kinematics.step import LinkState, Step, StepPose
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array, Batch
     from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
+    from linkage_ros.kinematics.grid import Grid
     from numpy.typing import ArrayLike
+
+_FILLED = 2
+"""Inputs that cells within limits are made of before the first state."""
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -310,6 +314,9 @@ class StepwiseClosure:
             for compiled in self._compiled:
                 if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
                     return compiled
+            for grid in self.grids:
+                if len(grid.home) <= _FILLED:
+                    grid.fill()
             compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
             self._compiled.append(compiled)
             return compiled
@@ -412,6 +419,12 @@ class StepwiseClosure:
     def slide_bound(self) -> float:
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         raise NotImplementedError
+
+    @property
+    def grids(self) -> list[Grid]:
+        """Return the cells of links that close only together, by several inputs."""
+        steps: Sequence[Any] = self.steps
+        return [step.grid for step in steps if hasattr(type(step), 'grid')]
 
     def slide_reach(self, _number: int) -> tuple[float, float]:
         """Return between which values an input that slides is worth a trial, in [m]."""

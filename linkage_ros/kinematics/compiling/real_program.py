@@ -283,14 +283,11 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     velocities, 2 with accelerations. A DefinitionError says that links are iterated with several
     inputs, or that no closed state is found.
     """
-    # A table of starts can be written, a grid of cells cannot.
-    on_grid = any(hasattr(type(step), 'grid') for step in closure.steps)
-    if on_grid or (is_iterated(closure) and len(closure.linkage.inputs) > 1):
+    if is_iterated(closure) and len(closure.linkage.inputs) > 1 and not closure.grids:
         raise DefinitionError(
             'links',
-            f'some are iterated {"in space" if on_grid else "with several inputs"}, which cannot '
-            'be compiled',
-            'compile a linkage whose joints close one after the other',
+            'some are iterated with several inputs, which cannot be compiled',
+            'compile a linkage with one input, or of dyads',
         )
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths
     if not paths:

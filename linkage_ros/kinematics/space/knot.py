@@ -59,9 +59,10 @@ class Knot:
         equations: KnotEquations,
         before: StepsBefore,
         start: Sequence[float],
+        limits: Sequence[tuple[float, float]],
     ) -> None:
         self._equations, self._start = equations, tuple(start)
-        self._group = GridGroup(equations, before, start)
+        self._group = GridGroup(equations, before, start, limits)
 
     @property
     def equation_count(self) -> int:

@@ -100,7 +100,7 @@ class KnotEquations:
             subtract(rod.rod.power(state, velocities), dot(vector, slip))
             for rod, vector, slip in self._slips(state, still)
         ]
-        return self.linearize(known, unknowns)[1].solve(right)
+        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
 
     def solve_accelerations(
         self,
@@ -124,7 +124,7 @@ class KnotEquations:
             )
             bend = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
             right.append(subtract(bend, dot(vector, minus(other, one))))
-        return self.linearize(known, unknowns)[1].solve(right)
+        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
 
     def place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
         """Return the state with the frames of the links."""
@@ -182,7 +182,11 @@ class KnotEquations:
     ) -> tuple[list[float], Elimination]:
         """Return the residuals, and the matrix of their derivatives; see `Equations`."""
         errors, rows = self.evaluate(known, unknowns)
-        return errors, eliminate(rows)
+        matrix = Elimination(rows, ())
+        divisors = matrix.divisors
+        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+            raise UndecidedError
+        return errors, matrix
 
     def evaluate(
         self, known: LinkState, unknowns: Sequence[float]
@@ -265,12 +269,3 @@ class KnotEquations:
                 aligned_pair = max(one, other), min(one, other)
                 bound(one, other, move * more * aligned.get(aligned_pair, 1.0))
         return [*bounds.values()]
-
-
-def eliminate(rows: Sequence[Sequence[float]]) -> Elimination:
-    """Return a matrix, eliminated; UndecidedError is raised if it is singular."""
-    eliminated = Elimination(rows, ())
-    divisors = eliminated.divisors
-    if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
-        raise UndecidedError
-    return eliminated

@@ -107,7 +107,12 @@ def add_knot(plan: SpacePlan) -> bool:
     last = 1 + len(plan.linkage.driven)
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
-    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start))
+    units = [plan.scale if given.slider else 1.0 for given in plan.linkage.inputs]
+    limits = [
+        (given.limits.low / unit, given.limits.high / unit)
+        for given, unit in zip(plan.linkage.inputs, units, strict=True)
+    ]
+    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, limits))
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))
     what = f'{len(rods)} equations for {list_names(found.unknown)}'
     method = f"iterated: Newton's method, {what}: {by}"

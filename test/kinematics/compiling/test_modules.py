@@ -14,9 +14,11 @@ import json
 import math
 from math import ulp
 from pathlib import Path
+from random import Random
 import subprocess
 from typing import Any
 
+import linkage_ros as lr
 from linkage_ros.tools.models.source_code import (
     FUNCTIONS,
     JavaScript,
@@ -62,6 +64,32 @@ def test_python_has_the_bits_of_the_steps(name):
     solve = python_of(subject(closure))['motion']
     for state in states(closure, COUNT, name):
         assert told_by(solve, state) == plain(closure, state), state
+
+
+def test_python_has_the_cells_of_a_knot():
+    closure, random = closure_of('ankle_motors'), Random(1)
+    solve = python_of(subject(closure))['motion']
+    for _ in range(300):
+        reaches = (0.6, 0.6, 3.0, 3.0, 9.0, 9.0)
+        state = tuple(random.uniform(-reach, reach) for reach in reaches)
+        told = told_by(solve, state)
+        assert told == plain(closure, state), state
+        assert told.status == 'CLOSED'
+    for beyond in (0.65, 3.0):
+        state = (beyond, 0.1, 1.0, 1.0, 1.0, 1.0)
+        assert told_by(solve, state).status in ('LIMITED', 'UNDECIDED')
+
+
+@pytest.mark.parametrize(
+    ('name', 'language', 'told'),
+    [
+        ('ankle_motors', JavaScript(), 'close only together, by 2 inputs; .* x.py'),
+        ('hexapod', PythonModule(2), '6 inputs .* too many cells; give these inputs limits'),
+    ],
+)
+def test_what_has_no_cells_is_not_written(name, language, told):
+    with pytest.raises(lr.DefinitionError, match=told):
+        write_source(subject(closure_of(name)), language)
 
 
 def test_python_needs_nothing_but_math():

@@ -11,10 +11,9 @@ from math import dist, remainder, tau
 from pathlib import Path
 from random import Random
 
-import linkage_ros as lr
 from linkage_ros.description import load
 from linkage_ros.kinematics import Status
-from linkage_ros.kinematics.compiling import compile_program, Compiled
+from linkage_ros.kinematics.compiling import Compiled
 import numpy as np
 import pytest
 
@@ -75,6 +74,16 @@ def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypat
     monkeypatch.setattr(grid, '_KEPT', 4)
     few = closure_of('ankle_motors')
     assert [few.position(*inputs).joints for inputs in states] == expected
+
+
+def test_the_cells_within_limits_are_those_that_states_meet():
+    one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
+    (grid,), (met,) = one.grids, other.grids
+    cells = grid.fill()
+    assert {key[0] for key in cells} == {0}
+    for inputs in random_inputs(other, 300, 0.6):
+        assert met(*inputs) in cells.values()
+    assert closure_of('hexapod').grids[0].fill() is None
 
 
 def test_a_state_is_where_a_walk_from_the_pose_ends():
@@ -145,11 +154,6 @@ def test_a_knot_is_named_and_its_equations_counted():
         (('cross', 'foot'), 'as in the pose')
     ]
     assert '2 equations for pitch, roll' in groups[0].method
-
-
-def test_a_knot_is_not_written_in_c():
-    with pytest.raises(lr.DefinitionError, match='iterated in space'):
-        compile_program(closure_of('ankle_motors'), 0, lambda motion: [motion.position.joints])
 
 
 def test_a_knot_follows_closed_steps_and_others_follow_it():
