@@ -23,13 +23,15 @@ from typing import Any, Protocol, TypeVar
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.compiling import Tape
-from linkage_ros.kinematics.elimination import Elimination, subtract
+from linkage_ros.kinematics.elimination import subtract
 from linkage_ros.kinematics.grid import Grid
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.steps_before import StepsBefore
 from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
 
 T = TypeVar('T')
+Solve = Callable[[Sequence[Any]], list[Any]]
 
 _SECOND = 8.0
 """How often the next step at most is in the unit of an unknown."""
@@ -40,6 +42,12 @@ _LAST_STEP = 2.0**-36
 _LEAST_STEP = 2.0**-20
 """The same of a solution next to a singularity, where the rounding is greater."""
 
+_SINGULAR = 1e-11
+"""Least ratio of smallest to largest singular value at which rates exist."""
+
+_TOGGLE = 2.0**-43
+"""How far a toggle may be from where the way to its inputs ends, relative to their size."""
+
 _HALFWAY, _MOST_STEPS = 2.0**-21, 6
 """Sum of the last changes but one, whose square is a rounding; and most steps of the method."""
 
@@ -47,10 +55,12 @@ _HALFWAY, _MOST_STEPS = 2.0**-21, 6
 class Equations(Protocol):
     """As many equations as unknowns, for numbers and symbols; ``known`` has the steps before."""
 
-    def linearize(
-        self, known: LinkState, unknowns: Sequence[Any]
-    ) -> tuple[list[Any], Elimination]:
-        """Return the errors, and the matrix of their derivatives; UndecidedError if singular."""
+    def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """
+        Return the errors, and a function that solves with the matrix of their derivatives.
+
+        An UndecidedError is raised if that is singular.
+        """
 
     def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
         """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
@@ -195,14 +205,34 @@ class GridGroup:
             raise UndecidedError
         step: Sequence[Any] = ()
         for _ in range(self._step_count):
-            errors, matrix = self._equations.linearize(known, values)
-            step = matrix.solve(errors)
+            errors, solve = self._equations.linearize(known, values)
+            step = solve(errors)
             values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
         errors, _ = self._equations.linearize(known, values)
-        step = matrix.solve(errors)
+        step = solve(errors)
         if not sum(map(abs, step[1:]), abs(step[0])) <= _LAST_STEP:
             raise UndecidedError
         return [subtract(value, change) for value, change in zip(values, step, strict=True)]
+
+    def close_slowly(
+        self, solved: LinkState, conditioning: Callable[[Sequence[float]], float]
+    ) -> tuple[Status, Sequence[float]]:
+        """
+        Return status and unknowns where no straight line leads to them, as next to a singularity.
+
+        If they are open, the unknowns are where the way to the inputs ends. ``conditioning`` is
+        that of the equations at unknowns.
+        """
+        inputs = [solved.coordinates[1 + k] for k in self.inputs]
+        start = self.grid.find_start(inputs)
+        if start is not None and (found := self.solve_from(inputs, start)) is not None:
+            return Status.CLOSED, found
+        cell, left = self.grid.reach(inputs)
+        if not left:
+            regular = conditioning(cell.unknowns) > _SINGULAR
+            return (Status.CLOSED if regular else Status.TOGGLE), cell.unknowns
+        near = left <= _TOGGLE * (1.0 + max(map(abs, inputs)))
+        return (Status.TOGGLE if near else Status.OPEN), cell.unknowns
 
     # What the grid asks for; inputs on which nothing depends are as in the pose
 
@@ -274,10 +304,10 @@ class GridGroup:
     def _list_system(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return a step of Newton's method, the inverse by columns, and bounds by equations."""
         known, count = _decided(self._before.known_at(given.coordinates)), len(pose.coordinates)
-        errors, matrix = self._equations.linearize(known, pose.coordinates)
-        found = matrix.solve(errors)
+        errors, solve = self._equations.linearize(known, pose.coordinates)
+        found = solve(errors)
         for k in range(count):
-            found += matrix.solve([float(i == k) for i in range(count)])
+            found += solve([float(i == k) for i in range(count)])
         for k in range(count):
             found += self._equations.bound_bends(k, known, pose.coordinates)
         return found

@@ -28,12 +28,6 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.steps_before import StepsBefore
 
-_SINGULAR = 1e-11
-"""Least ratio of smallest to largest singular value at which rates exist."""
-
-_TOGGLE = 2.0**-43
-"""How far a toggle may be from where the way to its inputs ends, relative to their size."""
-
 _MOVED = 2.0**-20
 """A gap that shrinks to less, relative to itself, is closed by another assembly."""
 
@@ -126,28 +120,23 @@ class Knot:
         from linkage_ros.kinematics.descent import descend  # local import: it loads numpy
         import numpy as np  # local import: few states need it
 
-        inputs = [solved.coordinates[1 + k] for k in self.inputs]
-        start = self.grid.find_start(inputs)
-        if start is not None and (found := self._group.solve_from(inputs, start)) is not None:
-            return self._append(Status.CLOSED, solved, found)
-        cell, left = self.grid.reach(inputs)
-        if not left:
-            status = Status.CLOSED
-            if self._conditioning_at(solved, cell.unknowns) <= _SINGULAR:
-                status = Status.TOGGLE
-            return self._append(status, solved, cell.unknowns)
+        status, found = self._group.close_slowly(
+            solved, lambda unknowns: self._conditioning_at(solved, unknowns)
+        )
+        if status is Status.CLOSED:
+            return self._append(status, solved, found)
         sizes = np.array([rod.rod.length(solved) for rod in self._equations.rods])
 
         def system(unknowns: Any) -> Any:
             errors, rows = self._equations.evaluate(solved, unknowns.tolist())
             return np.array(errors) / sizes, np.array(rows) / sizes[:, None]
 
-        begin = np.array(cell.unknowns)
+        begin = np.array(found)
         first = float(np.abs(system(begin)[0]).max())
         unknowns, gap = descend(system, begin)
-        if left <= _TOGGLE * (1.0 + max(map(abs, inputs))):
-            return self._append(Status.TOGGLE, solved, unknowns.tolist())
-        return KnotPose(Status.OPEN, gap if gap > _MOVED * first else first, cell.unknowns, solved)
+        if status is Status.TOGGLE:
+            return self._append(status, solved, unknowns.tolist())
+        return KnotPose(status, gap if gap > _MOVED * first else first, found, solved)
 
     def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
         from linkage_ros.kinematics.descent import (

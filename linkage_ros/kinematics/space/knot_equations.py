@@ -22,6 +22,7 @@ from typing import NamedTuple
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.elimination import Elimination
+from linkage_ros.kinematics.grid_group import Solve
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (
@@ -177,16 +178,14 @@ class KnotEquations:
             vector = minus(rod.end.locate(state), rod.start.locate(state))
             yield rod, vector, minus(other, one)
 
-    def linearize(
-        self, known: LinkState, unknowns: Sequence[float]
-    ) -> tuple[list[float], Elimination]:
-        """Return the residuals, and the matrix of their derivatives; see `Equations`."""
+    def linearize(self, known: LinkState, unknowns: Sequence[float]) -> tuple[list[float], Solve]:
+        """Return the residuals, and a function that solves with their derivatives."""
         errors, rows = self.evaluate(known, unknowns)
         matrix = Elimination(rows, ())
         divisors = matrix.divisors
         if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
             raise UndecidedError
-        return errors, matrix
+        return errors, matrix.solve
 
     def evaluate(
         self, known: LinkState, unknowns: Sequence[float]
