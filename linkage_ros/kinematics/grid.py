@@ -120,7 +120,7 @@ class Grid:
         count = len(inputs)
         level = (0.0,) * len(unknowns)
         bends = (level,) * (count * (count + 1) // 2)
-        self._start = GridCell(tuple(inputs), tuple(unknowns), (level,) * count, bends)
+        self._given = GridCell(tuple(inputs), tuple(unknowns), (level,) * count, bends)
         self._kept: dict[tuple[int, Key], _Found] = {}
         self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
@@ -152,12 +152,12 @@ class Grid:
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
         found = call(self, *inputs)
-        return _predict(found, inputs, len(self._start.unknowns)) if has_result(found) else None
+        return _predict(found, inputs, len(self._given.unknowns)) if has_result(found) else None
 
     @property
     def home(self) -> tuple[float, ...]:
         """Return the inputs of the pose, at the centre of the first cell."""
-        return self._start.inputs
+        return self._given.inputs
 
     def fill(self) -> dict[Key, tuple[float, ...]] | None:
         """
@@ -210,12 +210,17 @@ class Grid:
 
     @BuiltProperty
     def _prediction(self) -> Callable[..., Any]:
-        count, unknowns = len(self.home), len(self._start.unknowns)
+        count, unknowns = len(self.home), len(self._given.unknowns)
 
         def compute(*numbers: Any) -> list[Any]:
             return _predict(numbers[count:], numbers[:count], unknowns)
 
-        return compile_line(compute, [*self.home, *self._start.numbers])
+        return compile_line(compute, [*self.home, *self._given.numbers])
+
+    @BuiltProperty
+    def _start(self) -> GridCell:
+        """Return the solution in the pose, with its forms."""
+        return self._step_to(self._given, self.home) or self._given
 
     def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
         """Yield the corners of the cell about the pose, with the unknowns predicted there."""
@@ -231,25 +236,27 @@ class Grid:
 
     def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
         """
-        Follow the straight line from the last cell to inputs, in proven steps.
+        Follow the straight line from the last cell to inputs, in proven steps; or from the pose.
 
         Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
         them.
         """
-        home, width = self.home, self.widths[-1]
-        key = tuple(round((x - at) / width) for x, at in zip(inputs, home, strict=True))
+        width = self.widths[-1]
+        key = tuple(round((x - at) / width) for x, at in zip(inputs, self.home, strict=True))
         with BUILD_LOCK:
-            begin = cell = self._follow(_LEVELS - 1, key).last
-            done, step = 0.0, 1.0
-            while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
-                part = min(1.0, done + step)
-                found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
-                if found is None:
-                    step *= 0.5
-                else:
-                    cell, done, step = found, part, 2.0 * step
-        if done == 1.0:
-            return cell, 0.0
+            begins = self._follow(_LEVELS - 1, key).last, self._start
+            ends = (self._follow_line(begin, inputs) for begin in begins)
+            return min(ends, key=lambda end: end[1])
+
+    def _follow_line(self, begin: GridCell, inputs: Sequence[float]) -> tuple[GridCell, float]:
+        cell, done, step = begin, 0.0, 1.0
+        while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
+            part = min(1.0, done + step)
+            found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
+            if found is None:
+                step *= 0.5
+            else:
+                cell, done, step = found, part, 2.0 * step
         return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
 
     def _follow(self, level: int, key: Key) -> _Found:

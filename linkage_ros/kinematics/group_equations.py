@@ -85,15 +85,6 @@ class GroupEquations:
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
-    def correct(self, unknowns: Sequence[Any], solved: LinkState) -> tuple[list[Any], list[Any]]:
-        """Return what Newton's method subtracts from the free unknowns, and its divisors."""
-        errors, jacobian = evaluate_constraints(self._constraints, unknowns, solved)
-        eliminated = Elimination(jacobian, self._unit_pivots)
-        # The places were computed from the pins, which are closed.
-        right = [0.0 if row in self._rows_of_pins else e for row, e in enumerate(errors)]
-        step = eliminated.solve(right)
-        return [step[k] for k in self.free], eliminated.divisors
-
     # The equations that close loops, as functions of the free unknowns; see `GridGroup`
 
     def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:

@@ -423,8 +423,8 @@ class StepwiseClosure:
     @property
     def grids(self) -> list[Grid]:
         """Return the cells of links that close only together, by several inputs."""
-        steps: Sequence[Any] = self.steps
-        return [step.grid for step in steps if hasattr(type(step), 'grid')]
+        found = (getattr(step, 'grid', None) for step in self.steps)
+        return [grid for grid in found if grid is not None]
 
     def slide_reach(self, _number: int) -> tuple[float, float]:
         """Return between which values an input that slides is worth a trial, in [m]."""
