@@ -24,12 +24,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice, product
-from math import isfinite, ldexp, prod
+from math import isfinite, ldexp, prod, tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import call, has_result
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.compiling import compile_line
+from linkage_ros.kinematics.linkage import Input
 
 _WIDTH = 0.125
 """Width of the widest cells, in [rad] or lengths."""
@@ -52,6 +53,9 @@ _MOST_CORNERED = 3
 _DIGITS = 28
 """Binary digits after the point of the numbers of a cell: a start needs no more."""
 
+_RETURNED = 1e-9
+"""Farthest from the pose, apart from whole turns, that links are back."""
+
 _SHORTEST = 2.0**-50
 """Shortest step beyond the cells, as a part of the way."""
 
@@ -59,6 +63,27 @@ _HOPELESS = 2.0**-12
 """The same, as a part of what is left: a way that needs shorter ones ends before the inputs."""
 
 Key = tuple[int, ...]
+
+
+class GridInput(NamedTuple):
+    """An input: its value in the pose, its limits, and whether it turns without any."""
+
+    home: float
+    low: float
+    high: float
+    turns: bool
+
+
+def grid_inputs(
+    inputs: Sequence[Input], pose: Sequence[float], scale: float
+) -> tuple[GridInput, ...]:
+    """Return the inputs of a linkage as coordinates; lengths are in units of ``scale`` metres."""
+    found = []
+    for given, home in zip(inputs, pose, strict=True):
+        unit, limits = scale if given.slider else 1.0, given.limits
+        turns = not given.slider and not limits.is_bounded
+        found.append(GridInput(home, limits.low / unit, limits.high / unit, turns))
+    return tuple(found)
 
 
 class GridCell(NamedTuple):
@@ -103,24 +128,18 @@ class GridFunctions(Protocol):
 
 
 class Grid:
-    """
-    The cells of a group of links about a pose, whose inputs and unknowns are given.
-
-    ``limits`` are those of the inputs; infinite where there are none.
-    """
+    """The cells of a group of links about a pose, whose unknowns are given."""
 
     def __init__(
-        self,
-        group: GridFunctions,
-        inputs: Sequence[float],
-        unknowns: Sequence[float],
-        limits: Sequence[tuple[float, float]],
+        self, group: GridFunctions, inputs: Sequence[GridInput], unknowns: Sequence[float]
     ) -> None:
-        self._group, self._limits = group, limits
+        self._group, self._inputs = group, inputs
         count = len(inputs)
         level = (0.0,) * len(unknowns)
         bends = (level,) * (count * (count + 1) // 2)
-        self._given = GridCell(tuple(inputs), tuple(unknowns), (level,) * count, bends)
+        self.home = tuple(given.home for given in inputs)
+        """The inputs of the pose, at the centre of the first cell."""
+        self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
         self._kept: dict[tuple[int, Key], _Found] = {}
         self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
@@ -151,13 +170,42 @@ class Grid:
 
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
-        found = call(self, *inputs)
-        return _predict(found, inputs, len(self._given.unknowns)) if has_result(found) else None
+        turned, gains = self.turn_back(inputs)
+        found = call(self, *turned)
+        if not has_result(found):
+            return None
+        values = _predict(found, turned, len(self._given.unknowns))
+        return [value + gain if gain else value for value, gain in zip(values, gains, strict=True)]
 
-    @property
-    def home(self) -> tuple[float, ...]:
-        """Return the inputs of the pose, at the centre of the first cell."""
-        return self._given.inputs
+    def turn_back(self, inputs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+        """
+        Return the inputs within half a turn of the pose, and what the unknowns gain by the turns.
+
+        Only inputs are turned after a turn of which the links are back.
+        """
+        turned, gains = [*inputs], [0.0] * len(self._given.unknowns)
+        for k, gained in enumerate(self._gained_in_turns):
+            if gained is not None:
+                turns = round((inputs[k] - self.home[k]) / tau)
+                turned[k] = inputs[k] - tau * turns
+                gains = [
+                    gain + by * turns if by else gain
+                    for gain, by in zip(gains, gained, strict=True)
+                ]
+        return turned, gains
+
+    @BuiltProperty
+    def _gained_in_turns(self) -> list[tuple[float, ...] | None]:
+        """Return for each input what the unknowns gain in a turn; None if it does not return."""
+        found: list[tuple[float, ...] | None] = []
+        for k, given in enumerate(self._inputs):
+            later = tuple(x + tau * (i == k) for i, x in enumerate(self.home))
+            cell, left = self.reach(later) if given.turns else (self._start, 1.0)
+            moved = [b - a for a, b in zip(self._start.unknowns, cell.unknowns, strict=True)]
+            gained = tuple(tau * round(each / tau) for each in moved)
+            returns = all(abs(a - b) < _RETURNED for a, b in zip(moved, gained, strict=True))
+            found.append(gained if returns and not left else None)
+        return found
 
     def fill(self) -> dict[Key, tuple[float, ...]] | None:
         """
@@ -166,9 +214,10 @@ class Grid:
         None where an input has no limits, or where these are more cells than are kept.
         """
         cells: dict[Key, tuple[float, ...]] = {}
-        if not all(map(isfinite, chain(*self._limits))):
+        limits = [(given.low, given.high) for given in self._inputs]
+        if not all(map(isfinite, chain(*limits))):
             return None
-        waiting = [(0, self._keys_between(0, self._limits))]
+        waiting = [(0, self._keys_between(0, limits))]
         while waiting:
             level, keys = waiting.pop()
             if len(cells) + prod(map(len, keys)) > _KEPT:
@@ -184,9 +233,7 @@ class Grid:
                     half = 0.5 * self.widths[level]
                     within = [
                         (max(low, x - half), min(high, x + half))
-                        for x, (low, high) in zip(
-                            self._centre(level, key), self._limits, strict=True
-                        )
+                        for x, (low, high) in zip(self._centre(level, key), limits, strict=True)
                     ]
                     waiting.append((level + 1, self._keys_between(level + 1, within)))
         return cells

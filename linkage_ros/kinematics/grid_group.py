@@ -24,7 +24,7 @@ from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.elimination import subtract
-from linkage_ros.kinematics.grid import Grid
+from linkage_ros.kinematics.grid import Grid, GridInput
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.steps_before import StepsBefore
@@ -85,7 +85,7 @@ class GridGroup:
     """
     Equations after the steps ``before``.
 
-    ``start`` has the unknowns in the pose, ``limits`` are those of all inputs, as coordinates.
+    ``start`` has the unknowns in the pose, ``given_inputs`` are all inputs.
     """
 
     def __init__(
@@ -93,9 +93,9 @@ class GridGroup:
         equations: Equations,
         before: StepsBefore,
         start: Sequence[float],
-        limits: Sequence[tuple[float, float]],
+        given_inputs: Sequence[GridInput],
     ) -> None:
-        self._limits = limits
+        self._given_inputs = given_inputs
         self._equations, self._before, self._start = equations, before, tuple(start)
         given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
 
@@ -135,9 +135,7 @@ class GridGroup:
     @BuiltProperty
     def grid(self) -> Grid:
         """Return the cells from which the equations are solved."""
-        home = [self._before.inputs[k] for k in self.inputs]
-        limits = [self._limits[k] for k in self.inputs]
-        return Grid(self, home, self._start, limits)
+        return Grid(self, [self._given_inputs[k] for k in self.inputs], self._start)
 
     @BuiltProperty
     def _step_count(self) -> int:
@@ -227,12 +225,14 @@ class GridGroup:
         start = self.grid.find_start(inputs)
         if start is not None and (found := self.solve_from(inputs, start)) is not None:
             return Status.CLOSED, found
-        cell, left = self.grid.reach(inputs)
+        turned, gains = self.grid.turn_back(inputs)
+        cell, left = self.grid.reach(turned)
+        unknowns = [value + gain for value, gain in zip(cell.unknowns, gains, strict=True)]
         if not left:
-            regular = conditioning(cell.unknowns) > _SINGULAR
-            return (Status.CLOSED if regular else Status.TOGGLE), cell.unknowns
-        near = left <= _TOGGLE * (1.0 + max(map(abs, inputs)))
-        return (Status.TOGGLE if near else Status.OPEN), cell.unknowns
+            regular = conditioning(unknowns) > _SINGULAR
+            return (Status.CLOSED if regular else Status.TOGGLE), unknowns
+        near = left <= _TOGGLE * (1.0 + max(map(abs, turned)))
+        return (Status.TOGGLE if near else Status.OPEN), unknowns
 
     # What the grid asks for; inputs on which nothing depends are as in the pose
 

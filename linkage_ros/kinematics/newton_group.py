@@ -49,7 +49,7 @@ from linkage_ros.kinematics.equations import (
     GroupMotion,
     OnLine,
 )
-from linkage_ros.kinematics.grid import Grid
+from linkage_ros.kinematics.grid import Grid, grid_inputs, GridInput
 from linkage_ros.kinematics.grid_group import GridGroup
 from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
@@ -103,8 +103,8 @@ class Iteration:
     """
 
     __slots__ = (
-        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
-        '_limits', '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line',
+        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_given_inputs',
+        '_known_sizes', '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line',
         '_start', '_system_line', '_table', 'branch', 'group', 'inputs', 'solution',
     )  # fmt: skip
 
@@ -116,7 +116,7 @@ class Iteration:
         start: Sequence[float],
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
-        limits: Sequence[tuple[float, float]],
+        given_inputs: Sequence[GridInput],
         far: float,
         known: LinkState,
     ) -> None:
@@ -126,7 +126,7 @@ class Iteration:
         self.inputs = inputs
         self._sliding = sliding
         self._far = far
-        self._limits = limits
+        self._given_inputs = given_inputs
         self._start = np.array(start)
         self._equations = GroupEquations(constraints, len(start) // 3)
         self._system_line = StraightLine(self._list_system, lambda: None)
@@ -213,7 +213,7 @@ class Iteration:
         if solution is None:
             return None
         start = [float(solution[k]) for k in self._equations.free]
-        return GridGroup(self._equations, self._before, start, self._limits)
+        return GridGroup(self._equations, self._before, start, self._given_inputs)
 
     @property
     def grid(self) -> Grid | None:
@@ -583,11 +583,7 @@ def make_iteration(
         for points in planner.points.values()
     )
     slides = tuple(constraints.slides.values())
-    units = [scale if slides else 1.0 for slides in sliding]
-    limits = [
-        (given.limits.low / unit, given.limits.high / unit)
-        for given, unit in zip(linkage.inputs, units, strict=True)
-    ]
+    given = grid_inputs(linkage.inputs, inputs, scale)
     return Iteration(
-        tuple(constraints.constraints), slides, inputs, start, before, sliding, limits, far, solved
+        tuple(constraints.constraints), slides, inputs, start, before, sliding, given, far, solved
     )

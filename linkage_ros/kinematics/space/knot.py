@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from itertools import islice
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.grid import Grid
+from linkage_ros.kinematics.grid import Grid, GridInput
 from linkage_ros.kinematics.grid_group import GridGroup
 from linkage_ros.kinematics.space.knot_equations import KnotEquations
 from linkage_ros.kinematics.space.steps import missing_length
@@ -53,10 +53,10 @@ class Knot:
         equations: KnotEquations,
         before: StepsBefore,
         start: Sequence[float],
-        limits: Sequence[tuple[float, float]],
+        given_inputs: Sequence[GridInput],
     ) -> None:
         self._equations, self._start = equations, tuple(start)
-        self._group = GridGroup(equations, before, start, limits)
+        self._group = GridGroup(equations, before, start, given_inputs)
 
     @property
     def equation_count(self) -> int:

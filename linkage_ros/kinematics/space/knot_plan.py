@@ -22,6 +22,7 @@ from math import dist
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import list_names
+from linkage_ros.kinematics.grid import grid_inputs
 from linkage_ros.kinematics.space.knot import Knot
 from linkage_ros.kinematics.space.knot_equations import KnotEquations, KnotRod, Mover, RodEnd
 from linkage_ros.kinematics.space.steps import Rod
@@ -107,12 +108,8 @@ def add_knot(plan: SpacePlan) -> bool:
     last = 1 + len(plan.linkage.driven)
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
-    units = [plan.scale if given.slider else 1.0 for given in plan.linkage.inputs]
-    limits = [
-        (given.limits.low / unit, given.limits.high / unit)
-        for given, unit in zip(plan.linkage.inputs, units, strict=True)
-    ]
-    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, limits))
+    given = grid_inputs(plan.linkage.inputs, before.inputs, plan.scale)
+    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, given))
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))
     what = f'{len(rods)} equations for {list_names(found.unknown)}'
     method = f"iterated: Newton's method, {what}: {by}"

@@ -76,6 +76,22 @@ def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypat
     assert [few.position(*inputs).joints for inputs in states] == expected
 
 
+@pytest.mark.parametrize('turns', [-7, 1, 3, 1000])
+def test_a_crank_that_turns_on_and_on_meets_the_same_links(turns):
+    closure = closure_of('ankle_of_one_motor')
+    gear, *others = range(len(closure.joint_names))
+    for (x,) in random_inputs(closure, 20, 3.0):
+        one, later = closure.position(x), closure.position(x + tau * turns)
+        assert later.status is one.status is Status.CLOSED
+        assert later.joints[gear] - one.joints[gear] == pytest.approx(-tau * turns)
+        for k in others:
+            assert later.joints[k] == pytest.approx(one.joints[k], abs=1e-11)
+    wound = 0.3 + tau * turns
+    position = closure.position(wound)
+    rates = closure.velocity(position, 1.0).joints
+    assert Compiled(closure, 1)(wound, 1.0).values == (position.joints, rates)
+
+
 def test_the_cells_within_limits_are_those_that_states_meet():
     one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
     (grid,), (met,) = one.grids, other.grids
