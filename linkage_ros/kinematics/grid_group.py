@@ -157,7 +157,7 @@ class GridGroup:
         """Return the unknowns; None where no straight line leads to them."""
         if has_symbols(solved):
             return self._straight_solution(solved)
-        return self._solution_line(self._given(solved))
+        return self._solution_line(self._inputs_of(solved))
 
     def rates(
         self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState
@@ -166,7 +166,7 @@ class GridGroup:
         found = None
         if not has_symbols(solved, velocities):
             pose = LinkState([*unknowns], [])
-            found = self._rates_line(self._given(solved), pose, self._given(velocities))
+            found = self._rates_line(self._inputs_of(solved), pose, self._inputs_of(velocities))
         return found or self._equations.solve_rates(solved, unknowns, velocities)
 
     def accelerations(
@@ -180,14 +180,14 @@ class GridGroup:
         """Return the accelerations of the unknowns."""
         found = None
         if not has_symbols(solved, velocities, changes):
-            known, moving, changing = map(self._given, (solved, velocities, changes))
+            known, moving, changing = map(self._inputs_of, (solved, velocities, changes))
             pose, speeds = LinkState([*unknowns], []), LinkState([*rates], [])
             found = self._accelerations_line(known, pose, moving, speeds, changing)
         return found or self._equations.solve_accelerations(
             solved, unknowns, velocities, rates, changes
         )
 
-    def _given(self, state: LinkState) -> LinkState:
+    def _inputs_of(self, state: LinkState) -> LinkState:
         """Return the inputs of a state, or their derivatives."""
         end = 1 + len(self._before.inputs)
         return LinkState(state.coordinates[1:end], [])
@@ -285,8 +285,9 @@ class GridGroup:
         if found is None:
             return None
         size = len(unknowns)
-        rows: list[Sequence[float]] = [found[k : k + size] for k in range(0, len(found), size)]
-        return rows[: len(inputs)], rows[len(inputs) :]
+        rows: list[Sequence[float]] = [*zip(*[iter(found)] * size, strict=True)]
+        count = len(inputs)
+        return rows[:count], rows[count:]
 
     def _complete(self, inputs: Sequence[float]) -> LinkState:
         given = [*self._before.inputs]
@@ -303,7 +304,7 @@ class GridGroup:
 
     def _list_system(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return a step of Newton's method, the inverse by columns, and bounds by equations."""
-        known, count = _decided(self._before.known_at(given.coordinates)), len(pose.coordinates)
+        known, count = _require(self._before.known_at(given.coordinates)), len(pose.coordinates)
         errors, solve = self._equations.linearize(known, pose.coordinates)
         found = solve(errors)
         for k in range(count):
@@ -338,11 +339,11 @@ class GridGroup:
         return [*slopes, *bends]
 
     def _list_solution(self, given: LinkState) -> list[Any]:
-        return self._straight_solution(_decided(self._before.known_at(given.coordinates)))
+        return self._straight_solution(_require(self._before.known_at(given.coordinates)))
 
     def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
         states = self._before.moving_at(given.coordinates, rates.coordinates)
-        known, velocities = _decided(states)
+        known, velocities = _require(states)
         return self._equations.solve_rates(known, pose.coordinates, velocities)
 
     def _list_accelerations(
@@ -354,13 +355,13 @@ class GridGroup:
         accelerations: LinkState,
     ) -> list[Any]:
         states = self._before.changing_at(*(x.coordinates for x in (given, rates, accelerations)))
-        known, velocities, changes = _decided(states)
+        known, velocities, changes = _require(states)
         return self._equations.solve_accelerations(
             known, pose.coordinates, velocities, speeds.coordinates, changes
         )
 
 
-def _decided(found: T | None) -> T:
+def _require(found: T | None) -> T:
     """Return what the steps before have; UndecidedError is raised where they have none."""
     if found is None:
         raise UndecidedError

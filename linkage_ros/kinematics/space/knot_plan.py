@@ -19,12 +19,13 @@ from collections.abc import Iterator
 from heapq import heappop, heappush
 from itertools import combinations, count
 from math import dist
-from typing import NamedTuple, TYPE_CHECKING
+from typing import NamedTuple
 
 from linkage_ros.errors import list_names
 from linkage_ros.kinematics.grid import grid_inputs
 from linkage_ros.kinematics.space.knot import Knot
 from linkage_ros.kinematics.space.knot_equations import KnotEquations, KnotRod, Mover, RodEnd
+from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (
     cross,
@@ -39,9 +40,6 @@ from linkage_ros.kinematics.space.vectors import (
     ZERO,
 )
 from linkage_ros.kinematics.steps_before import StepsBefore
-
-if TYPE_CHECKING:
-    from linkage_ros.kinematics.space.plan import SpacePlan
 
 _INDEPENDENT = 1e-6
 """Least part of a rod's equation that others do not tell, in the pose."""

@@ -26,7 +26,7 @@ The pose gives the sign of each closed step.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
 from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
@@ -96,10 +96,15 @@ class _Pair(NamedTuple):
 
 
 class SpacePlan:
-    """Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres."""
+    """
+    Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres.
 
-    def __init__(self, linkage: SpaceLinkage) -> None:
+    ``add_knot`` adds links that only close together as the next step, and says whether it could.
+    """
+
+    def __init__(self, linkage: SpaceLinkage, add_knot: Callable[[SpacePlan], bool]) -> None:
         self.linkage = linkage
+        self._add_knot = add_knot
         self.scale = ldexp(1.0, frexp(size_of(linkage))[1])
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
@@ -238,20 +243,15 @@ class SpacePlan:
             or any(map(self._frame, self._unknown_links()))
             or any(map(self._place_point, self.carriers))
             or any(map(self._translate, self._unknown_links()))
-            or self._tie()
+            or (self.has_unknown_joints and self._add_knot(self))
         )
 
-    def _tie(self) -> bool:
-        """Solve the smallest set of joints that close together."""
+    @property
+    def has_unknown_joints(self) -> bool:
+        """Return whether a joint leads to a link that is not solved yet."""
         joints = self.linkage.pair_joints.values()
         held = {end for joint in joints for end in (joint.parent, joint.child)}
-        if held.isdisjoint(self._unknown_links()):
-            return False
-        from linkage_ros.kinematics.space.knot_plan import (
-            add_knot,  # local import: most linkages have none
-        )
-
-        return add_knot(self)
+        return not held.isdisjoint(self._unknown_links())
 
     # Joints
 
