@@ -17,16 +17,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from math import tau
-from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
+from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.errors import list_names, quote
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
 from linkage_ros.kinematics.topology import Structure
-
-if TYPE_CHECKING:
-    from linkage_ros.kinematics.grid import Grid
 
 
 class InputRange(NamedTuple):
@@ -148,7 +145,7 @@ class LoopClosure(Protocol):
     def slide_bound(self) -> float: ...
 
     @property
-    def grids(self) -> list[Grid]: ...
+    def grids(self) -> list[Any]: ...
 
     def slide_reach(self, number: int) -> tuple[float, float]: ...
 
