@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
-from math import ceil, isnan, pi
+from math import ceil, floor, isnan, log10, pi
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -46,7 +46,13 @@ _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 
 _FONT_SIZE = 7.0
 """Of names beside lines, in points."""
-STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+STROKES = {
+    'rail': (INK, 1.3),
+    'hatch': (INK, 0.7),
+    'slot': ('#ffffff', 2.2),
+    'axis': (NAME_INK, 0.7),
+}
+_DASH_DOT = (0, (9, 2, 1.5, 2))
 _SETTINGS: Any = {
     'font.size': 8.0,
     'svg.hashsalt': 'linkage_ros',
@@ -287,7 +293,7 @@ def paint_shapes(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
             circle = patches.Circle(
                 centre,
                 shape.radius,
-                facecolor='white',
+                facecolor=FACES.get(shape.role, 'white'),
                 edgecolor=INK,
                 linewidth=0.9,
                 zorder=LAYERS['shape'],
@@ -300,10 +306,54 @@ def paint_shapes(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
                 (shape.start, shape.end),
                 color=colour,
                 linewidth=width,
+                linestyle=_DASH_DOT if shape.role == 'axis' else '-',
                 solid_capstyle='round',
                 zorder=LAYERS['shape'],
             )
     return painted
+
+
+def make_faint(artist: Any, strength: float) -> None:
+    """Mix the colours of a painted shape with white; of strength 1 nothing changes."""
+    from matplotlib.colors import to_rgba  # local import: an extra, and slow to load
+
+    for part in ('color',) if hasattr(artist, 'get_color') else ('facecolor', 'edgecolor'):
+        *colour, opacity = to_rgba(getattr(artist, f'get_{part}')())
+        mixed = [1.0 - strength * (1.0 - each) for each in colour]
+        getattr(artist, f'set_{part}')((*mixed, opacity))
+
+
+def paint_frame(
+    axes: Any, directions: Any, low: complex, high: complex, *, has_lengths: bool
+) -> None:
+    """
+    Paint the directions x, y and z in the lower left corner of a picture, and a bar to scale.
+
+    The first two rows of ``directions`` are what is right and up in the picture.
+    """
+    arm = 0.05 * abs(high - low)
+    origin = low + arm * (1.5 + 2.0j)
+    for name, right, up in zip('xyz', *directions[:2], strict=True):
+        way = arm * complex(right, up)
+        plot_places(axes, (origin, origin + way), color=INK, linewidth=1.0)
+        letter = origin + 1.4 * way
+        axes.text(
+            letter.real, letter.imag, name, ha='center', va='center', fontsize=_FONT_SIZE,
+            color=INK,
+        )  # fmt: skip
+    if not has_lengths:
+        return
+    unit, factor = unit_of_length(abs(high - low))
+    longest = 0.4 * (high - low).real
+    power = 10.0 ** floor(log10(longest))
+    length = next(k * power for k in (5.0, 2.0, 1.0) if k * power <= longest)
+    start = low + arm * (0.4 + 0.1j)
+    ends = (start + 0.15j * arm, start, start + length, start + length + 0.15j * arm)
+    plot_places(axes, ends, color=INK, linewidth=1.0)
+    axes.text(
+        ends[-1].real + 0.2 * arm, start.imag, f'{length * factor:g} {unit}', va='bottom',
+        fontsize=_FONT_SIZE, color=INK,
+    )  # fmt: skip
 
 
 class NameLabels:

@@ -20,13 +20,14 @@ published joints, as in a robot model (`linkage_ros.tools.models.tree`), and eac
 its own recorded value. The loops are not solved: where a sensor is wrong or late relative to
 another, links that share a pin come apart there, and the page shows the distance. If the published
 joints do not determine the position of a link, the loops are closed at the recorded inputs
-instead.
+instead. So are those of a spatial linkage, of which the page has places in space: see
+`linkage_ros.tools.drawing.space_drawing`.
 """
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
@@ -36,9 +37,10 @@ from linkage_ros.kinematics import (
     GROUND,
     prepare_view,
     separate_blocks,
+    SpaceClosure,
     usual_inputs,
 )
-from linkage_ros.tools.drawing import drawn_in_frames
+from linkage_ros.tools.drawing import drawn_in_frames, SpaceDrawing
 from linkage_ros.tools.models import grow_tree, prefix_names, Tree
 from linkage_ros.tools.view.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.tools.view.report.labels import (
@@ -61,6 +63,9 @@ from numpy.typing import ArrayLike
 _FARTHEST = 1e30
 """In [m] or [rad]: larger values are implausible, and not written to the page."""
 
+_LOOKED_AT = 100
+"""Instants of a run, to see how far its slides go."""
+
 Places = Any
 """Array of complex numbers: positions in [m], or directions."""
 
@@ -77,7 +82,7 @@ class Poses(NamedTuple):
 
     links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are not links
     # Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape (instants, links,
-    # 3); NaN where it is unknown.
+    # 3); of a spatial linkage its places instead; NaN where it is unknown.
     frames: Numbers
     # Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
     apart: Numbers
@@ -313,18 +318,24 @@ def _frames_json(frames: Frames) -> dict[str, Any]:
 def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
     found, space = [], SHAPE_BYTES
     for linkage in linkages:
-        drawn, size, undrawn = _drawing_of(linkage.closure, space)
+        closure: Any = linkage.closure
+        drawing: dict[str, Any] | None = None
+        if isinstance(closure, Closure):
+            poses = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
+        else:
+            poses, drawing = _spatial_poses(closure, [frames.values[n] for n in linkage.inputs])
+        drawn, size, undrawn = _drawing_of(closure, drawing, space)
         space -= size
-        found.append({**_linkage_json(linkage, frames), 'drawn': drawn, 'undrawn': undrawn})
+        found.append({**_linkage_json(linkage, poses), 'drawn': drawn, 'undrawn': undrawn})
     return found
 
 
-def _drawing_of(closure: Any, space: int) -> tuple[dict[str, Any] | None, int, str]:
+def _drawing_of(
+    closure: Any, drawn: dict[str, Any] | None, space: int
+) -> tuple[dict[str, Any] | None, int, str]:
     """Return the drawing of a linkage and its size in [bytes], or why there is none."""
-    if not isinstance(closure, Closure):
-        return None, 0, 'a spatial linkage'
     try:
-        drawn = drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
+        drawn = drawn or drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)
     except LinkageError as error:
         return None, 0, shorten_text(str(error), 200)
@@ -333,13 +344,31 @@ def _drawing_of(closure: Any, space: int) -> tuple[dict[str, Any] | None, int, s
     return (drawn, size, '') if size <= space else (None, 0, 'no room on the page')
 
 
-def _linkage_json(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
-    closure: Any = linkage.closure
-    if isinstance(closure, Closure):
-        found = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
-    else:
-        count = len(frames.times)
-        found = Poses((), np.empty((count, 0, 3)), np.full(count, np.nan), '')
+def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
+    """Return places of a spatial linkage instead of frames, and its drawing."""
+    drawing = SpaceDrawing(closure)
+
+    def place_all(numbers: Iterable[int]) -> Numbers:
+        found = np.full((len(inputs[0]), drawing.count, 3), np.nan)
+        for i in numbers:
+            given = [float(values[i]) for values in inputs]
+            if all(abs(value) < _FARTHEST for value in given):
+                position = closure.position(*given)
+                if position.joints:
+                    found[i] = drawing.places(position)
+        return found
+
+    count = len(inputs[0])
+    seen = place_all(range(0, count, max(1, count // _LOOKED_AT)))
+    drawing.stretch_rails([places for places in seen if np.isfinite(places).all()])
+    found = place_all(range(count))
+    known = found[np.isfinite(found).all(axis=(1, 2))]
+    if not len(known):
+        known = drawing.places(closure.position(*usual_inputs(closure)))[None]
+    return Poses((), found, np.full(count, np.nan), ''), drawing.page_data(known)
+
+
+def _linkage_json(linkage: LinkageRun, found: Poses) -> dict[str, Any]:
     return {
         'name': linkage.name,
         'inputs': linkage.inputs,
