@@ -93,7 +93,7 @@ def _find_range(input_sweep: InputSweep, about: InputRange) -> InputRange:
 
 
 def _close_loops(closure: Any, inputs: tuple[float, ...]) -> Position:
-    position = closure.position(*inputs)
+    position: Position = closure.position(*inputs)
     if not position.joints:
         ranges = InputSweep(closure, inputs).ranges
         near = ' or '.join(_ends_text(interval) for interval in ranges)

@@ -45,9 +45,9 @@ from linkage_ros.description import (
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
     check_planar,
-    Closure,
     prepare_view,
     read_drawn_pose,
+    SpaceClosure,
     usual_inputs,
 )
 from linkage_ros.resources import named_file
@@ -102,9 +102,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         return _draw_assemblies(arguments)
     named = named_file(arguments.file, 'linkages')
     content = linkage_content(named)
-    closure = read_any_closure(content, named.stem)
-    spatial = not isinstance(closure, Closure)
-    for option in () if spatial else ('azimuth', 'elevation'):
+    closure: Any = read_any_closure(content, named.stem)
+    for option in () if isinstance(closure, SpaceClosure) else ('azimuth', 'elevation'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
     if arguments.output and arguments.output.suffix.lower() == '.dxf':

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""What a picture of a linkage shows, as shapes in its plane: of a planar linkage, or a spatial one."""
+"""What a picture of a linkage shows, as shapes in its plane, of a planar or a spatial linkage."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics import (
-    all_places,
     bounding_corners,
     Circle,
     draw_shapes,
@@ -31,7 +30,6 @@ from linkage_ros.kinematics import (
 )
 from linkage_ros.tools.drawing.space_drawing import (
     Camera,
-    choose_camera,
     projected_shapes,
     skeleton_of,
     SpaceDrawing,
@@ -133,9 +131,8 @@ def _draw_spatial(shown: LinkageView, angles: Sequence[float | None]) -> DrawnLi
     swept = [drawing.places(position) for position in moved if position.joints]
     several = len(shown.inputs) > 1 and not shown.are_ghosts_given
     behind = [] if several else [drawing.places(ghost) for ghost in shown.ghosts]
-    drawing.stretch_rails([drawing.places(shown.position), *behind, *swept])
     places = drawing.places(shown.position)
-    camera = choose_camera(drawing.lines(places), *angles)
+    camera = drawing.choose_camera(places, *angles)
     drawn = projected_shapes(drawing, places, camera)
     seen, _ = camera.project(places)
     traced = {name: drawing.points[name] for name in shown.closure.linkage.traced}

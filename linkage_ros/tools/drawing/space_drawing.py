@@ -21,7 +21,7 @@ in which it stands, and the z axis of the ground points up in the picture.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import dist, radians
 from typing import Any, NamedTuple
 
@@ -43,30 +43,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 Places = NDArray[np.float64]
-"""Places in the frame of the ground, in [m], of shape (places, 3)."""
-
-STROKED: tuple[Role, ...] = ('axis', 'rail')
-"""Roles of parts that are lines."""
+"""Places in the frame of the ground, in [m], of shape (places, 3); or one of them."""
 
 _ARC = 16
-"""Places of an arc."""
+"""Pieces of an arc."""
+
+_RAIL = 0.4
+"""Length of a rail to either side of the pose, relative to the extent of the linkage."""
 
 _SAME = 1e-6
-"""Largest distance of places that are one, relative to the linkage."""
+"""Largest distance of places that are one, relative to the extent."""
 
-_AZIMUTHS, _ELEVATIONS = range(-170, 190, 10), (20, 30, 40)
-"""Directions of which one is chosen, in [°]: none is along an axis of the ground."""
+_AZIMUTHS, _ELEVATIONS = [a for a in range(-170, 190, 10) if a % 90], (20, 30, 40)
+"""Directions of which one is chosen, in [°]."""
 
-_AXIS_SEEN = 0.5
-"""Length of an axis in the picture, relative to the axis, from which on it is seen well."""
-
-_SHORTEST = 0.02
-"""Least length of a line in the picture, relative to the line: shorter ones count as this."""
+_SHORTEST, _AXIS_SEEN = 0.02, 0.5
+"""Between these, relative to its length, an axis in the picture counts; other lines up to 1."""
 
 _FAINTEST, _FADING = 0.4, 0.6
 """Least strength of a shape, and what is lost of it over the extent of the linkage."""
-
-_JOINTS: tuple[Role, ...] = ('hinge', 'base', 'ball', 'pin', 'block')
 
 
 class Camera(NamedTuple):
@@ -76,7 +71,7 @@ class Camera(NamedTuple):
     elevation: float
 
     @property
-    def axes(self) -> NDArray[np.float64]:
+    def axes(self) -> Places:
         """Return, as rows, the directions to the right, up, and to the camera."""
         ca, sa = np.cos(self.azimuth), np.sin(self.azimuth)
         ce, se = np.cos(self.elevation), np.sin(self.elevation)
@@ -89,13 +84,14 @@ class Camera(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part of the drawing between places, by their numbers; one place is a ball."""
+    """A part of the drawing: a ball, a bar, a bent bar or the hull of places, by their numbers."""
 
     role: Role
     name: str
     corners: tuple[int, ...]
     width: float = 1.0  # In widths of a bar
-    is_hull: bool = False  # It is the hull of its places, or else a line through them
+    is_hull: bool = False
+    joins: tuple[str, ...] = ()  # The links before which a joint is painted
 
 
 class SpaceDrawing:
@@ -111,15 +107,13 @@ class SpaceDrawing:
     size
         Half the width of a bar, in [m].
     has_lengths
-        Whether its size means anything: a linkage of axes through one point has none.
+        Whether its extent means anything: a linkage of axes through one point has none.
 
     """
 
     def __init__(self, closure: SpaceClosure) -> None:
-        self.closure = closure
-        self.linkage = closure.linkage
+        self.closure, self.linkage = closure, closure.linkage
         self.bodies: list[Part] = []
-        self.parts: list[Part] = []
         self.points: dict[str, int] = {}
         self.joints: dict[str, int] = {}
         pose = closure.close_unlimited(*closure.linkage.pose.inputs)
@@ -127,114 +121,29 @@ class SpaceDrawing:
         self._links: list[str] = []
         self._arms: list[Places] = []
         self._tubes: list[tuple[int, int, int, float]] = []
-        self._rails: list[tuple[int, int, int]] = []
         self._carried: dict[str, list[int]] = {link: [] for link in self.linkage.link_names}
-        self._driven = {
-            joint.parent if joint.child == GROUND else joint.child
-            for name, joint in self.linkage.pair_joints.items()
-            if name in self.linkage.driven
-        }
         hinges = [hinge.at for hinge in self.linkage.hinges.values()]
         places = np.array([*self.linkage.points.values(), *hinges])
-        self.extent = float(np.linalg.norm(np.ptp(places, axis=0)))
-        self.has_lengths = self.extent > 0.0
-        self.extent = self.extent or 2.0
-        together = len(hinges) > 2 and np.ptp(hinges, axis=0).max() <= _SAME * self.extent
-        self._radius = 0.5 * self.extent if together else 0.0
-        self._add_all()
-
-    def _add_all(self) -> None:
-        """Add all parts; what they carry comes first, as it determines the size of symbols."""
-        linkage = self.linkage
-        for link, names in linkage.links.items():
+        extent = float(np.linalg.norm(np.ptp(places, axis=0)))
+        self.has_lengths, self.extent = extent > 0.0, extent or 2.0
+        one_place = len(hinges) > 2 and np.ptp(hinges, axis=0).max() <= _SAME * self.extent
+        self._radius = 0.5 * self.extent if one_place else 0.0
+        # What links carry comes first: it determines the size of symbols.
+        for link, names in self.linkage.links.items():
             for name in names:
-                self.points[name] = self._carry(link, np.array(linkage.points[name]))
+                self.points[name] = self._carry(link, np.array(self.linkage.points[name]))
         centres = self._hinge_centres()
-        for name, hinge in linkage.hinges.items():
-            for centre in centres[name]:
-                for link in (hinge.parent, hinge.child):
-                    self.joints[name] = self._carry(link, centre)
         bars = [
-            dist(*(self._pose_place(row) for row in rows))
+            dist(*map(self._pose_place, rows))
             for link, rows in self._carried.items()
             if link != GROUND and len(rows) == 2
         ]
-        self.size = bar_size(
-            (0.8 if self._radius else 1.4) * self.extent, min(bars, default=self.extent)
-        )
-        for name, slide in linkage.slides.items():
-            self._add_slide(name, slide)
-        for link, rows in self._carried.items():
-            if link != GROUND and len(rows) > 1:
-                self._add_link(link, rows)
-        for name, hinge in linkage.hinges.items():
-            self._add_hinge(name, hinge, centres[name])
-        for name, (one, other) in linkage.struts.items():
-            self._add_strut(name, one, other)
-        ends = [end for pair in linkage.struts.values() for end in pair]
-        for name, row in self.points.items():
-            carriers = [link for link, names in linkage.links.items() if name in names]
-            if len(carriers) + ends.count(name) < 2:
-                self.parts.append(Part('pin', name, (row,), 0.6))
-            else:
-                self.parts.append(Part('base' if GROUND in carriers else 'ball', name, (row,)))
-        self.below = list(self._find_below())
-
-    @property
-    def count(self) -> int:
-        """Return the number of places."""
-        return len(self._links)
-
-    def lines(self, places: Places) -> list[Places]:
-        """Return the vectors between places that links join, and along the axes, in two arrays."""
-        joined = places[sorted({row for rows in self._carried.values() for row in rows})]
-        one, other = np.triu_indices(len(joined), 1)
-        axes = [places[part.corners[1]] - places[part.corners[0]]
-                for part in self.parts if part.role == 'axis']  # fmt: skip
-        between = joined[one] - joined[other]
-        long = np.linalg.norm(between, axis=1) > _SAME * self.extent
-        return [between[long], np.array(axes)]
-
-    def _find_below(self) -> Iterator[list[int]]:
-        """Yield for each part those, of before, that it is in front of: what a joint joins."""
-        for i, part in enumerate(self.parts):
-            found = []
-            if part.role in _JOINTS or part.name in self.joints:
-                middle = np.mean([self._pose_place(row) for row in part.corners], axis=0)
-                for other, body in enumerate(self.parts[:i]):
-                    ends = [self._pose_place(row) for row in body.corners]
-                    ends.append(np.mean(ends, axis=0))
-                    near_by = any(dist(end, middle) < _SAME * self.extent for end in ends)
-                    if near_by or (body.role, body.name) == ('rail', part.name):
-                        found.append(other)
-            yield found
-
-    def page_data(self, seen: Places) -> dict[str, Any]:
-        """Return the drawing as JSON data; ``seen`` are its places at many positions."""
-        middle = 0.5 * (seen.min(axis=(0, 1)) + seen.max(axis=(0, 1)))
-        away = seen - middle
-        return {
-            'camera': choose_camera(self.lines(seen[0])),
-            'middle': middle.tolist(),
-            # To the side and upward, from whatever side it is seen.
-            'reach': [
-                float(np.linalg.norm(reached, axis=2).max()) + 2.0 * self.size
-                for reached in (away[:, :, :2], away)
-            ],
-            'size': self.size,
-            'extent': self.extent,
-            'has_lengths': self.has_lengths,
-            'count': self.count,
-            'shapes': [
-                {**part._asdict(), 'number': number, 'below': below}
-                for number, (part, below) in enumerate(zip(self.parts, self.below, strict=True))
-            ],
-            'traced': [
-                {'point': name, 'link': self.points[name], 'at': []}
-                for name in self.linkage.traced
-            ],
-            'paths': {},
-        }
+        picture = (0.8 if self._radius else 1.4) * self.extent
+        self.size = bar_size(picture, min(bars, default=picture))
+        joints = [*self._slide_parts(), *self._hinge_parts(centres), *self._strut_parts()]
+        self.bodies.extend(self._link_parts())
+        self.parts = [*self.bodies, *joints, *self._point_parts()]
+        self.count = len(self._links)
 
     def places(self, position: Position) -> Places:
         """Return all places at a position that closes."""
@@ -243,40 +152,99 @@ class SpaceDrawing:
         turns = np.array([frames[link][1] for link in self._links])
         axis, arms = turns[:, :3], np.array(self._arms)
         half = np.cross(axis, arms)
-        found = origins + arms + 2.0 * (turns[:, 3:] * half + np.cross(axis, half))
+        found = np.asarray(origins + arms + 2.0 * (turns[:, 3:] * half + np.cross(axis, half)))
         for row, one, other, length in self._tubes:
             way = found[other] - found[one]
             found[row] = found[one] + way * min(length / np.linalg.norm(way), 0.9)
-        return np.asarray(found)
+        return found
 
-    def stretch_rails(self, seen: Sequence[Places]) -> None:
-        """Make rails as long as the slides need in some poses."""
-        for on, block, first in self._rails:
-            start, end = (self._arms[row] for row in (first, first + 1))
-            way = (end - start) / np.linalg.norm(end - start)
-            travels = [0.0]
-            for places in seen:
-                along = places[first + 1] - places[first]
-                along /= np.linalg.norm(along)
-                travels.append(float((places[block] - places[on]) @ along))
-            self._arms[first] = start + min(travels) * way
-            self._arms[first + 1] = end + max(travels) * way
+    def below(self, part: Part) -> list[int]:
+        """Return the numbers of the links before which a part is painted."""
+        return [i for i, body in enumerate(self.bodies) if body.name in part.joins]
+
+    def choose_camera(
+        self, places: Places, azimuth: float | None = None, elevation: float | None = None
+    ) -> Camera:
+        """
+        Return the camera before which links hide each other least; its angles may be given.
+
+        Of every 10° of azimuth and three elevations it is one before which the fewest joints and
+        points are behind bars. Of these it is the one that shortens lines between them least, by
+        the mean of the logarithms; axes count where it is within 30° of them.
+        """
+        joined = places[sorted({row for rows in self._carried.values() for row in rows})]
+        lines = np.array([one - other for one, other in combinations(joined, 2)])
+        rows = [part.corners for part in self.parts if part.role == 'axis']
+        axes = np.array([places[one] - places[other] for one, other in rows])
+        bars = [places[[body.corners[0], body.corners[-1]]] for body in self.bodies]
+
+        def count_hidden(camera: Camera) -> int:
+            (seen, near), hidden = camera.project(joined), 0
+            for bar in bars:
+                (start, end), (depth, deeper) = camera.project(bar)
+                along = (seen - start) / ((end - start) or 1.0)
+                share = np.clip(along.real, 0.0, 1.0)
+                off = np.abs(along - share) * abs(end - start)
+                nearer = depth + share * (deeper - depth) - near
+                hidden += int(np.count_nonzero((off < 2.5 * self.size) & (nearer > self.size)))
+            return hidden
+
+        def mean_log(vectors: Places, camera: Camera, most: float) -> float:
+            lengths = np.linalg.norm(vectors, axis=-1)
+            there = lengths > _SAME * self.extent
+            if not there.any():
+                return 0.0
+            seen = np.abs(camera.project(vectors[there])[0]) / lengths[there]
+            return float(np.log(np.clip(seen, _SHORTEST, most)).mean())
+
+        def quality(camera: Camera) -> tuple[int, float]:
+            seen = mean_log(lines, camera, 1.0) + mean_log(axes, camera, _AXIS_SEEN)
+            return -count_hidden(camera), seen
+
+        azimuths = [*map(radians, _AZIMUTHS)] if azimuth is None else [azimuth]
+        elevations = [*map(radians, _ELEVATIONS)] if elevation is None else [elevation]
+        return max((Camera(a, e) for e in elevations for a in azimuths), key=quality)
+
+    def page_data(self, seen: Places) -> dict[str, Any]:
+        """Return the drawing as JSON data; ``seen`` are its places at many positions."""
+        middle = 0.5 * (seen.min(axis=(0, 1)) + seen.max(axis=(0, 1)))
+        away = seen - middle
+        reach = [np.linalg.norm(each, axis=2).max() for each in (away[:, :, :2], away)]
+        return {
+            'camera': self.choose_camera(seen[0]),
+            'middle': middle.tolist(),
+            # To the side and upward, from wherever it is seen.
+            'reach': [float(each) + 2.0 * self.size for each in reach],
+            'size': self.size,
+            'extent': self.extent,
+            'has_lengths': self.has_lengths,
+            'count': self.count,
+            'shapes': [
+                {**part._asdict(), 'number': number, 'below': self.below(part)}
+                for number, part in enumerate(self.parts)
+            ],
+            'traced': [
+                {'point': name, 'link': self.points[name], 'at': []}
+                for name in self.linkage.traced
+            ],
+            'paths': {},
+        }
 
     def _pose_place(self, row: int) -> Places:
         return self._arms[row] + self._origins[self._links[row]]
 
-    def _add_place(self, link: str, place: Places) -> int:
-        """Add a place of a link, by where it is in the pose; return its number."""
-        self._links.append(link)
-        self._arms.append(place - self._origins[link])
-        return len(self._links) - 1
+    def _add_places(self, link: str, *places: Places) -> tuple[int, ...]:
+        """Add places of a link, by where they are in the pose; return their numbers."""
+        self._links += [link] * len(places)
+        self._arms += [place - self._origins[link] for place in places]
+        return tuple(range(len(self._links) - len(places), len(self._links)))
 
     def _carry(self, link: str, place: Places) -> int:
         """Return the number of a place between which a link is drawn; add it if it is new."""
         for row in self._carried[link]:
             if dist(self._pose_place(row), place) <= _SAME * self.extent:
                 return row
-        self._carried[link].append(self._add_place(link, place))
+        self._carried[link] += self._add_places(link, place)
         return self._carried[link][-1]
 
     def _hinge_centres(self) -> dict[str, list[Places]]:
@@ -285,116 +253,98 @@ class SpaceDrawing:
         ways: list[Places] = []
         for name, hinge in linkage.hinges.items():
             at, way = np.array(hinge.at), _unit(hinge)
-            carried = [linkage.links.get(link, ()) for link in (hinge.parent, hinge.child)]
-            both = [np.array(linkage.points[point]) for point in carried[0] if point in carried[1]]
-            centres = [
-                place
-                for place in both
-                if np.linalg.norm(np.cross(place - at, way)) <= _SAME * self.extent
-            ]
+            names = [linkage.links.get(link, ()) for link in (hinge.parent, hinge.child)]
+            both = [np.array(linkage.points[point]) for point in names[0] if point in names[1]]
+            off = [np.linalg.norm(np.cross(place - at, way)) for place in both]
+            centres = [p for p, r in zip(both, off, strict=True) if r <= _SAME * self.extent]
             if self._radius:
                 # The shorter arc to the hinge before; of equal ones, away from all others.
                 last = float(way @ ways[-1]) if ways else 1.0
-                apart = last if abs(last) > 0.1 else -float(way @ np.sum(ways, axis=0))
-                ways.append(way if apart >= 0.0 else -way)
+                side = last if abs(last) > 0.1 else -float(way @ np.sum(ways, axis=0))
+                ways.append(way if side >= 0.0 else -way)
                 centres = [at + self._radius * ways[-1]]
             found[name] = centres or [at]
+            for centre in found[name]:
+                for link in (hinge.parent, hinge.child):
+                    self.joints[name] = self._carry(link, centre)
         return found
 
-    def _add_hinge(self, name: str, hinge: SpatialJoint, centres: Sequence[Places]) -> None:
-        way, fixed = _unit(hinge), GROUND in (hinge.parent, hinge.child)
-        role: Role = 'base' if fixed else 'hinge'
-        link = hinge.child if hinge.parent == GROUND else hinge.parent
-        for centre in centres:
-            ends = (self._add_place(link, centre + k * self.size * way) for k in (-1.6, 1.6))
-            self.parts.append(Part(role, name, tuple(ends), 1.5))
-        if self._radius:
-            start = np.array(hinge.at)
-            line = start, centres[0] + 5.0 * self.size * (centres[0] - start) / self._radius
-        else:
-            reach = [float((centre - centres[0]) @ way) for centre in centres]
-            low, high = min(reach) - 5.0 * self.size, max(reach) + 5.0 * self.size
-            line = centres[0] + low * way, centres[0] + high * way
-        axis = (self._add_place(link, place) for place in line)
-        self.parts.append(Part('axis', name, tuple(axis)))
+    def _hinge_parts(self, centres: dict[str, list[Places]]) -> Iterator[Part]:
+        for name, hinge in self.linkage.hinges.items():
+            joins = (hinge.parent, hinge.child)
+            link = hinge.child if hinge.parent == GROUND else hinge.parent
+            way = self.size * _unit(hinge)
+            first, *_, last = [centres[name][0], *centres[name]]
+            begin = np.array(hinge.at) if self._radius else first
+            along = first - begin if self._radius else last - first
+            beyond = way if float(along @ way) >= 0.0 else -way
+            ends = begin - (not self._radius) * 5.0 * beyond, last + 5.0 * beyond
+            yield Part('axis', name, self._add_places(link, *ends))
+            for centre in centres[name]:
+                corners = self._add_places(link, centre - 1.6 * way, centre + 1.6 * way)
+                yield Part('base' if GROUND in joins else 'hinge', name, corners, 1.5, joins=joins)
 
-    def _add_slide(self, name: str, slide: SpatialJoint) -> None:
-        """Add block and rail of a slide; links without places only keep others from turning."""
-        rows = self._carried[slide.child]
-        if not rows or not (slide.parent == GROUND or self._carried[slide.parent]):
-            return
-        middle = np.mean([self._pose_place(row) for row in rows], axis=0)
-        way = _unit(slide) * self.size
-        block = self._carry(slide.child, middle)
-        on = self._carry(slide.parent, middle)
-        ends = [self._add_place(slide.child, middle + k * way) for k in (-2.4, 2.4)]
-        role: Role = 'input' if name in self.linkage.driven else 'block'
-        rail = [self._add_place(slide.parent, middle + k * way) for k in (-5.0, 5.0)]
-        self.parts.append(Part('rail', name, tuple(rail)))
-        self.parts.append(Part(role, name, tuple(ends), 1.6))
-        self._rails.append((on, block, rail[0]))
-        self.joints[name] = block
+    def _slide_parts(self) -> Iterator[Part]:
+        """Yield rails and blocks; links without places only keep others from turning."""
+        for name, slide in self.linkage.slides.items():
+            rows = self._carried[slide.child]
+            if not rows or not (slide.parent == GROUND or self._carried[slide.parent]):
+                continue
+            middle = np.mean([*map(self._pose_place, rows)], axis=0)
+            way, rail = self.size * _unit(slide), _RAIL * self.extent * _unit(slide)
+            self._carry(slide.parent, middle)
+            self.joints[name] = self._carry(slide.child, middle)
+            yield Part('rail', name, self._add_places(slide.parent, middle - rail, middle + rail))
+            ends = self._add_places(slide.child, middle - 2.4 * way, middle + 2.4 * way)
+            role: Role = 'input' if name in self.linkage.driven else 'block'
+            yield Part(role, name, ends, 1.6, joins=(slide.parent, slide.child))
 
-    def _add_link(self, link: str, rows: Sequence[int]) -> None:
-        driven = link in self._driven
-        if len(rows) > 2:
-            role: Role = 'input' if driven else 'plate'
-            part = Part(role, link, tuple(rows), 0.9, is_hull=True)
-        else:
-            role = 'input' if driven else 'link'
-            part = Part(role, link, (rows[0], *self._arc(link, *rows), rows[1]))
-        self.bodies.append(part)
-        self.parts.append(part)
+    def _strut_parts(self) -> Iterator[Part]:
+        for name, (one, other) in self.linkage.struts.items():
+            start, end = self.points[one], self.points[other]
+            (tube,) = self._add_places(GROUND, np.zeros(3))
+            length = 0.55 * dist(self._pose_place(start), self._pose_place(end))
+            self._tubes.append((tube, start, end, length))
+            self.joints[name] = tube
+            yield Part('link', name, (start, end), 0.6)
+            role: Role = 'input' if name in self.linkage.driven else 'tube'
+            yield Part(role, name, (start, tube), 1.5)
 
-    def _arc(self, link: str, start: int, end: int) -> list[int]:
+    def _link_parts(self) -> Iterator[Part]:
+        joints = self.linkage.pair_joints
+        ends = [(joints[n].child, joints[n].parent) for n in self.linkage.driven if n in joints]
+        driven = {child if child != GROUND else parent for child, parent in ends}
+        for link, rows in self._carried.items():
+            role: Role = 'input' if link in driven else 'plate' if len(rows) > 2 else 'link'
+            if link == GROUND or len(rows) < 2:
+                continue
+            if len(rows) == 2:
+                yield Part(role, link, (rows[0], *self._arc(link, *rows), rows[1]))
+            else:
+                yield Part(role, link, tuple(rows), 0.9, is_hull=True)
+
+    def _arc(self, link: str, start: int, end: int) -> tuple[int, ...]:
         """Return places of an arc between two on the sphere; none without a sphere."""
-        if not self._radius:
-            return []
-        centre = np.array(next(iter(self.linkage.hinges.values())).at)
+        centre = next((np.array(hinge.at) for hinge in self.linkage.hinges.values()), np.zeros(3))
         one, other = (self._pose_place(row) - centre for row in (start, end))
-        if max(abs(np.linalg.norm(way) - self._radius) for way in (one, other)) > _SAME:
-            return []
+        off = max(abs(np.linalg.norm(way) - self._radius) for way in (one, other))
+        if not self._radius or off > _SAME * self._radius:
+            return ()
         ways = [one + (other - one) * i / _ARC for i in range(1, _ARC)]
-        arc = [centre + self._radius / np.linalg.norm(way) * way for way in ways]
-        return [self._add_place(link, place) for place in arc]
+        arc = (centre + self._radius / np.linalg.norm(way) * way for way in ways)
+        return self._add_places(link, *arc)
 
-    def _add_strut(self, name: str, one: str, other: str) -> None:
-        start, end = self.points[one], self.points[other]
-        tube = self._add_place(GROUND, np.zeros(3))
-        length = 0.55 * dist(self._pose_place(start), self._pose_place(end))
-        self._tubes.append((tube, start, end, length))
-        role: Role = 'input' if name in self.linkage.driven else 'tube'
-        self.parts.append(Part('link', name, (start, end), 0.6))
-        self.parts.append(Part(role, name, (start, tube), 1.5))
-        self.joints[name] = tube
+    def _point_parts(self) -> Iterator[Part]:
+        ends = [end for pair in self.linkage.struts.values() for end in pair]
+        for name, row in self.points.items():
+            joins = tuple(link for link, names in self.linkage.links.items() if name in names)
+            shared = len(joins) + ends.count(name) > 1
+            role: Role = 'base' if GROUND in joins else 'ball' if shared else 'pin'
+            yield Part(role, name, (row,), 1.0 if shared else 0.6, joins=joins)
 
 
 def _unit(joint: SpatialJoint) -> Places:
-    axis = np.array(joint.axis)
-    return np.asarray(axis / np.linalg.norm(axis))
-
-
-def choose_camera(
-    lines: Sequence[Places], azimuth: float | None = None, elevation: float | None = None
-) -> Camera:
-    """
-    Return the camera before which places hide each other least; its angles may be given.
-
-    Of every 10° of azimuth and three elevations it is the one that shortens lines between places
-    least, by the mean of the logarithms; axes count as shortened where it is within 30° of them.
-    """
-    azimuths = [radians(a) for a in _AZIMUTHS if a % 90] if azimuth is None else [azimuth]
-    elevations = [radians(e) for e in _ELEVATIONS] if elevation is None else [elevation]
-
-    def length_seen(camera: Camera) -> float:
-        total = 0.0
-        for vectors, most in zip(lines, (1.0, _AXIS_SEEN), strict=True):
-            if len(vectors):
-                seen = np.abs(camera.project(vectors)[0]) / np.linalg.norm(vectors, axis=1)
-                total += float(np.log(np.clip(seen, _SHORTEST, most)).mean())
-        return total
-
-    return max((Camera(a, e) for e in elevations for a in azimuths), key=length_seen)
+    return np.asarray(np.array(joint.axis) / np.linalg.norm(joint.axis))
 
 
 def projected_shapes(
@@ -403,47 +353,37 @@ def projected_shapes(
     """Return shapes in the picture, the farthest first, each with its strength from 0 to 1."""
     seen, near = camera.project(places)
     depths = [float(np.mean(near[list(part.corners)])) for part in drawing.parts]
-    order = list(depths)
-    for i, below in enumerate(drawing.below):
-        order[i] = max([order[i], *(order[other] for other in below)])
-    nearest = max(depths)
-    return [
-        (
-            _shape_of(part, [complex(seen[i]) for i in part.corners], drawing.size),
-            max(_FAINTEST, 1.0 - _FADING * (nearest - depth) / drawing.extent),
-        )
-        for _, _, depth, part in sorted(
-            (at, i, depths[i], drawing.parts[i]) for i, at in enumerate(order)
-        )
-    ]
+    nearest, found = max(depths), []
+    for i, part in enumerate(drawing.parts):
+        # A joint is in front of the links that it joins; a rail is behind all.
+        order = max([depths[i], *(depths[body] for body in drawing.below(part))])
+        shape = _shape_of(part, [complex(seen[row]) for row in part.corners], drawing.size)
+        strength = max(_FAINTEST, 1.0 - _FADING * (nearest - depths[i]) / drawing.extent)
+        found.append((part.role != 'rail', order, i, shape, strength))
+    return [(shape, strength) for *_, shape, strength in sorted(found, key=lambda each: each[:3])]
 
 
 def _shape_of(part: Part, corners: list[complex], size: float) -> Shape:
     radius = part.width * size
-    if part.role in STROKED:
+    if part.role in ('axis', 'rail'):
         return Segment(part.role, part.name, corners[0], corners[-1])
     if len(corners) == 1:
         return Circle(part.role, part.name, corners[0], radius)
-    if len(corners) > 2 and not part.is_hull:
-        return Polygon(part.role, part.name, _ribbon(corners, radius))
-    return Polygon(part.role, part.name, round_corners(convex_hull(corners), radius))
-
-
-def _ribbon(line: Sequence[complex], radius: float) -> tuple[complex, ...]:
-    """Return the outline of a band about a line."""
-    ways = np.gradient(np.array(line))
-    across = 1j * radius * ways / np.maximum(np.abs(ways), 1e-12)
-    one, other = np.array(line) + across, np.array(line) - across
-    return tuple(map(complex, (*one, *other[::-1])))
+    if len(corners) == 2 or part.is_hull:
+        return Polygon(part.role, part.name, round_corners(convex_hull(corners), radius))
+    ways = np.gradient(np.array(corners))
+    across = 1j * radius * ways / np.maximum(np.abs(ways), _SAME * radius)
+    edges = (*(corners + across), *(corners - across)[::-1])
+    return Polygon(part.role, part.name, tuple(map(complex, edges)))
 
 
 def skeleton_of(drawing: SpaceDrawing, places: Places, camera: Camera) -> Iterator[Segment]:
     """Yield the links as lines in the picture, for a pose in the background."""
     seen, _ = camera.project(places)
     for part in drawing.bodies:
-        corners = [complex(seen[i]) for i in part.corners]
+        corners: Sequence[complex] = [complex(seen[row]) for row in part.corners]
         if part.is_hull:
             corners = convex_hull(corners)
-            corners += corners[:1] if len(corners) > 2 else []
+            corners = [*corners, corners[0]] if len(corners) > 2 else corners
         for start, end in pairwise(corners):
             yield Segment('ghost', part.name, start, end)

@@ -27,7 +27,7 @@ instead. So are those of a spatial linkage, of which the page has places in spac
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
@@ -62,9 +62,6 @@ from numpy.typing import ArrayLike
 
 _FARTHEST = 1e30
 """In [m] or [rad]: larger values are implausible, and not written to the page."""
-
-_LOOKED_AT = 100
-"""Instants of a run, to see how far its slides go."""
 
 Places = Any
 """Array of complex numbers: positions in [m], or directions."""
@@ -346,22 +343,13 @@ def _drawing_of(
 
 def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
     """Return places of a spatial linkage instead of frames, and its drawing."""
-    drawing = SpaceDrawing(closure)
-
-    def place_all(numbers: Iterable[int]) -> Numbers:
-        found = np.full((len(inputs[0]), drawing.count, 3), np.nan)
-        for i in numbers:
-            given = [float(values[i]) for values in inputs]
-            if all(abs(value) < _FARTHEST for value in given):
-                position = closure.position(*given)
-                if position.joints:
-                    found[i] = drawing.places(position)
-        return found
-
-    count = len(inputs[0])
-    seen = place_all(range(0, count, max(1, count // _LOOKED_AT)))
-    drawing.stretch_rails([places for places in seen if np.isfinite(places).all()])
-    found = place_all(range(count))
+    drawing, count = SpaceDrawing(closure), len(inputs[0])
+    found = np.full((count, drawing.count, 3), np.nan)
+    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        if all(abs(value) < _FARTHEST for value in given):
+            position = closure.position(*given)
+            if position.joints:
+                found[i] = drawing.places(position)
     known = found[np.isfinite(found).all(axis=(1, 2))]
     if not len(known):
         known = drawing.places(closure.position(*usual_inputs(closure)))[None]
