@@ -168,38 +168,27 @@ class SpaceDrawing:
         """
         Return the camera before which links hide each other least; its angles may be given.
 
-        Of every 10° of azimuth and three elevations it is one before which the fewest joints and
-        points are behind bars. Of these it is the one that shortens lines between them least, by
-        the mean of the logarithms; axes count where it is within 30° of them.
+        Of every 10° of azimuth and three elevations it is the one that shortens lines between
+        joints and points least, by the mean of the logarithms. Axes count where it is within 30°
+        of them.
         """
         joined = places[sorted({row for rows in self._carried.values() for row in rows})]
-        lines = np.array([one - other for one, other in combinations(joined, 2)])
+        lines = [one - other for one, other in combinations(joined, 2)]
         rows = [part.corners for part in self.parts if part.role == 'axis']
-        axes = np.array([places[one] - places[other] for one, other in rows])
-        bars = [places[[body.corners[0], body.corners[-1]]] for body in self.bodies]
-
-        def count_hidden(camera: Camera) -> int:
-            (seen, near), hidden = camera.project(joined), 0
-            for bar in bars:
-                (start, end), (depth, deeper) = camera.project(bar)
-                along = (seen - start) / ((end - start) or 1.0)
-                share = np.clip(along.real, 0.0, 1.0)
-                off = np.abs(along - share) * abs(end - start)
-                nearer = depth + share * (deeper - depth) - near
-                hidden += int(np.count_nonzero((off < 2.5 * self.size) & (nearer > self.size)))
-            return hidden
-
-        def mean_log(vectors: Places, camera: Camera, most: float) -> float:
-            lengths = np.linalg.norm(vectors, axis=-1)
+        axes = [places[one] - places[other] for one, other in rows]
+        groups = []
+        for vectors, most in ((lines, 1.0), (axes, _AXIS_SEEN)):
+            lengths = np.linalg.norm(np.reshape(vectors, (-1, 3)), axis=1)
             there = lengths > _SAME * self.extent
-            if not there.any():
-                return 0.0
-            seen = np.abs(camera.project(vectors[there])[0]) / lengths[there]
-            return float(np.log(np.clip(seen, _SHORTEST, most)).mean())
+            if there.any():
+                groups.append((np.array(vectors)[there], lengths[there], most))
 
-        def quality(camera: Camera) -> tuple[int, float]:
-            seen = mean_log(lines, camera, 1.0) + mean_log(axes, camera, _AXIS_SEEN)
-            return -count_hidden(camera), seen
+        def quality(camera: Camera) -> float:
+            shares = (
+                (np.abs(camera.project(v)[0]) / lengths, most) for v, lengths, most in groups
+            )
+            means = [np.log(np.clip(share, _SHORTEST, most)).mean() for share, most in shares]
+            return float(sum(means))
 
         azimuths = [*map(radians, _AZIMUTHS)] if azimuth is None else [azimuth]
         elevations = [*map(radians, _ELEVATIONS)] if elevation is None else [elevation]
