@@ -91,7 +91,7 @@ class Part(NamedTuple):
     corners: tuple[int, ...]
     width: float = 1.0  # In widths of a bar
     is_hull: bool = False
-    joins: tuple[str, ...] = ()  # The links before which a joint is painted
+    joins: tuple[str, ...] = ()  # Parts before which it is painted, as a joint before links
 
 
 class SpaceDrawing:
@@ -158,9 +158,10 @@ class SpaceDrawing:
             found[row] = found[one] + way * min(length / np.linalg.norm(way), 0.9)
         return found
 
-    def below(self, part: Part) -> list[int]:
-        """Return the numbers of the links before which a part is painted."""
-        return [i for i, body in enumerate(self.bodies) if body.name in part.joins]
+    def below(self, number: int) -> list[int]:
+        """Return the numbers of the parts before which a part is painted."""
+        joins = self.parts[number].joins
+        return [i for i, other in enumerate(self.parts[:number]) if other.name in joins]
 
     def choose_camera(
         self, places: Places, azimuth: float | None = None, elevation: float | None = None
@@ -209,7 +210,7 @@ class SpaceDrawing:
             'has_lengths': self.has_lengths,
             'count': self.count,
             'shapes': [
-                {**part._asdict(), 'number': number, 'below': self.below(part)}
+                {**part._asdict(), 'number': number, 'below': self.below(number)}
                 for number, part in enumerate(self.parts)
             ],
             'traced': [
@@ -270,8 +271,10 @@ class SpaceDrawing:
             ends = begin - (not self._radius) * 5.0 * beyond, last + 5.0 * beyond
             yield Part('axis', name, self._add_places(link, *ends))
             for centre in centres[name]:
-                corners = self._add_places(link, centre - 1.6 * way, centre + 1.6 * way)
-                yield Part('base' if GROUND in joins else 'hinge', name, corners, 1.5, joins=joins)
+                corners = self._add_places(link, centre - 1.3 * way, centre + 1.3 * way)
+                yield Part(
+                    'base' if GROUND in joins else 'hinge', name, corners, 1.35, joins=joins
+                )
 
     def _slide_parts(self) -> Iterator[Part]:
         """Yield rails and blocks; links without places only keep others from turning."""
@@ -297,7 +300,7 @@ class SpaceDrawing:
             self.joints[name] = tube
             yield Part('link', name, (start, end), 0.6)
             role: Role = 'input' if name in self.linkage.driven else 'tube'
-            yield Part(role, name, (start, tube), 1.5)
+            yield Part(role, name, (start, tube), 1.5, joins=(name,))
 
     def _link_parts(self) -> Iterator[Part]:
         joints = self.linkage.pair_joints
@@ -324,10 +327,10 @@ class SpaceDrawing:
         return self._add_places(link, *arc)
 
     def _point_parts(self) -> Iterator[Part]:
-        ends = [end for pair in self.linkage.struts.values() for end in pair]
+        carriers = [*self.linkage.links.items(), *self.linkage.struts.items()]
         for name, row in self.points.items():
-            joins = tuple(link for link, names in self.linkage.links.items() if name in names)
-            shared = len(joins) + ends.count(name) > 1
+            joins = tuple(carrier for carrier, names in carriers if name in names)
+            shared = len(joins) > 1
             role: Role = 'base' if GROUND in joins else 'ball' if shared else 'pin'
             yield Part(role, name, (row,), 1.0 if shared else 0.6, joins=joins)
 
@@ -344,8 +347,8 @@ def projected_shapes(
     depths = [float(np.mean(near[list(part.corners)])) for part in drawing.parts]
     nearest, found = max(depths), []
     for i, part in enumerate(drawing.parts):
-        # A joint is in front of the links that it joins; a rail is behind all.
-        order = max([depths[i], *(depths[body] for body in drawing.below(part))])
+        # A rail is behind all.
+        order = max([depths[i], *(depths[other] for other in drawing.below(i))])
         shape = _shape_of(part, [complex(seen[row]) for row in part.corners], drawing.size)
         strength = max(_FAINTEST, 1.0 - _FADING * (nearest - depths[i]) / drawing.extent)
         found.append((part.role != 'rail', order, i, shape, strength))

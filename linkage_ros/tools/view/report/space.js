@@ -16,9 +16,9 @@ const Space = (() => {
     do {
       found.push(at);
       let [next] = pixels;
-      for (const [x, y] of pixels) {
-        const side = (next[0] - at[0]) * (y - at[1]) - (next[1] - at[1]) * (x - at[0]);
-        if (next === at || side < 0) next = pixels.find((each) => each[0] === x && each[1] === y);
+      for (const each of pixels) {
+        const [x, y, a, b] = [next[0] - at[0], next[1] - at[1], each[0] - at[0], each[1] - at[1]];
+        if (next === at || x * b < y * a) next = each;
       }
       at = next;
     } while (at !== found[0] && found.length < pixels.length);
@@ -67,7 +67,8 @@ const Space = (() => {
       });
       canvas.addEventListener('pointermove', (event) => {
         if (!canvas.hasPointerCapture(event.pointerId)) return;
-        this.turn((held.clientX - event.clientX) * PER_PIXEL, (event.clientY - held.clientY) * PER_PIXEL);
+        const [right, down] = [event.clientX - held.clientX, event.clientY - held.clientY];
+        this.turn(-right * PER_PIXEL, down * PER_PIXEL);
         held = event;
       });
       canvas.addEventListener('dblclick', () => {
@@ -93,15 +94,17 @@ const Space = (() => {
     draw(number, time, view) {
       const { shapes, extent } = this.linkage.drawn;
       if (this.linkage.hasPose(number, time)) {
-        const byNumber = [...shapes].sort((one, other) => one.number - other.number);
-        for (const shape of byNumber) {
-          const near = shape.corners.map((row) => this.linkage.place(row, number)[2]);
-          shape.near = near.reduce((sum, each) => sum + each) / near.length;
-          shape.order = Math.max(shape.near, ...shape.below.map((i) => byNumber[i].order));
+        const near = new Map();
+        for (const { number: own, corners } of shapes) {
+          const each = corners.map((row) => this.linkage.place(row, number)[2]);
+          near.set(own, each.reduce((sum, one) => sum + one) / each.length);
         }
-        const nearest = Math.max(...shapes.map((shape) => shape.near));
+        const nearest = Math.max(...near.values());
         for (const shape of shapes) {
-          shape.strength = Math.max(FAINTEST, 1 - (FADING * (nearest - shape.near)) / extent);
+          const own = near.get(shape.number);
+          shape.strength = Math.max(FAINTEST, 1 - (FADING * (nearest - own)) / extent);
+          shape.order = Math.max(own, ...shape.below.map((other) => near.get(other)));
+          if (shape.role === 'rail') shape.order = -Infinity;
         }
         shapes.sort((one, other) => one.order - other.order || one.number - other.number);
       }
