@@ -43,13 +43,7 @@ from linkage_ros.description import (
     written_linkage,
 )
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import (
-    check_planar,
-    prepare_view,
-    read_drawn_pose,
-    SpaceClosure,
-    usual_inputs,
-)
+from linkage_ros.kinematics import Closure, prepare_view, read_drawn_pose, usual_inputs
 from linkage_ros.resources import named_file
 from linkage_ros.tools.drawing.dxf import links_dxf
 from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture
@@ -98,15 +92,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
-    if arguments.assemblies:
-        return _draw_assemblies(arguments)
     named = named_file(arguments.file, 'linkages')
     content = linkage_content(named)
-    closure: Any = read_any_closure(content, named.stem)
-    for option in () if isinstance(closure, SpaceClosure) else ('azimuth', 'elevation'):
+    is_dxf = arguments.output and arguments.output.suffix.lower() == '.dxf'
+    if 'points' in content and (arguments.assemblies or is_dxf):
+        remedy = 'leave --assemblies out, and name an SVG, PNG or PDF'
+        raise LinkageError(arguments.file, 'is a spatial linkage', remedy)
+    for option in () if 'points' in content else ('azimuth', 'elevation'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
-    if arguments.output and arguments.output.suffix.lower() == '.dxf':
+    if arguments.assemblies:
+        return _draw_assemblies(arguments)
+    closure: Any = read_any_closure(content, named.stem)
+    if is_dxf:
         return _write_parts(closure, arguments)
     for option in ('width', 'hole'):
         if getattr(arguments, option) is not None:
@@ -126,9 +124,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _write_parts(closure: Any, arguments: argparse.Namespace) -> int:
+def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
     """Write the links as parts."""
-    check_planar(closure.name, closure.linkage)
     width, hole = (
         None if typed is None else typed / 1e3 for typed in (arguments.width, arguments.hole)
     )
