@@ -18,8 +18,13 @@ from linkage_ros import svg
 from linkage_ros.description import load
 from linkage_ros.kinematics import Circle, prepare_view, SpaceClosure, usual_inputs
 from linkage_ros.resources import spatial_linkage_names
-from linkage_ros.tools.drawing import draw_linkage, figure as drawing, paint_picture, SpaceDrawing
-from linkage_ros.tools.drawing.space_drawing import Camera
+from linkage_ros.tools.drawing import (
+    Camera,
+    draw_linkage,
+    figure as drawing,
+    paint_picture,
+    SpaceDrawing,
+)
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -30,9 +30,10 @@ from linkage_ros.kinematics import (
     symbol_size,
 )
 from linkage_ros.names import picture_text
-from linkage_ros.tools.drawing.drawn_linkage import draw_linkage, DrawnLinkage
+from linkage_ros.tools.drawing.drawn_linkage import draw_linkage
 from linkage_ros.tools.drawing.painting import (
     degree_step,
+    DrawnLinkage,
     GHOST,
     label_ends,
     LAYERS,
@@ -47,7 +48,6 @@ from linkage_ros.tools.drawing.painting import (
     set_plane,
     show_lengths,
 )
-from linkage_ros.tools.drawing.space_drawing import Camera
 
 
 def _turns_text(shown: LinkageView) -> str:
@@ -71,7 +71,7 @@ def paint_picture(
     camera: Sequence[float | None] = (None, None),
 ) -> None:
     """
-    Paint a picture to a file; of a spatial linkage from a camera, as `choose_camera` has it.
+    Paint a picture to a file; a spatial linkage from a camera, as `draw_linkage` does.
 
     A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
@@ -95,7 +95,8 @@ def paint_picture(
         )
         heading = picture_text(heading, 120)
         if drawn.camera:
-            heading += f'\nfrom {_camera_text(drawn.camera)}'
+            azimuth, elevation = map(degrees, drawn.camera)
+            heading += f'\nfrom azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'
         left.set_title(heading, loc='left', fontsize=9)
         paint_linkage(left, drawn, 3.0)
         turning_input = not shown.closure.linkage.inputs[0].slider
@@ -127,11 +128,6 @@ def paint_linkage(axes: Any, drawn: DrawnLinkage, margin: float) -> None:
     if drawn.camera:
         axes.set_axis_off()
         paint_frame(axes, drawn.camera.axes, low, high, has_lengths=drawn.has_lengths)
-
-
-def _camera_text(camera: Camera) -> str:
-    azimuth, elevation = (degrees(angle) for angle in camera)
-    return f'azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'
 
 
 def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
@@ -23,7 +23,17 @@ from warnings import catch_warnings, filterwarnings
 
 from linkage_ros.description import atomic_write
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics import Circle, COLOURS, FACES, INK, Polygon, Shape
+from linkage_ros.kinematics import (
+    bounding_corners,
+    Circle,
+    COLOURS,
+    FACES,
+    INK,
+    Polygon,
+    Segment,
+    Shape,
+    shape_outline,
+)
 from linkage_ros.names import picture_text
 
 _DIRECTIONS = 16
@@ -59,6 +69,40 @@ _SETTINGS: Any = {
     'axes.linewidth': 0.6,
     'text.parse_math': False,  # a name between dollar signs is not a formula
 }
+
+
+class DrawnName(NamedTuple):
+    """A name to be written beside one of some places, the first the best."""
+
+    text: str
+    anchors: Sequence[complex]
+    is_link: bool = False
+    clear: float = 1.2  # Of the anchor, in half widths of a bar
+
+
+class DrawnLinkage(NamedTuple):
+    """A linkage as it is painted; all lengths in [m]."""
+
+    size: float  # Half the width of a bar
+    shapes: Sequence[Shape]  # The topmost last
+    skeleton: Sequence[Segment]  # The links as lines
+    ghosts: Sequence[Sequence[Segment]]  # Poses in the background
+    paths: Mapping[str, Sequence[complex]]  # Of the traced points
+    dots: Mapping[str, complex]  # The traced points
+    names: Sequence[DrawnName]
+    strengths: Sequence[float] = ()  # How strong shapes are painted; those behind are fainter
+    camera: Any = None  # The `Camera` of a spatial linkage
+    has_lengths: bool = True
+
+    def corners(self, margin: float) -> tuple[complex, complex]:
+        """Return lower left and upper right of all, with a margin in half widths of a bar."""
+        places = [place for shape in self.shapes for place in shape_outline(shape)]
+        places += [place for path in self.paths.values() for place in path]
+        for lines in (self.skeleton, *self.ghosts):
+            places += [end for line in lines for end in shape_outline(line)]
+        low, high = bounding_corners(places)
+        edge = margin * self.size * (1.0 + 1.0j)
+        return low - edge, high + edge
 
 
 class Label(NamedTuple):

@@ -29,7 +29,9 @@ from linkage_ros.kinematics import (
     bar_size,
     Circle,
     convex_hull,
+    drawn_once,
     GROUND,
+    LinkageView,
     Polygon,
     Position,
     Role,
@@ -39,6 +41,7 @@ from linkage_ros.kinematics import (
     SpaceClosure,
     SpatialJoint,
 )
+from linkage_ros.tools.drawing.painting import DrawnLinkage, DrawnName
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,6 +53,8 @@ _ARC = 16
 
 _RAIL = 0.4
 """Length of a rail to either side of the pose, relative to the extent of the linkage."""
+
+_PLACES_ON_A_PATH = 180
 
 _SAME = 1e-6
 """Largest distance of places that are one, relative to the extent."""
@@ -379,3 +384,52 @@ def skeleton_of(drawing: SpaceDrawing, places: Places, camera: Camera) -> Iterat
             corners = [*corners, corners[0]] if len(corners) > 2 else corners
         for start, end in pairwise(corners):
             yield Segment('ghost', part.name, start, end)
+
+
+def draw_spatial(shown: LinkageView, angles: Sequence[float | None]) -> DrawnLinkage:
+    """Draw a spatial linkage from a camera, whose angles `SpaceDrawing.choose_camera` takes."""
+    drawing = SpaceDrawing(shown.closure)
+    over = shown.sweep.joints[0].x if shown.sweep.joints else ()
+    step = max(1, len(over) // _PLACES_ON_A_PATH)
+    moved = [shown.closure.position(value, *shown.inputs[1:]) for value in over[::step]]
+    swept = [drawing.places(position) for position in moved if position.joints]
+    several = len(shown.inputs) > 1 and not shown.are_ghosts_given
+    behind = [] if several else [drawing.places(ghost) for ghost in shown.ghosts]
+    places = drawing.places(shown.position)
+    camera = drawing.choose_camera(places, *angles)
+    drawn = projected_shapes(drawing, places, camera)
+    seen, _ = camera.project(places)
+    traced = {name: drawing.points[name] for name in shown.closure.linkage.traced}
+    paths = {}
+    for name, row in traced.items():
+        path = [complex(camera.project(each[row : row + 1])[0][0]) for each in swept]
+        if path:
+            paths[name] = drawn_once(path)
+    return DrawnLinkage(
+        drawing.size,
+        [shape for shape, _ in drawn],
+        list(skeleton_of(drawing, places, camera)),
+        [list(skeleton_of(drawing, each, camera)) for each in behind],
+        paths,
+        {name: complex(seen[traced[name]]) for name in paths},
+        list(_spatial_names(drawing, seen)),
+        [strength for _, strength in drawn],
+        camera,
+        drawing.has_lengths,
+    )
+
+
+def _spatial_names(drawing: SpaceDrawing, seen: Any) -> Iterator[DrawnName]:
+    for name, row in drawing.joints.items():
+        yield DrawnName(name, (complex(seen[row]),), clear=1.8)
+    for name, row in drawing.points.items():
+        yield DrawnName(name, (complex(seen[row]),))
+    for part in drawing.bodies:
+        corners = [complex(seen[row]) for row in part.corners]
+        anchors = [corners[len(corners) // 2], *corners[2:-2]]
+        if len(corners) == 2:
+            (one, other), parts = corners, (0.5, 0.35, 0.65, 0.25, 0.75)
+            anchors = [one + (other - one) * part for part in parts]
+        elif part.is_hull:
+            anchors = [sum(corners) / len(corners)]
+        yield DrawnName(part.name, anchors, is_link=True, clear=1.1)
