@@ -62,8 +62,11 @@ _SAME = 1e-6
 _AZIMUTHS, _ELEVATIONS = [a for a in range(-170, 190, 10) if a % 90], (20, 30, 40)
 """Directions of which one is chosen, in [°]."""
 
-_SHORTEST, _AXIS_SEEN = 0.02, 0.5
-"""Between these, relative to its length, an axis in the picture counts; other lines up to 1."""
+_BESIDE = 0.87
+"""Cosine of the angle between an axis and the direction in which it is seen, at most."""
+
+_SHORTEST = 0.01
+"""Length that is added to lines in the picture, relative to the extent: some are points."""
 
 _FAINTEST, _FADING = 0.4, 0.6
 """Least strength of a shape, and what is lost of it over the extent of the linkage."""
@@ -174,31 +177,28 @@ class SpaceDrawing:
         """
         Return the camera before which links hide each other least; its angles may be given.
 
-        Of every 10° of azimuth and three elevations it is the one that shortens lines between
-        joints and points least, by the mean of the logarithms. Axes count where it is within 30°
-        of them.
+        Of every 10° of azimuth and three elevations, where none is within 30° of an axis if that
+        can be, it is the one that shortens lines between joints and points least, by the mean of
+        the logarithms.
         """
         joined = places[sorted({row for rows in self._carried.values() for row in rows})]
-        lines = [one - other for one, other in combinations(joined, 2)]
+        lines = np.array([one - other for one, other in combinations(joined, 2)])
+        lines = lines[np.linalg.norm(lines, axis=-1) > _SAME * self.extent]
         rows = [part.corners for part in self.parts if part.role == 'axis']
-        axes = [places[one] - places[other] for one, other in rows]
-        groups = []
-        for vectors, most in ((lines, 1.0), (axes, _AXIS_SEEN)):
-            lengths = np.linalg.norm(np.reshape(vectors, (-1, 3)), axis=1)
-            there = lengths > _SAME * self.extent
-            if there.any():
-                groups.append((np.array(vectors)[there], lengths[there], most))
-
-        def quality(camera: Camera) -> float:
-            shares = (
-                (np.abs(camera.project(v)[0]) / lengths, most) for v, lengths, most in groups
-            )
-            means = [np.log(np.clip(share, _SHORTEST, most)).mean() for share, most in shares]
-            return float(sum(means))
-
+        axes = np.array([places[one] - places[other] for one, other in rows]).reshape(-1, 3)
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         azimuths = [*map(radians, _AZIMUTHS)] if azimuth is None else [azimuth]
         elevations = [*map(radians, _ELEVATIONS)] if elevation is None else [elevation]
-        return max((Camera(a, e) for e in elevations for a in azimuths), key=quality)
+        cameras = [Camera(a, e) for e in elevations for a in azimuths]
+        beside = [
+            each for each in cameras if np.abs(axes @ each.axes[2]).max(initial=0.0) < _BESIDE
+        ]
+
+        def length_seen(camera: Camera) -> float:
+            seen = np.abs(camera.project(lines)[0]) + _SHORTEST * self.extent
+            return float(np.log(seen).mean()) if len(lines) else 0.0
+
+        return max(beside or cameras, key=length_seen)
 
     def page_data(self, seen: Places) -> dict[str, Any]:
         """Return the drawing as JSON data; ``seen`` are its places at many positions."""
