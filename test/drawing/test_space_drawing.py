@@ -11,10 +11,8 @@
 from itertools import combinations
 from math import degrees
 from pathlib import Path
-import re
 from typing import Any
 
-from linkage_ros import svg
 from linkage_ros.description import load
 from linkage_ros.kinematics import Circle, prepare_view, SpaceClosure, usual_inputs
 from linkage_ros.resources import spatial_linkage_names
@@ -145,11 +143,3 @@ def test_a_strut_is_a_rod_in_a_tube_of_its_own_length(lift):
         slide = dict(zip(lift.joint_names, position.joints, strict=True))['rail']
         assert np.linalg.norm(moved - ends) == pytest.approx(abs(slide), abs=1e-12)
     assert np.ptp(lengths) < 1e-12
-
-
-def test_notebooks_show_a_spatial_linkage_too(lift):
-    text = svg(lift)
-    assert text.count('<circle') == len(lift.linkage.points)
-    size = re.search(r'width="(\d+)" height="(\d+)"', text)
-    assert size
-    assert max(map(int, size.groups())) == 420

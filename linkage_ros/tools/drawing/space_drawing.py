@@ -25,6 +25,7 @@ from itertools import combinations, pairwise
 from math import dist, radians
 from typing import Any, NamedTuple
 
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
     bar_size,
     Circle,
@@ -112,6 +113,8 @@ class SpaceDrawing:
         The parts, and those of them that are links.
     points, joints
         For each point and each joint the number of a place.
+    traced
+        The traced points that a link carries.
     size
         Half the width of a bar, in [m].
     has_lengths
@@ -131,15 +134,17 @@ class SpaceDrawing:
         self._tubes: list[tuple[int, int, int, float]] = []
         self._carried: dict[str, list[int]] = {link: [] for link in self.linkage.link_names}
         hinges = [hinge.at for hinge in self.linkage.hinges.values()]
-        places = np.array([*self.linkage.points.values(), *hinges])
+        places = np.array([*self.linkage.points.values(), *hinges] or [(0.0, 0.0, 0.0)])
         extent = float(np.linalg.norm(np.ptp(places, axis=0)))
         self.has_lengths, self.extent = extent > 0.0, extent or 2.0
         one_place = len(hinges) > 2 and np.ptp(hinges, axis=0).max() <= _SAME * self.extent
         self._radius = 0.5 * self.extent if one_place else 0.0
+        self._add_places(GROUND, np.zeros(3))  # one place there is, if there are only slides
         # What links carry comes first: it determines the size of symbols.
         for link, names in self.linkage.links.items():
             for name in names:
                 self.points[name] = self._carry(link, np.array(self.linkage.points[name]))
+        self.traced = [name for name in self.linkage.traced if name in self.points]
         centres = self._hinge_centres()
         bars = [
             dist(*map(self._pose_place, rows))
@@ -182,10 +187,10 @@ class SpaceDrawing:
         the logarithms.
         """
         joined = places[sorted({row for rows in self._carried.values() for row in rows})]
-        lines = np.array([one - other for one, other in combinations(joined, 2)])
-        lines = lines[np.linalg.norm(lines, axis=-1) > _SAME * self.extent]
+        lines = np.array([a - b for a, b in combinations(joined, 2)]).reshape(-1, 3)
+        lines = lines[np.linalg.norm(lines, axis=1) > _SAME * self.extent]
         rows = [part.corners for part in self.parts if part.role == 'axis']
-        axes = np.array([places[one] - places[other] for one, other in rows]).reshape(-1, 3)
+        axes = np.array([places[a] - places[b] for a, b in rows]).reshape(-1, 3)
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         azimuths = [*map(radians, _AZIMUTHS)] if azimuth is None else [azimuth]
         elevations = [*map(radians, _ELEVATIONS)] if elevation is None else [elevation]
@@ -219,8 +224,7 @@ class SpaceDrawing:
                 for number, part in enumerate(self.parts)
             ],
             'traced': [
-                {'point': name, 'link': self.points[name], 'at': []}
-                for name in self.linkage.traced
+                {'point': name, 'link': self.points[name], 'at': []} for name in self.traced
             ],
             'paths': {},
         }
@@ -388,30 +392,30 @@ def skeleton_of(drawing: SpaceDrawing, places: Places, camera: Camera) -> Iterat
 
 def draw_spatial(shown: LinkageView, angles: Sequence[float | None]) -> DrawnLinkage:
     """Draw a spatial linkage from a camera, whose angles `SpaceDrawing.choose_camera` takes."""
-    drawing = SpaceDrawing(shown.closure)
-    over = shown.sweep.joints[0].x if shown.sweep.joints else ()
-    step = max(1, len(over) // _PLACES_ON_A_PATH)
-    moved = [shown.closure.position(value, *shown.inputs[1:]) for value in over[::step]]
-    swept = [drawing.places(position) for position in moved if position.joints]
+    drawing, closure = SpaceDrawing(shown.closure), shown.closure
+    if not drawing.parts:
+        raise LinkageError(closure.name, 'has only slides, which have no place', 'add a point')
     several = len(shown.inputs) > 1 and not shown.are_ghosts_given
     behind = [] if several else [drawing.places(ghost) for ghost in shown.ghosts]
     places = drawing.places(shown.position)
     camera = drawing.choose_camera(places, *angles)
     drawn = projected_shapes(drawing, places, camera)
     seen, _ = camera.project(places)
-    traced = {name: drawing.points[name] for name in shown.closure.linkage.traced}
+    over = shown.sweep.joints[0].x if drawing.traced and shown.sweep.joints else ()
+    step = max(1, len(over) // _PLACES_ON_A_PATH)
+    moved = [closure.position(value, *shown.inputs[1:]) for value in over[::step]]
+    points = [closure.points(position) for position in moved if position.joints]
     paths = {}
-    for name, row in traced.items():
-        path = [complex(camera.project(each[row : row + 1])[0][0]) for each in swept]
-        if path:
-            paths[name] = drawn_once(path)
+    for name in drawing.traced if points else ():
+        path, _ = camera.project(np.array([place[name] for place in points]))
+        paths[name] = drawn_once(path.tolist())
     return DrawnLinkage(
         drawing.size,
         [shape for shape, _ in drawn],
         list(skeleton_of(drawing, places, camera)),
         [list(skeleton_of(drawing, each, camera)) for each in behind],
         paths,
-        {name: complex(seen[traced[name]]) for name in paths},
+        {name: complex(seen[drawing.points[name]]) for name in paths},
         list(_spatial_names(drawing, seen)),
         [strength for _, strength in drawn],
         camera,
