@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from .runs import BEGIN, data_of, MS, page_of_run, read, recorded
-from .test_page_in_browser import page_of, quiet, readout, settle
+from .test_page_in_browser import page_of, PAINTED, quiet, settle
 from ..node.ticked import Moment
 
 WISHBONE = Path(__file__).parents[2] / 'config' / 'linkages' / 'space' / 'wishbone.yaml'
@@ -28,8 +28,6 @@ SCENE = """
 rate: 200
 drive: {sine: {amplitude: 0.2, frequency: 1.0, inputs: {rack: {amplitude: 0.03, frequency: 2.0}}}}
 """
-PLACES = """() => Report.linkages[0].drawn.shapes.flatMap((shape) => shape.corners)
-  .map((row) => [row, Report.linkages[0].place(row, Report.number)])"""
 
 
 @pytest.fixture(scope='module')
@@ -78,17 +76,21 @@ def test_the_data_are_the_places_of_the_drawing_at_the_recorded_inputs(bag):
 
 
 def test_places_are_projected_as_in_the_picture_of_draw(page, canvas):
+    model = SpaceDrawing(load(WISHBONE))
     for share in (0.0, 0.3, 0.8):
         page.locator('#scrub').fill(str(round(share * 1e6)))
-        model = SpaceDrawing(load(WISHBONE))
         inputs = page.evaluate(
             "['travel', 'rack'].map((name) => Report.frames.values[name][Report.number])"
         )
         places = model.places(model.closure.position(*inputs))
         middle = page.evaluate('Report.linkages[0].drawn.middle')
         seen, near = camera_of(page).project(places - np.array(middle))
-        for row, told in page.evaluate(PLACES):
-            assert told == pytest.approx([seen[row].real, seen[row].imag, near[row]], abs=1e-6)
+        told = page.evaluate(
+            f'[...Array({model.count}).keys()].map('
+            '(row) => Report.linkages[0].place(row, Report.number))'
+        )
+        expected = np.array([seen.real, seen.imag, near]).T
+        assert np.array(told) == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_drag_and_arrow_keys_turn_the_camera_and_the_run_stands_still(page, canvas):
@@ -118,17 +120,12 @@ def test_a_drag_and_arrow_keys_turn_the_camera_and_the_run_stands_still(page, ca
     assert camera_of(page) == pytest.approx(first)
 
 
-def test_elsewhere_keys_move_the_run_and_the_picture_follows(page, canvas):
-    before = page.evaluate(PLACES)
+def test_other_keys_move_the_run(page, canvas):
     page.keyboard.press('ArrowRight')
     assert page.evaluate('Report.number') == 1
-    assert page.evaluate(PLACES) != before
     canvas.focus()
     page.keyboard.press('End')
     assert page.evaluate('Report.number') == 199
-    assert float(readout(page)['rack'].split()[0]) == pytest.approx(
-        page.evaluate('Report.frames.values.rack[199]'), abs=1e-5
-    )
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
@@ -136,22 +133,11 @@ def test_parts_are_painted_in_the_colours_of_the_page(browser, bag, scheme):
     with quiet(browser, page_of(bag.path), color_scheme=scheme) as page:
         settle(page)
         ink = page.evaluate('Picture.ink()')
-        roles = {shape['role'] for shape in page.evaluate('Report.linkages[0].drawn.shapes')}
-        assert all(ink.get(role) for role in roles - {'axis', 'rail'})
-        assert page.locator('canvas.orbit').get_attribute('aria-label')
-        painted = page.evaluate("""() => {
-          const canvas = document.querySelector('canvas.orbit');
-          const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d');
-          copy.drawImage(canvas, 0, 0);
-          const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
-          const found = new Set();
-          for (let i = 0; i < data.length; i += 4) {
-            const parts = [data[i], data[i + 1], data[i + 2]];
-            found.add(`#${parts.map((each) => each.toString(16).padStart(2, '0')).join('')}`);
-          }
-          return [...found];
-        }""")
-        assert {ink['input'], ink['base'], ink['ball']} <= set(painted)
+        wanted = {
+            ','.join(str(int(ink[role][k : k + 2], 16)) for k in (1, 3, 5))
+            for role in ('input', 'base', 'ball')
+        }
+        assert wanted <= page.evaluate(PAINTED)[0].keys()
 
 
 def test_a_linkage_that_never_closed_has_no_pose(tmp_path):
