@@ -61,9 +61,10 @@ Made by `python -m campaigns.space --write`, a part of `make accuracy`.
 Errors are given in units of u·κ, as in [campaign.md](campaign.md). For a step κ goes over all that
 it starts from: places, distances, velocities and accelerations. For a linkage it goes over all
 places and axes, the length of each rod, which is a number of its own, the inputs, their rates and
-their accelerations; a published angle counts as π at least. The reference has 80 digits; its rates
-and accelerations are differences along the motion. *near*: 1e-9 to 1e-3 from a toggle. The limit
-is 4.
+their accelerations, and as in the plane over the point that a step passes to the next one, with
+its velocity and acceleration, each with its own κ; a published angle counts as π at least. The
+reference has 80 digits; its rates and accelerations are differences along the motion. *near*: 1e-9
+to 1e-3 from a toggle. The limit is 4.
 """,
 )
 
@@ -208,17 +209,20 @@ def rssr_case(random: Random) -> Case:
     places = (*linkage.points.values(), crank.at, crank.axis, rocker.at, rocker.axis)
     sign = sign_of(closure, 'rocker')
 
-    def angle(numbers: Sequence[Any], t: Any) -> Any:
-        a, b, at, axis, to_at, to_axis = (_three(numbers, 3 * k) for k in range(6))
-        rod, q, w, change = numbers[18:]
-        now = turned_about(a, at, axis, q + w * t + change * t * t / 2)
-        return angle_to_meet(b, to_at, to_axis, now, rod, sign)
+    def pin(numbers: Sequence[Any], t: Any) -> Any:
+        q, w, change = numbers[19:]
+        a, at, axis = (_three(numbers, 3 * k) for k in (0, 2, 3))
+        return turned_about(a, at, axis, q + w * t + change * t * t / 2)
+
+    def angle(numbers: Sequence[Any], now: Any) -> Any:
+        b, at, axis = (_three(numbers, 3 * k) for k in (1, 4, 5))
+        return angle_to_meet(b, at, axis, now, numbers[18], sign)
 
     # The length of the rod is a number of its own, which is rounded wherever it comes from. If κ
     # took it for a function of the ends, it would be 0 at the pose even next to a toggle.
     numbers = [*(n for place in places for n in place), exact_distance(*places[:2]), *state]
     (found,) = joint_orders(closure, *([number] for number in state))
-    return Case(errors_of(angle, numbers, found, floor=pi), (linkage, state))
+    return Case(errors_of(angle, numbers, found, pi, pin), (linkage, state))
 
 
 _ANKLE = {'m1': ('b1', 'c1'), 'm2': ('b2', 'c2')}
@@ -246,19 +250,19 @@ def ankle_case(random: Random) -> Case:
         places += [part for hinge in hinges for part in (hinge.at, hinge.axis)]
         sign = sign_of(closure, motor)
 
-        def angle(numbers: Sequence[Any], t: Any, sign: int = sign) -> Any:
-            b, c, at1, axis1, at2, axis2, at3, axis3 = (_three(numbers, 3 * n) for n in range(8))
-            pitch, roll = (
-                numbers[25 + n] + numbers[27 + n] * t + numbers[29 + n] * t * t / 2
-                for n in range(2)
-            )
-            now = turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
-            return angle_to_meet(b, at3, axis3, now, numbers[24], sign)
+        def pin(numbers: Sequence[Any], t: Any) -> Any:
+            c, at1, axis1, at2, axis2 = (_three(numbers, 3 * n) for n in range(1, 6))
+            pitch, roll = moved(numbers[25:27], numbers[27:29], numbers[29:], t)
+            return turned_about(turned_about(c, at2, axis2, roll), at1, axis1, pitch)
+
+        def angle(numbers: Sequence[Any], now: Any, sign: int = sign) -> Any:
+            b, at, axis = (_three(numbers, 3 * n) for n in (0, 6, 7))
+            return angle_to_meet(b, at, axis, now, numbers[24], sign)
 
         rod = exact_distance(*places[:2])
         numbers = [*(n for place in places for n in place), rod]
         numbers += [part for state in states for part in state]
-        errors.append(errors_of(angle, numbers, orders, floor=pi))
+        errors.append(errors_of(angle, numbers, orders, pi, pin))
     return Case([max(each) for each in zip(*errors, strict=True)], states)
 
 

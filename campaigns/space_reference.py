@@ -13,6 +13,7 @@ differences in each number that is given.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from mpmath import mp, mpf
@@ -80,40 +81,72 @@ def errors_of(
     given: Sequence[float],
     found: Sequence[float],
     floor: Any = None,
+    passed: Callable[[Sequence[Any], Any], Row] | None = None,
 ) -> list[float]:
     """
     Return the errors of a value, its rate and its acceleration at the time 0, in u·κ.
 
     ``function`` takes the given numbers and the time. With a ``floor`` the value is an angle
-    modulo 2π, which counts as the floor at least.
+    modulo 2π, which counts as the floor at least. ``passed`` takes both and gives the point that
+    a step passes to the next one; ``function`` then takes this point instead of the time. Place,
+    velocity and acceleration of the point are rounded, so each counts with its own κ.
     """
     with mp.workdps(DIGITS):
         exact = [mpf(number) for number in given]
+        sizes = [abs(number) for number in exact]
 
-        def orders(numbers: Sequence[Any]) -> list[mpf]:
-            before, now, after = (function(numbers, k * _STEP) for k in (-1, 0, 1))
-            return [
-                now,
-                (after - before) / (2 * _STEP),
-                (after - 2 * now + before) / _STEP**2,
-            ]
+        def whole(numbers: Sequence[Any], t: Any) -> Any:
+            return function(numbers, passed(numbers, t) if passed else t)
 
-        values = orders(exact)
-        kappa = [abs(value) for value in values]
+        values, kappa = _orders(whole, exact), _sums_of_changes(whole, exact, sizes)
+        if passed:
+            parts = [partial(_part, passed, axis) for axis in range(3)]
+            orders = [_orders(part, exact) for part in parts]
+            spreads = [_sums_of_changes(part, exact, sizes) for part in parts]
+            # The three places, then the velocities, then the accelerations.
+            point, spread = (
+                [one[k] for k in range(3) for one in each] for each in (orders, spreads)
+            )
+            widths = [abs(n) + w for n, w in zip(point, spread, strict=True)]
+
+            def after(numbers: Sequence[Any], t: Any) -> Any:
+                return function(exact, moved(numbers[:3], numbers[3:6], numbers[6:], t))
+
+            more = _sums_of_changes(after, point, widths)
+            kappa = [one + other for one, other in zip(kappa, more, strict=True)]
         off = [mpf(one) - value for one, value in zip(found, values, strict=True)]
+        kappa = [abs(value) + one for value, one in zip(values, kappa, strict=True)]
         if floor is not None:
-            kappa[0] = max(kappa[0], floor)
+            kappa[0] += max(floor - abs(values[0]), 0)
             off[0] -= 2 * mp.pi * mp.nint(off[0] / (2 * mp.pi))
-        for k, number in enumerate(exact):
-            if number:
-                beside = list(exact)
-                beside[k] = number * (1 + mpf(10) ** -15)
-                for order, value in enumerate(orders(beside)):
-                    kappa[order] += abs(value - values[order]) * mpf(10) ** 15
         return [
             float(abs(error) / (_UNIT_ROUNDOFF * size)) if error else 0.0
             for error, size in zip(off, kappa, strict=True)
         ]
+
+
+def _orders(function: Callable[[Sequence[Any], Any], Any], numbers: Sequence[Any]) -> Row:
+    """Return a value, its rate and its acceleration at the time 0."""
+    before, now, after = (function(numbers, k * _STEP) for k in (-1, 0, 1))
+    return [now, (after - before) / (2 * _STEP), (after - 2 * now + before) / _STEP**2]
+
+
+def _sums_of_changes(
+    function: Callable[[Sequence[Any], Any], Any], numbers: Sequence[Any], widths: Sequence[Any]
+) -> Row:
+    """Return for each order the sum of its changes, as each number changes by its width."""
+    values, sums = _orders(function, numbers), [mpf(0)] * 3
+    for k, width in enumerate(widths):
+        if width:
+            beside = list(numbers)
+            beside[k] += width * mpf(10) ** -15
+            changes = zip(sums, _orders(function, beside), values, strict=True)
+            sums = [total + abs(one - value) * mpf(10) ** 15 for total, one, value in changes]
+    return sums
+
+
+def _part(function: Callable[..., Row], axis: int, numbers: Sequence[Any], t: Any) -> Any:
+    return function(numbers, t)[axis]
 
 
 def turn(vector: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:

@@ -360,7 +360,7 @@ def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     Empty if there is none, or if there are several inputs.
     """
     ranges, bounds = closure.closing_ranges, closure.bounds
-    if bounds.inputs:
+    if bounds.inputs and ranges:
         ranges = within_own(closure, ranges)
     if bounds.joints:
         ranges = within_published(closure, ranges, bounds.joints)

@@ -357,3 +357,13 @@ def test_with_several_inputs_the_limits_of_each_joint_hold():
         assert by in ('left_joint', 'rod_joint')
         assert InputSweep(closure, (1.5, 1.5)).position_at(end + outward * 1e-6).status is LIMITED
     assert remainder(rod, tau) == rod
+
+
+@pytest.mark.parametrize(
+    'limits', [dict.fromkeys(names, ', limits: [-2, 2]') for names in
+               (('left',), ('left', 'right'), ('rod',), ('left', 'right', 'rod'))]
+)  # fmt: skip
+def test_several_inputs_have_no_ranges_whatever_is_limited(limits):
+    closure = closed(symmetric_five_bar(**{'left': '', **limits}))
+    assert closure.input_ranges == ()
+    assert closure.bounds.inputs or closure.bounds.joints

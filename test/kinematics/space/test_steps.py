@@ -29,7 +29,7 @@ from ...support.sampling import sample_count
 @pytest.mark.parametrize('family', FAMILIES)
 def test_what_is_closed_is_as_exact_as_its_numbers(family):
     random, draw = Random(family), FAMILIES[family]
-    for _ in range(sample_count(1000, 30)):
+    for _ in range(sample_count(300, 20)):
         case = draw(random)
         for order, error in zip(ORDERS, case.errors, strict=True):
             assert error <= LIMIT, (order, case.given)
