@@ -134,7 +134,7 @@ def test_parts_are_painted_in_the_colours_of_the_page(browser, bag, scheme):
         settle(page)
         ink = page.evaluate('Picture.ink()')
         wanted = {
-            ','.join(str(int(ink[role][k : k + 2], 16)) for k in (1, 3, 5))
+            ','.join(map(str, bytes.fromhex(ink[role].removeprefix('#'))))
             for role in ('input', 'base', 'ball')
         }
         assert wanted <= page.evaluate(PAINTED)[0].keys()

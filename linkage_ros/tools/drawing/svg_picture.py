@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 from xml.sax.saxutils import escape
 
 from linkage_ros.errors import quote
@@ -58,8 +59,9 @@ def svg(shown: Closure | SpaceClosure | Position) -> str:
         If it is neither.
 
     """
-    closed = isinstance(shown, (Closure, SpaceClosure))
-    position = shown.position(*usual_inputs(shown)) if closed else shown  # type: ignore[union-attr, arg-type]
+    position: Any = shown
+    if isinstance(shown, (Closure, SpaceClosure)):
+        position = shown.position(*usual_inputs(shown))
     if not isinstance(position, Position):
         raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
     drawn = draw_linkage(prepare_view(position.closure, position.inputs))
