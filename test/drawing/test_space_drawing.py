@@ -68,6 +68,16 @@ def test_every_point_has_its_dot_where_it_is_and_joints_are_where_links_meet(nam
         for body in bodies:
             apart = np.linalg.norm(places[list(body.corners)] - middle, axis=1)
             assert apart.min() < 1e-9
+    # The farthest link is painted first, and a ball after the links that it joins.
+    order = [(each.role, each.name) for each in shapes]
+    _, near = Camera(0.4, 0.5).project(places)
+    bodies = sorted(model.bodies, key=lambda one: order.index((one.role, one.name)))
+    depths = [near[list(body.corners)].mean() for body in bodies]
+    assert depths == sorted(depths)
+    for ball in (part for part in model.parts if part.role in ('base', 'ball')):
+        joined = [(body.role, body.name) for body in bodies if body.name in ball.joins]
+        at = order.index((ball.role, ball.name))
+        assert all(order.index(each) < at for each in joined)
 
 
 @pytest.mark.sample(2)
