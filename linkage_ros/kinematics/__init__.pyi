@@ -137,6 +137,7 @@ from linkage_ros.kinematics.shapes import (
     INK as INK,
     LinkFrame as LinkFrame,
     Polygon as Polygon,
+    Role as Role,
     round_corners as round_corners,
     Segment as Segment,
     Shape as Shape,

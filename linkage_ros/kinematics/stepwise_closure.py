@@ -136,6 +136,11 @@ class StepwiseClosure:
         named = ' '.join(filter(None, (type(self).__name__, escape_unprintable(self.name))))
         return f'<{named}: {has}>'
 
+    def _repr_svg_(self) -> str:
+        from linkage_ros import svg  # local import: only a notebook asks for pictures
+
+        return svg(self)  # type: ignore[arg-type]
+
     def position(self, *inputs: float) -> Position:
         """
         Close the loops.
