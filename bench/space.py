@@ -24,6 +24,8 @@ RATE, ACCELERATION = 3.0, 0.5
 TARGETS = {'rssr': '≤ 1.6', 'delta': '≤ 4', 'ankle': '≤ 5'}
 _REACH = 0.3
 """How far states lie from the pose, in [rad] of each input."""
+_KNOT, _KNOT_TARGET = 'ankle_motors', '≤ 15'
+"""What closes only together, with rates."""
 
 
 def measure_space(rounds: int, states: int, batch: int) -> Table:
@@ -40,6 +42,12 @@ def measure_space(rounds: int, states: int, batch: int) -> Table:
     }
     for name, target in TARGETS.items():
         compare(table, 'µs a state', name, 'four_bar', times, target)
+    solvers = {name: _over_states(load(name), states, 1) for name in ('four_bar', _KNOT)}
+    times = {
+        name: [1e6 * seconds / states for seconds in found]
+        for name, found in in_turn(solvers, rounds).items()
+    }
+    compare(table, 'µs a state, with rates', _KNOT, 'four_bar', times, _KNOT_TARGET)
     batches = {name: _over_batch(closures[name], batch) for name in ('four_bar', 'rssr')}
     speeds = {
         name: [batch / seconds / 1e6 for seconds in found]
@@ -49,15 +57,16 @@ def measure_space(rounds: int, states: int, batch: int) -> Table:
     return table
 
 
-def _over_states(closure: Any, count: int) -> Callable[[], None]:
+def _over_states(closure: Any, count: int, derivatives: int = 2) -> Callable[[], None]:
     """Return a function that solves states about the pose, one at a time."""
-    random, solve = Random(closure.name), Compiled(closure, 2).fast
+    random, solve = Random(closure.name), Compiled(closure, derivatives).fast
     pose = closure.linkage.pose.inputs if closure.linkage.pose else (1.0,)
     given: list[list[float]] = []
     while len(given) < count:
         inputs = [value + random.uniform(-_REACH, _REACH) for value in pose]
         if closure.position(*inputs).status is Status.CLOSED:  # Not beyond limits
-            given.append([*inputs, *[RATE] * len(pose), *[ACCELERATION] * len(pose)])
+            state = [*inputs, *[RATE] * len(pose), *[ACCELERATION] * len(pose)]
+            given.append(state[: len(pose) * (1 + derivatives)])
     if any(solve(*state) is None for state in given):
         raise MeasurementError(f'{closure.name}: leaves the compiled function')
 

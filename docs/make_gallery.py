@@ -26,31 +26,26 @@ import sys
 from linkage_ros.cli import angle_text, describe_group, fixed_text
 from linkage_ros.description import load
 from linkage_ros.kinematics import (
-    all_places,
-    bounding_corners,
     Closure,
     conditioning_curves,
-    draw_shapes,
     Driven,
     InputSweep,
     LinkageView,
     links_of,
     prepare_view,
-    shape_outline,
     sides_at,
-    symbol_size,
+    SpaceClosure,
     transmission_angles,
     usual_inputs,
 )
 from linkage_ros.tools.drawing import (
     animate,
-    paint_background,
+    draw_linkage,
+    paint_linkage,
     paint_picture,
-    paint_shapes,
     picture_settings,
     range_motion,
     save_picture,
-    set_plane,
 )
 from matplotlib.figure import Figure
 from PIL import Image
@@ -74,6 +69,15 @@ stand for them in all commands, as in `linkage check jansen_leg`; `linkage galle
 copies one. `make gallery` makes this page and theirs from the files; do not edit them.
 """
 
+_PLANAR_LOOK = (
+    '*Driven links are orange, poses over the whole range light grey, paths of traced points '
+    'dashed.*'
+)
+_SPATIAL_LOOK = (
+    '*Driven links are orange, joints of the ground dark cylinders, balls dots; poses over the '
+    'range of a single input are light grey, paths of traced points dashed.*'
+)
+
 _CONTENTS = """\
 
 ```{toctree}
@@ -90,7 +94,7 @@ def main() -> int:
     folder = DOCS / 'gallery'
     shutil.rmtree(folder, ignore_errors=True)
     (folder / 'thumbnails').mkdir(parents=True)
-    files = sorted(LINKAGES.glob('*.yaml'))
+    files = [*sorted(LINKAGES.glob('*.yaml')), *sorted(LINKAGES.glob('space/*.yaml'))]
     sizes = {}
     for file in files:
         closure = load(file)
@@ -114,19 +118,11 @@ def main() -> int:
 
 def thumbnail(shown: LinkageView, file: Path) -> None:
     """Draw a linkage alone, small."""
-    size = symbol_size(shown)
-    drawn = draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = bounding_corners(
-        [*all_places(shown), *(p for shape in drawn for p in shape_outline(shape))]
-    )
-    margin = complex(2.0, 2.0) * size
     with picture_settings():
         figure = Figure(figsize=(4.0, 3.0), dpi=100)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        set_plane(axes, low - margin, high + margin)
+        paint_linkage(axes, draw_linkage(shown)._replace(has_lengths=False), 2.0)
         axes.set_axis_off()
-        paint_background(axes, shown)
-        paint_shapes(axes, drawn)
         save_picture(figure, file)
 
 
@@ -153,21 +149,18 @@ def overview(files: Sequence[Path]) -> Iterator[str]:
         yield f'- [![](gallery/thumbnails/{name}.png) {name}](gallery/{name}.md)'
 
 
-def chapter(closure: Closure, file: Path, drawn: Path) -> Iterator[str]:
+def chapter(closure: Closure | SpaceClosure, file: Path, drawn: Path) -> Iterator[str]:
     """Yield the lines of the page on a linkage."""
     name = file.stem
     yield f'# {name}'
     yield ''
     yield f'![{name}, its range and its joints]({drawn.name})'
     yield ''
-    yield (
-        '*Driven links are orange, poses over the whole range light grey, paths of traced '
-        'points dashed.*'
-    )
+    yield _PLANAR_LOOK if isinstance(closure, Closure) else _SPATIAL_LOOK
     yield ''
     yield _head(file)
     yield ''
-    yield f'- [{file.name}](../../config/linkages/{file.name})'
+    yield f'- [{file.name}](../../config/linkages/{file.relative_to(LINKAGES)})'
     yield f'- Solved: {_sequence(closure)}'
     yield f'- Range: {_range(closure)}'
     extreme = _worst(closure)
@@ -186,7 +179,16 @@ def _head(file: Path) -> str:
     return ' '.join(lines)
 
 
-def _sequence(closure: Closure) -> str:
+def group_words(kind: str, links: Sequence[str], method: str, assembly: str) -> Iterator[str]:
+    """Yield what the page says of a group of a spatial linkage."""
+    yield kind
+    yield ', '.join(links)
+    yield f'({method}{"; " * bool(assembly)}{assembly})'
+
+
+def _sequence(closure: Closure | SpaceClosure) -> str:
+    if isinstance(closure, SpaceClosure):
+        return '; '.join(' '.join(filter(None, group_words(*group))) for group in closure.groups)
     steps = []
     sides = sides_at(closure, closure.position(*usual_inputs(closure)))
     for index, group in enumerate(closure.structure.groups):
@@ -200,7 +202,7 @@ def _sequence(closure: Closure) -> str:
     return '; '.join(steps)
 
 
-def _range(closure: Closure) -> str:
+def _range(closure: Closure | SpaceClosure) -> str:
     if len(closure.linkage.inputs) > 1:
         return 'depends on every input'
     sweep = InputSweep(closure)
@@ -217,9 +219,9 @@ def _range(closure: Closure) -> str:
     return ' or '.join(intervals)
 
 
-def _worst(closure: Closure) -> str:
+def _worst(closure: Closure | SpaceClosure) -> str:
     """Return the smallest transmission angle of all dyads, or the worst conditioning."""
-    if len(closure.linkage.inputs) > 1:
+    if len(closure.linkage.inputs) > 1 or isinstance(closure, SpaceClosure):
         return ''
     sweep = InputSweep(closure)
     angles = transmission_angles(sweep)

@@ -116,7 +116,7 @@ def test_what_a_prompt_shows_is_short(shown, text):
     assert repr(shown) == text
 
 
-@pytest.mark.parametrize('name', lr.linkage_names())
+@pytest.mark.parametrize('name', [*lr.linkage_names(), 'wishbone', 'rssr'])
 def test_every_linkage_is_a_picture_in_a_notebook(name):
     closure = lr.load(name)
     root = ET.fromstring(closure._repr_svg_())

@@ -394,7 +394,8 @@ def _refuse_in_space(
     drives = section_with('drive')
     if drive == 'torque':
         raise drives.error('drive.torque', reason, 'drive it by topic or at a given motion')
-    if drive == 'topic' and 'joint' in drives.section('drive').section('topic'):
+    topic = drives.section('drive', required=False)
+    if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
     for key in ('loads', 'robot_description'):
         if key in section_with(key):

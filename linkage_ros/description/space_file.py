@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from linkage_ros.description.linkage_grammar import ratio_in_si, UNITS
@@ -25,6 +26,8 @@ from linkage_ros.kinematics import (
     SpaceLinkage,
     SpatialJoint,
 )
+
+_AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
 
 
 def is_spatial(content: Section) -> bool:
@@ -51,8 +54,10 @@ def _own_key(content: Section, where: str) -> str:
     section, _, part = where.partition('.')
     if section == 'joints' and part:
         name = part.partition('.')[0]
-        kind = next(of for of in ('hinges', 'slides', 'struts') if name in _names(content, of))
-        return f'{kind}.{part}' if kind != 'struts' else f'{kind}.{name}'
+        for kind in ('hinges', 'slides', 'struts'):
+            if name in _names(content, kind):
+                return f'{kind}.{part}' if kind != 'struts' else f'{kind}.{name}'
+        return f'balls.{name[:-2]}'
     return {'pose': 'points', 'input': 'input'}.get(section, where)
 
 
@@ -72,6 +77,12 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
                 for link in (of['parent'], of['child']):
                     links[link] = tuple(dict.fromkeys((*links.get(link, ()), *through)))
             joints[kind][joint] = SpatialJoint(**of)
+    for ball, given in values.get('balls', {}).items():
+        for joint, made in _hinges_of_ball(ball, **given).items():
+            if joint in joints['hinges'] or joint in links:
+                reason = f'{quote(joint)} is a hinge or a link of the file already'
+                raise content.error(f'balls.{ball}', reason, 'name the ball differently')
+            joints['hinges'][joint] = made
     struts = values.get('struts', {})
     names = [*joints['hinges'], *joints['slides'], *struts]
     for one in names:
@@ -97,6 +108,16 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         },
         traced=values.get('traced', ()),
     )
+
+
+def _hinges_of_ball(name: str, parent: str, child: str, at: Any) -> dict[str, SpatialJoint]:
+    """Return the three hinges of a ball, with two links between them."""
+    hinges = [f'{name}_{axis}' for axis in _AXES]
+    ends = pairwise((parent, *hinges[:2], child))
+    return {
+        hinge: SpatialJoint(on, link, axis, at)
+        for hinge, (on, link), axis in zip(hinges, ends, _AXES.values(), strict=True)
+    }
 
 
 def _axis_through(

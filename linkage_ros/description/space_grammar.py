@@ -127,6 +127,12 @@ _SLIDE = Keys(
     },
     (Moves(True),),
 )
+_BALL = Keys(
+    'A ball joint that is published: NAME_x, NAME_y and NAME_z are hinges about the axes of the '
+    'ground in the pose, one after the other; singular where NAME_y is at 90°.',
+    dict,
+    {**_ENDS, 'at': declare(Place('its centre: [x, y, z]', 'm', FARTHEST))},
+)
 SPACE = Keys(
     'A spatial linkage: points in one pose, and what joins the links there.',
     dict,
@@ -146,6 +152,7 @@ SPACE = Keys(
             None,
         ),
         'hinges': _by_name('Hinges between links, by name.', _group(_HINGE)),
+        'balls': _by_name('Ball joints between links that are published, by name.', _group(_BALL)),
         'slides': _by_name('Slides between links, by name.', _group(_SLIDE)),
         'struts': _by_name(
             'Pairs of points whose distance is a joint, such as a cylinder, by name.',

@@ -78,6 +78,7 @@ from linkage_ros.kinematics.grashof import (
     GRASHOF as GRASHOF,
     TRIPLE_ROCKERS as TRIPLE_ROCKERS,
 )
+from linkage_ros.kinematics.grid import Grid as Grid
 from linkage_ros.kinematics.inverse_closure import InverseClosure as InverseClosure
 from linkage_ros.kinematics.limits import Bound as Bound
 from linkage_ros.kinematics.link_frames import separate_blocks as separate_blocks
@@ -136,6 +137,7 @@ from linkage_ros.kinematics.shapes import (
     INK as INK,
     LinkFrame as LinkFrame,
     Polygon as Polygon,
+    Role as Role,
     round_corners as round_corners,
     Segment as Segment,
     Shape as Shape,

@@ -95,11 +95,6 @@ class Closure(StepwiseClosure):
         self._more_steps = tuple(planner.steps[needed:])
         self._inverses: dict[str, Inverse] = {}
 
-    def _repr_svg_(self) -> str:
-        from linkage_ros import svg  # local import: only a notebook asks for pictures
-
-        return svg(self)
-
     def view(self) -> LinkagePage:
         """
         Return the page of `linkage view`, which a notebook shows in a cell.

@@ -17,9 +17,12 @@ the places are the constants 1 and −1, which the elimination takes first.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from math import prod
 from typing import Any, NamedTuple
 
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.bend_bounds import ArmSums, list_bounds
 from linkage_ros.kinematics.elimination import Elimination, is_zero, subtract
 from linkage_ros.kinematics.equations import (
     CoincidentPoints,
@@ -30,6 +33,8 @@ from linkage_ros.kinematics.equations import (
     GroupMotion,
 )
 from linkage_ros.kinematics.step import LinkState
+
+Solve = Callable[[Sequence[Any]], list[Any]]
 
 
 class _PlacedBody(NamedTuple):
@@ -54,6 +59,14 @@ class GroupEquations:
         by_pins = {each.end.body for each in self._placed}
         self.free = tuple(k for k in range(self._count) if not k % 3 or k // 3 not in by_pins)
         self._rows_of_pins = {each.row + axis for each in self._placed for axis in (0, 1)}
+        rows = [
+            (constraint, axis)
+            for constraint in constraints
+            for axis in range(1 + isinstance(constraint, CoincidentPoints))
+        ]
+        self._closing = [row for row in range(len(rows)) if row not in self._rows_of_pins]
+        self._closing_constraints = [rows[row][0] for row in self._closing]
+        self._sums = ArmSums({each.end.body: (each.end, each.other) for each in self._placed})
         # The last first: its place is in no other of the equations that remain.
         self._unit_pivots = [
             (each.row + axis, 3 * each.end.body + 1 + axis)
@@ -72,14 +85,57 @@ class GroupEquations:
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
-    def correct(self, unknowns: Sequence[Any], solved: LinkState) -> tuple[list[Any], list[Any]]:
-        """Return what Newton's method subtracts from the free unknowns, and its divisors."""
-        errors, jacobian = evaluate_constraints(self._constraints, unknowns, solved)
+    # The equations that close loops, as functions of the free unknowns; see `GridGroup`
+
+    def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """Return the errors, and a function that solves with the matrix of their derivatives."""
+        unknowns = self.place_bodies(values, known)
+        errors, jacobian = evaluate_constraints(self._constraints, unknowns, known)
         eliminated = Elimination(jacobian, self._unit_pivots)
-        # The places were computed from the pins, which are closed.
-        right = [0.0 if row in self._rows_of_pins else e for row, e in enumerate(errors)]
-        step = eliminated.solve(right)
-        return [step[k] for k in self.free], eliminated.divisors
+        divisors = eliminated.divisors
+        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+            raise UndecidedError
+
+        def solve(right: Sequence[Any]) -> list[Any]:
+            whole = [0.0] * self._count
+            for row, value in zip(self._closing, right, strict=True):
+                whole[row] = value
+            found = eliminated.solve(whole)
+            return [found[k] for k in self.free]
+
+        return [errors[row] for row in self._closing], solve
+
+    def bound_bends(self, number: int, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
+        unknowns = self.place_bodies(values, known)
+        bounds = self._sums.bound_bends(self._closing_constraints[number], unknowns, known)
+        return list_bounds(bounds, self.free)
+
+    def solve_rates(
+        self, known: LinkState, values: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the free unknowns."""
+        rates = self._all_rates(known, self.place_bodies(values, known), velocities)
+        return [rates[k] for k in self.free]
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        values: Sequence[Any],
+        velocities: LinkState,
+        _rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the free unknowns."""
+        unknowns, still = self.place_bodies(values, known), [0.0] * self._count
+        rates = self._all_rates(known, unknowns, velocities)
+        found = self.solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
+        return [found[k] for k in self.free]
+
+    def _all_rates(
+        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        return self.solve_motion(GroupMotion(unknowns, known, [0.0] * self._count, velocities))
 
     def solve_motion(self, motion: GroupMotion) -> list[Any]:
         """Return the highest derivatives of the unknowns, for a motion that has 0 for them."""

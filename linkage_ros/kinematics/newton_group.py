@@ -19,29 +19,27 @@ The assembly is the one that continuity from the given pose leads to. With a sin
 linkage was before: the method starts from the curve of the branch, and a solution farther from
 there than the curve allows is rejected. Two steps from a table of that curve end within the
 rounding; they are a straight line without a library, which a tape records. Only next to a toggle
-numpy iterates, until no step is shorter. With several inputs, the straight line from the inputs of
-the pose is followed again for each state, with the same proof that no other assembly is met.
+numpy iterates, until no step is shorter. With several inputs, cells take the place of the table:
+see `Grid`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import hypot, inf, isnan, nan, prod
+from functools import partial
+from math import inf, isnan, nan
 from operator import add, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.arithmetic import (
-    call,
-    has_result,
     make_vector,
-    SMALLEST,
     UndecidedError,
     UNIT_ROUNDOFF,
 )
 from linkage_ros.kinematics.branch import Branch, Continuation, Start
 from linkage_ros.kinematics.built_once import keep_results
-from linkage_ros.kinematics.compiling import Tape
+from linkage_ros.kinematics.descent import descend, reciprocal_condition
 from linkage_ros.kinematics.equations import (
     Array,
     Constraint,
@@ -51,12 +49,15 @@ from linkage_ros.kinematics.equations import (
     GroupMotion,
     OnLine,
 )
+from linkage_ros.kinematics.grid import Grid, grid_inputs, GridInput
+from linkage_ros.kinematics.grid_group import GridGroup
 from linkage_ros.kinematics.group_equations import GroupEquations
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.rough_pose import guess_unknowns
 from linkage_ros.kinematics.start_table import make_start_table, StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.kinematics.steps_before import StepsBefore
 from linkage_ros.kinematics.straight_line import has_symbols, StraightLine
 import numpy as np
 
@@ -65,9 +66,6 @@ if TYPE_CHECKING:
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Largest residual of a constraint at a solution, relative to the size of the coordinates."""
-
-_SINGULAR = 1e-11
-"""Several inputs: least ratio of smallest to largest singular value at which rates exist."""
 
 _AROUND = 64.0
 """In [rad] or lengths: largest distance from the start in a search for a solution."""
@@ -105,9 +103,9 @@ class Iteration:
     """
 
     __slots__ = (
-        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_known_sizes',
-        '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line', '_start',
-        '_system_line', '_table', 'branch', 'inputs', 'solution',
+        '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_given_inputs',
+        '_known_sizes', '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line',
+        '_start', '_system_line', '_table', 'branch', 'group', 'inputs', 'solution',
     )  # fmt: skip
 
     def __init__(
@@ -118,15 +116,17 @@ class Iteration:
         start: Sequence[float],
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
+        given_inputs: Sequence[GridInput],
         far: float,
         known: LinkState,
     ) -> None:
         self._constraints = constraints
         self._slides = slides
-        self._before = before
+        self._before = StepsBefore(before, inputs)
         self.inputs = inputs
         self._sliding = sliding
         self._far = far
+        self._given_inputs = given_inputs
         self._start = np.array(start)
         self._equations = GroupEquations(constraints, len(start) // 3)
         self._system_line = StraightLine(self._list_system, lambda: None)
@@ -148,6 +148,7 @@ class Iteration:
         self._table = keep_results(self._make_table)
         # Returns the branch of a single input; None if the pose leads to no solution.
         self.branch = keep_results(self._follow_branch)
+        self.group = keep_results(self._make_group)
         # Returns the unknowns at the pose's inputs; None if the pose leads to no solution.
         self.solution = keep_results(self._solution_of_pose)
 
@@ -178,11 +179,10 @@ class Iteration:
         equations, inputs = self._equations, self._inputs_of(solved)
         turns, gained = 0, [0.0] * (self.equation_count // 3)
         if len(inputs) > 1:
-            found = call(self._start_on_a_line, *inputs)
-            if not has_result(found):
+            group = self.group()
+            values = None if group is None else group.solution(solved)
+            if values is None:
                 raise UndecidedError
-            count = len(equations.free)
-            values, farthest = [found[k] for k in range(count)], found[count]
         else:
             branch, table = self.branch(), self._table()
             if branch is None or table is None:
@@ -193,14 +193,12 @@ class Iteration:
             if status is not Status.CLOSED:
                 return status, []
             values, farthest = table.find_start(x)
-        for last in (False, True):
-            unknowns = equations.place_bodies(values, solved)
-            step, divisors = equations.correct(unknowns, solved)
-            length = sum(map(abs, step[1:]), abs(step[0]))
-            regular = abs(prod(divisors[1:], start=divisors[0])) if divisors else 1.0
-            if not regular > SMALLEST or not length <= (_LAST_STEP if last else farthest):
-                raise UndecidedError
-            values = [value - change for value, change in zip(values, step, strict=True)]
+            for most in (farthest, _LAST_STEP):
+                errors, solve = equations.linearize(solved, values)
+                step = solve(errors)
+                if not sum(map(abs, step[1:]), abs(step[0])) <= most:
+                    raise UndecidedError
+                values = [value - change for value, change in zip(values, step, strict=True)]
         unknowns = equations.place_bodies(values, solved)
         angles = [
             angle + turns * more if more else angle
@@ -209,32 +207,28 @@ class Iteration:
         slides = [slide.place(unknowns, solved).real for slide in self._slides]
         return Status.CLOSED, [*unknowns, *angles, *slides]
 
-    def _start_on_a_line(self, *inputs: float) -> tuple[float, ...] | None:
-        """Return where Newton's method starts with several inputs, and how far it may lead."""
-        start, known = self._along_a_line(inputs), self._known_at(inputs)
-        if start is None or known is None:
+    def _make_group(self) -> GridGroup | None:
+        """Return the cells of several inputs; None if the pose leads to no solution."""
+        solution = self.solution()
+        if solution is None:
             return None
-        jacobian = self._evaluate_system(known, start.unknowns)[1]
-        if _reciprocal_condition(jacobian) <= _SINGULAR:
-            return None
-        values = start.unknowns.tolist()
-        return (*(values[k] for k in self._equations.free), start.farthest)
+        start = [float(solution[k]) for k in self._equations.free]
+        return GridGroup(self._equations, self._before, start, self._given_inputs)
+
+    @property
+    def grid(self) -> Grid | None:
+        """Return the cells of several inputs, if there are several."""
+        group = self.group() if len(self.inputs) > 1 else None
+        return None if group is None else group.grid
 
     def _trace_examples(self) -> dict[str, LinkState]:
         """Return the states at the pose as symbols; nothing if it is at a toggle."""
-        tape, n, inputs = Tape(), self.equation_count, self.inputs
-        states: list[Any] = [
-            [0.0, *(tape.add_input(f'{name}{i}', x) for i, x in enumerate(inputs))]
-            for name in 'qwa'
-        ]
-        known, velocities, accelerations = (LinkState(state, []) for state in states)
+        n = self.equation_count
         try:
-            for step in self._before:
-                closed = step.close(known)
-                if not closed.status.has_rates:
-                    return {}
-                found = step.rates(closed, known, velocities)
-                step.accelerations(closed, found, known, velocities, accelerations)
+            traced = self._before.trace()
+            if traced is None:
+                return {}
+            known, velocities, accelerations = traced
             pose = LinkState(self._straight_solution(known)[:n], [])
             rates = LinkState(self._straight_rates(pose, known, velocities)[:n], [])
         except UndecidedError:
@@ -260,7 +254,7 @@ class Iteration:
             return None if found is None else found[free]
 
         def converges(x: float, values: Array) -> bool:
-            known = self._known_at((x,))
+            known = self._before.known_at((x,))
             if known is None:
                 return False
             unknowns = np.array(self._equations.place_bodies(values.tolist(), known))
@@ -279,16 +273,33 @@ class Iteration:
     def _close_slowly(self, solved: LinkState) -> IteratedPose:
         """Close the links where straight lines do not, as near a toggle."""
         inputs = self._inputs_of(solved)
+        if len(inputs) > 1:
+            return self._close_beyond_cells(solved)
         start = self._start_at(inputs)
         if start is None or start.is_end:
             return self._not_closed(solved)
         corrected = self._solve_newton(solved, start.unknowns, start.farthest)
         if corrected is None:
             return self._not_closed(solved)
-        unknowns, jacobian = corrected
-        if len(inputs) > 1 and _reciprocal_condition(jacobian) <= _SINGULAR:
-            return self._not_closed(solved)
-        return self._pose_at(Status.CLOSED, solved, unknowns, start.turned_angles)
+        return self._pose_at(Status.CLOSED, solved, corrected[0], start.turned_angles)
+
+    def _close_beyond_cells(self, solved: LinkState) -> IteratedPose:
+        """Close the links by several inputs where no cell is, as near a toggle."""
+        group = self.group()
+        if group is None:
+            return self._nearest_open_pose(solved, self._start)
+
+        def conditioning(values: Sequence[float]) -> float:
+            unknowns = self._equations.place_bodies(values, solved)
+            return reciprocal_condition(self._evaluate_lists(solved, unknowns)[1])
+
+        status, values = group.close_slowly(solved, conditioning)
+        unknowns = np.array(self._equations.place_bodies(values, solved))
+        if status is Status.OPEN:
+            return self._nearest_open_pose(solved, unknowns)
+        if status is Status.TOGGLE:
+            unknowns, _ = descend(partial(self._evaluate_system, solved), unknowns)
+        return self._pose_at(status, solved, unknowns, np.zeros_like(unknowns))
 
     def _pose_at(
         self, status: Status, solved: LinkState, unknowns: Array, turned: Array
@@ -301,19 +312,17 @@ class Iteration:
 
     def _not_closed(self, solved: LinkState) -> IteratedPose:
         """Return the pose at a toggle, or the nearest one where the links are open."""
-        inputs = self._inputs_of(solved)
+        inputs, branch = self._inputs_of(solved), self.branch()
         start = self._start_at(inputs)
-        if start is None:
-            return self._nearest_open_pose(solved, inputs)
-        if start.is_end:
+        if start is not None and start.is_end:
             # The Jacobian is singular here, so Newton's method would come no nearer.
-            unknowns = start.unknowns
-        else:
+            return self._pose_at(Status.TOGGLE, solved, start.unknowns, start.turned_angles)
+        if start is not None:
             corrected = self._solve_newton(solved, start.unknowns, start.farthest)
-            if corrected is None:
-                return self._nearest_open_pose(solved, inputs)
-            unknowns = corrected[0]
-        return self._pose_at(Status.TOGGLE, solved, unknowns, start.turned_angles)
+            if corrected is not None:
+                return self._pose_at(Status.TOGGLE, solved, corrected[0], start.turned_angles)
+        end = None if branch is None else branch.nearest_end(inputs[0])
+        return self._nearest_open_pose(solved, self._start if end is None else end)
 
     def _inputs_of(self, solved: LinkState) -> list[float]:
         end = 1 + len(self.inputs)
@@ -326,8 +335,8 @@ class Iteration:
         return Branch(
             Continuation(
                 self._constraints,
-                lambda x: self._known_at((x,)),
-                lambda x: self._moving_at((x,)),
+                lambda x: self._before.known_at((x,)),
+                lambda x: self._before.moving_at((x,), (1.0,)),
                 self._evaluate_moving,
             ),
             solution,
@@ -337,7 +346,7 @@ class Iteration:
         )
 
     def _solution_of_pose(self) -> Array | None:
-        solved = self._known_at(self.inputs)
+        solved = self._before.known_at(self.inputs)
         corrected = self._solve_newton(solved, self._start, inf) if solved is not None else None
         return corrected[0] if corrected is not None else None
 
@@ -403,7 +412,7 @@ class Iteration:
 
     def conditioning(self, pose: IteratedPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return _reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
+        return reciprocal_condition(self._evaluate_lists(pose.solved, pose.unknowns)[1])
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -411,7 +420,7 @@ class Iteration:
 
         The constraints are linear in the places, which start at the least-squares solution.
         """
-        solved = self._known_at(self.inputs)
+        solved = self._before.known_at(self.inputs)
         if solved is None:
             return None
         start = np.zeros_like(self._start)
@@ -424,7 +433,7 @@ class Iteration:
 
     def solution_at(self, x: float) -> Array | None:
         """Return the unknowns at a value of the single input; None outside the branch."""
-        start, known = self._start_at((x,)), self._known_at((x,))
+        start, known = self._start_at((x,)), self._before.known_at((x,))
         if start is None or known is None:
             return None
         corrected = self._solve_newton(known, start.unknowns, start.farthest)
@@ -481,65 +490,10 @@ class Iteration:
         coordinates, pins = self._known_sizes
         return LinkState(state.coordinates[:coordinates], state.pins[:pins])
 
-    def _known_at(self, inputs: Sequence[float]) -> LinkState | None:
-        """Return the state of the links solved before this step, or None."""
-        solved = LinkState([0.0, *inputs], [])
-        for step in self._before:
-            if not step.close(solved).status.has_pose:
-                return None
-        return solved
-
-    def _moving_at(
-        self, inputs: Sequence[float], rates: Sequence[float] = (1.0,)
-    ) -> tuple[LinkState, LinkState] | None:
-        """Return the state of the links solved before and its rates, or None."""
-        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
-        for step in self._before:
-            pose = step.close(known)
-            if not pose.status.has_rates:
-                return None
-            step.rates(pose, known, speeds)
-        return known, speeds
-
     def _start_at(self, inputs: Sequence[float]) -> Start | None:
         """Return where Newton's method starts; None if the assembly does not lead there."""
-        if len(inputs) > 1:
-            return self._along_a_line(inputs)
         branch = self.branch()
         return None if branch is None else branch.find_start(inputs[0])
-
-    def _along_a_line(self, inputs: Sequence[float]) -> Start | None:
-        """Return the start on the straight line from the pose's inputs to several inputs."""
-        solution = self.solution()
-        if solution is None:
-            return None
-        ways = [value - begin for value, begin in zip(inputs, self.inputs, strict=True)]
-        length = hypot(*ways)
-        still = np.zeros_like(solution)
-        if not length:
-            return Start(solution, inf, still, False)
-        rates = [way / length for way in ways]
-
-        def inputs_at(x: float) -> list[float]:
-            return [begin + x * rate for begin, rate in zip(self.inputs, rates, strict=True)]
-
-        continuation = Continuation(
-            self._constraints,
-            lambda x: self._known_at(inputs_at(x)),
-            lambda x: self._moving_at(inputs_at(x), rates),
-            self._evaluate_moving,
-        )
-        node = continuation.first_node(solution, 0.0)
-        if node is None:
-            return None
-        cell = None
-        for cell in continuation.follow_cells(node, 1.0, length):
-            if cell.folds:
-                return None
-        if cell is None or cell.end.place[-1] < length:
-            return None
-        size = float(np.abs(cell.end.place - cell.begin.place).max())
-        return Start(cell.end.place[:-1], 0.2 * size, still, False)
 
     def _solve_newton(
         self, solved: LinkState, start: Array, farthest: float
@@ -564,26 +518,15 @@ class Iteration:
                 return None
         return None
 
-    def _nearest_open_pose(self, solved: LinkState, inputs: Sequence[float]) -> IteratedPose:
+    def _nearest_open_pose(self, solved: LinkState, unknowns: Array) -> IteratedPose:
         """
         Return how near the links come, descending from the end of their assembly.
 
         If they would close, but in another assembly or after another number of turns, the closure
         error is the one at that end.
         """
-        branch = self.branch() if len(inputs) == 1 else None
-        end = None if branch is None else branch.nearest_end(inputs[0])
-        unknowns = self._start if end is None else end
-        errors, jacobian = self._evaluate_system(solved, unknowns)
-        first = float(np.abs(errors).max())
-        for _ in range(20):
-            step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
-            step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial, slope = self._evaluate_system(solved, unknowns + step)
-            if np.abs(trial).max() >= np.abs(errors).max():
-                break
-            unknowns, errors, jacobian = unknowns + step, trial, slope
-        gap = float(np.abs(errors).max())
+        first = float(np.abs(self._evaluate_system(solved, unknowns)[0]).max())
+        unknowns, gap = descend(partial(self._evaluate_system, solved), unknowns)
         return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), solved)
 
 
@@ -594,11 +537,6 @@ def _greatest_magnitude(values: Sequence[float]) -> float:
 
 def _body_places(values: Sequence[float]) -> list[complex]:
     return list(map(make_vector, values[1::3], values[2::3]))
-
-
-def _reciprocal_condition(jacobian: Array) -> float:
-    values = np.linalg.svd(jacobian, compute_uv=False)
-    return float(values[-1] / values[0])
 
 
 def make_iteration(
@@ -645,6 +583,7 @@ def make_iteration(
         for points in planner.points.values()
     )
     slides = tuple(constraints.slides.values())
+    given = grid_inputs(linkage.inputs, inputs, scale)
     return Iteration(
-        tuple(constraints.constraints), slides, inputs, start, before, sliding, far, solved
+        tuple(constraints.constraints), slides, inputs, start, before, sliding, given, far, solved
     )

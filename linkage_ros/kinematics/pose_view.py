@@ -12,11 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees, remainder, tau
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.checks import check_planar
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.curves import RangeSweep, sweep_range
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import InputRange, Position
@@ -31,25 +29,25 @@ SAME_ANGLE = 1e-9
 class LinkageView(NamedTuple):
     """The content of a picture."""
 
-    closure: Closure  # The linkage
+    closure: Any  # The linkage: a `Closure`, or a `SpaceClosure`
     # The pose to draw.
     inputs: tuple[float, ...]
     position: Position
     ghosts: tuple[Position, ...]  # Poses in the background
+    are_ghosts_given: bool  # Or else they cover the range
     interval: InputRange  # Range of the first input around the pose, with the others held
     mark: float  # The first input, less the whole turns by which it lies outside of that range
     sweep: RangeSweep  # The motion through that range
 
 
 def prepare_view(
-    closure: Closure, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
+    closure: Any, inputs: tuple[float, ...], ghosts: Sequence[tuple[float, ...]] = ()
 ) -> LinkageView:
     """
     Prepare a picture of a pose, with others in the background.
 
     By default these cover the whole range. A LinkageError says that a pose does not close.
     """
-    check_planar(closure.name, closure.linkage)
     position = _close_loops(closure, inputs)
     input_sweep = InputSweep(closure, inputs)
     value = inputs[0]
@@ -76,6 +74,7 @@ def prepare_view(
         inputs,
         position,
         tuple(ghost for ghost in behind if ghost.joints),
+        bool(ghosts),
         interval,
         value + shift,
         sweep_range(input_sweep, interval),
@@ -93,8 +92,8 @@ def _find_range(input_sweep: InputSweep, about: InputRange) -> InputRange:
     return about
 
 
-def _close_loops(closure: Closure, inputs: tuple[float, ...]) -> Position:
-    position = closure.position(*inputs)
+def _close_loops(closure: Any, inputs: tuple[float, ...]) -> Position:
+    position: Position = closure.position(*inputs)
     if not position.joints:
         ranges = InputSweep(closure, inputs).ranges
         near = ' or '.join(_ends_text(interval) for interval in ranges)
@@ -114,7 +113,7 @@ def _ends_text(interval: InputRange) -> str:
     return f'{low:.6g} to {high:.6g} m'
 
 
-def pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
+def pose_text(closure: Any, inputs: tuple[float, ...]) -> str:
     """Return the inputs of a pose as text, each with its joint."""
     return ', '.join(
         f'{given.joint} {value:.4g} m' if given.slider else f'{given.joint} {degrees(value):.4g}°'

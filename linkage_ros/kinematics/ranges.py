@@ -149,7 +149,7 @@ def _iterating_steps(closure: LoopClosure) -> dict[int, Any]:
 
 def is_iterated(closure: LoopClosure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
-    return bool(_iterating_steps(closure))
+    return any(hasattr(step, 'conditioning') for step in closure.steps)
 
 
 def whole_turns(closure: LoopClosure) -> int:

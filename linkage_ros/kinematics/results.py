@@ -144,6 +144,11 @@ class LoopClosure(Protocol):
     @property
     def slide_bound(self) -> float: ...
 
+    @property
+    def grids(self) -> list[Any]: ...
+
+    def slide_reach(self, number: int) -> tuple[float, float]: ...
+
     input_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     scale: float

@@ -26,9 +26,10 @@ from linkage_ros.kinematics.linkage import GROUND, Slider
 from linkage_ros.kinematics.results import Position
 
 Role = Literal[
-    'link', 'input', 'plate', 'block', 'tube', 'rail', 'slot', 'ground', 'hatch', 'pin', 'ghost'
-]
-"""Kind of a shape; ``input`` is a driven link."""
+    'link', 'input', 'plate', 'block', 'tube', 'rail', 'slot', 'ground', 'hatch', 'pin', 'ghost',
+    'hinge', 'base', 'ball', 'axis',
+]  # fmt: skip
+"""Kind of a shape; ``input`` is a driven link, ``base`` a joint of a spatial linkage's ground."""
 
 Travels = Mapping[str, tuple[float, float]]
 """Lowest and highest slide of each slider in the drawing, in [m]."""
@@ -46,6 +47,9 @@ FACES = {
     'block': '#fff6d6',
     'tube': '#e8edf2',
     'ground': '#ffffff',
+    'hinge': '#ffffff',
+    'base': '#8795a3',
+    'ball': '#46596b',
 }
 """Colour of a filled area, by its role."""
 

@@ -41,7 +41,11 @@ from linkage_ros.kinematics.step import LinkState, Step, StepPose
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array, Batch
     from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
+    from linkage_ros.kinematics.grid import Grid
     from numpy.typing import ArrayLike
+
+_FILLED = 2
+"""Inputs that cells within limits are made of before the first state."""
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -131,6 +135,11 @@ class StepwiseClosure:
         has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
         named = ' '.join(filter(None, (type(self).__name__, escape_unprintable(self.name))))
         return f'<{named}: {has}>'
+
+    def _repr_svg_(self) -> str:
+        from linkage_ros import svg  # local import: only a notebook asks for pictures
+
+        return svg(self)  # type: ignore[arg-type]
 
     def position(self, *inputs: float) -> Position:
         """
@@ -310,6 +319,9 @@ class StepwiseClosure:
             for compiled in self._compiled:
                 if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
                     return compiled
+            for grid in self.grids:
+                if len(grid.home) <= _FILLED:
+                    grid.fill()
             compiled = linkage.Compiled(self, derivatives, wanted, given_count=given_count)
             self._compiled.append(compiled)
             return compiled
@@ -412,6 +424,16 @@ class StepwiseClosure:
     def slide_bound(self) -> float:
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         raise NotImplementedError
+
+    @property
+    def grids(self) -> list[Grid]:
+        """Return the cells of links that close only together, by several inputs."""
+        found = (getattr(step, 'grid', None) for step in self.steps)
+        return [grid for grid in found if grid is not None]
+
+    def slide_reach(self, _number: int) -> tuple[float, float]:
+        """Return between which values an input that slides is worth a trial, in [m]."""
+        return -self.slide_bound, self.slide_bound
 
     def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
         """Return the ranges of the first input that a user expects."""

@@ -10,8 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from linkage_ros.kinematics.arithmetic import UndecidedError
@@ -45,11 +44,11 @@ class StraightLine:
         if self._line is None:
             with BUILD_LOCK:
                 self._line = self._compile(self._examples() or states)
-        found = self._line(*_list_numbers(states))
+        found = self._line(*list_numbers(states))
         return found and list(found[0])
 
     def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:
-        examples = _list_numbers(states)
+        examples = list_numbers(states)
         varying = list(map(_is_symbol, examples))
         values = [one.operation.value if _is_symbol(one) else one for one in examples]
         if not any(varying):
@@ -58,9 +57,7 @@ class StraightLine:
         def compute(*numbers: Any) -> Sequence[Any]:
             given = zip(numbers, values, varying, strict=True)
             left = iter([number if varies else value for number, value, varies in given])
-            return self._function(
-                *(LinkState(*(list(islice(left, len(part))) for part in each)) for each in states)
-            )
+            return self._function(*(_fill_numbers(state, left) for state in states))
 
         try:
             return compile_line(compute, values)
@@ -68,8 +65,25 @@ class StraightLine:
             return lambda *_: None
 
 
-def _list_numbers(states: Sequence[LinkState]) -> list[Any]:
-    return [number for state in states for part in state for number in part]
+def list_numbers(parts: Sequence[Any]) -> list[Any]:
+    """Return all numbers in states, also those of vectors, frames and motions."""
+    numbers: list[Any] = []
+    for part in parts:
+        if isinstance(part, list | tuple):
+            numbers += list_numbers(part)
+        else:
+            numbers.append(part)
+    return numbers
+
+
+def _fill_numbers(example: Any, numbers: Iterator[Any]) -> Any:
+    """Return a state like an example, with other numbers."""
+    if not isinstance(example, list | tuple):
+        return next(numbers)
+    parts = [_fill_numbers(part, numbers) for part in example]
+    if isinstance(example, list):
+        return parts
+    return type(example)(*parts) if hasattr(example, '_fields') else tuple(parts)
 
 
 def _is_symbol(number: Any) -> bool:
@@ -78,4 +92,4 @@ def _is_symbol(number: Any) -> bool:
 
 def has_symbols(*states: LinkState) -> bool:
     """Return whether any number of states is a symbol."""
-    return any(map(_is_symbol, _list_numbers(states)))
+    return any(map(_is_symbol, list_numbers(states)))

@@ -42,6 +42,9 @@ _SAMPLES = 720
 _GRID, _MOST_ON_GRID = 24, 14_000
 """Values of each input on a grid, and states on it at most."""
 
+_FEW, _MOST_OF_MANY = 3, 60
+"""Inputs that the states on a grid are meant for; and how many states there are of more."""
+
 _SAME = 1e-9
 """Largest difference of values that count as equal, in [rad] or relative to a length."""
 
@@ -290,13 +293,14 @@ def grid_positions(
     closure: LoopClosure, count: int = _GRID
 ) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
-    ways = []
-    count = min(count, max(2, int(_MOST_ON_GRID ** (1.0 / len(closure.linkage.inputs)))))
-    for given in closure.linkage.inputs:
+    ways, inputs_count = [], len(closure.linkage.inputs)
+    most = _MOST_ON_GRID if inputs_count <= _FEW else _MOST_OF_MANY
+    count = min(count, max(1, int(most ** (1.0 / inputs_count))))
+    for number, given in enumerate(closure.linkage.inputs):
         low, high = given.limits.low, given.limits.high
         if given.slider:
-            farthest = closure.slide_bound
-            low, high = max(low, -farthest), min(high, farthest)
+            least, farthest = closure.slide_reach(number)
+            low, high = max(low, least), min(high, farthest)
             middle, half = 0.5 * (low + high), 0.5 * (high - low)
             ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
         elif given.limits.is_bounded:

@@ -26,7 +26,11 @@ import pytest
 
 
 ROOT = Path(__file__).parents[2]
-FILES = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
+FILES = [
+    file
+    for kind in ('*.yaml', 'space/*.yaml')
+    for file in sorted((ROOT / 'config' / 'linkages').glob(kind))
+]
 PNG = b'\x89PNG\r\n\x1a\n'
 SPEC = spec_from_file_location('make_gallery', ROOT / 'docs' / 'make_gallery.py')
 make_gallery = module_from_spec(SPEC)

@@ -28,14 +28,14 @@ _APART = 3.5
 """Smallest distance between two names, in pixels."""
 
 
-def drawn(name: str, inputs: tuple[float, ...] = ()) -> Any:
+def drawn(name: str, inputs: tuple[float, ...] = (), **options: Any) -> Any:
     """Draw a linkage with names; return the figure instead of storing it."""
     closure = load(name)
     kept = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drawing, 'save_picture', lambda figure, _file: kept.append(figure))
         shown = prepare_view(closure, inputs or usual_inputs(closure))
-        paint_picture(shown, name, Path('never.png'), names=True)
+        paint_picture(shown, name, Path('never.png'), names=True, **options)
     (figure,) = kept
     figure.draw_without_rendering()
     return figure

@@ -53,7 +53,9 @@ RODS = {
                 [('rocker_joint', (0.15, 0.05, 0.03), (0, 1, 0.3))])
     ],
 }  # fmt: skip
+RODS['ankle_motors'] = RODS['ankle']
 MOTIONS = {
+    'ankle_motors': {'m2': (0.1, -0.04), 'm1': (-0.2, 0.05)},
     'ankle': {'roll': (-0.1, 0.05), 'unknown': (0.0, 7.0), 'pitch': (0.05, 0.1)},
     'rssr': {'crank_joint': (0.5, 2.0)},
 }

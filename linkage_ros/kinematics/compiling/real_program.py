@@ -40,7 +40,6 @@ from linkage_ros.kinematics.compiling.trace import (
     Tree,
     tree_below,
 )
-from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -280,15 +279,8 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     Return the tree of a linkage, ignoring its limits.
 
     ``wanted`` selects the numbers of the leaves. Derivatives are 0 for positions, 1 with
-    velocities, 2 with accelerations. A DefinitionError says that links are iterated with several
-    inputs, or that no closed state is found.
+    velocities, 2 with accelerations. A DefinitionError says that no closed state is found.
     """
-    if is_iterated(closure) and len(closure.linkage.inputs) > 1:
-        raise DefinitionError(
-            'links',
-            'some are iterated with several inputs, which cannot be compiled',
-            'compile a linkage with one input, or of dyads',
-        )
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths
     if not paths:
         raise DefinitionError(

@@ -80,7 +80,7 @@ class SpaceClosure(StepwiseClosure):
             raise TypeError(f'linkage: {quote(linkage)} is not a SpaceLinkage; load() reads files')
         check_space_linkage(linkage)
         self.turns_with = {}
-        self._plan = plan = SpacePlan(linkage)
+        self._plan = plan = SpacePlan(linkage, _add_knot)
         self._set_linkage(linkage, name, plan.scale)
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy
@@ -251,9 +251,23 @@ class SpaceClosure(StepwiseClosure):
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         return 4.0 * self.scale
 
+    def slide_reach(self, number: int) -> tuple[float, float]:
+        """Return between which values an input that slides is worth a trial, in [m]."""
+        at, some = self.linkage.pose.inputs[number], 0.125 * self.scale
+        several = len(self.linkage.inputs) > 1
+        return (at - some, at + some) if several else super().slide_reach(number)
+
     def links_of_group(self, number: int) -> list[str]:
         """Return the links of a group."""
         return list(self.groups[number].links)
+
+
+def _add_knot(plan: SpacePlan) -> bool:
+    from linkage_ros.kinematics.space.knot_plan import (
+        add_knot,  # local import: most linkages have none
+    )
+
+    return add_knot(plan)
 
 
 def check_pose(closure: SpaceClosure) -> None:

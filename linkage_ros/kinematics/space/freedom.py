@@ -178,8 +178,8 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
     if unknown or plan.lost:
         raise DefinitionError(
             'input',
-            f'{list_names(unknown or plan.lost)} close only together, and no step finds them',
-            'drive other joints, for example those that are published',
+            f'no step finds {list_names(unknown or plan.lost)}',
+            'let each hang on hinges and slides that lead to the ground, or drive other joints',
         )
 
 

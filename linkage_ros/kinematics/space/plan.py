@@ -18,14 +18,15 @@ points to both of its links. In the order of the file, again and again:
   all such pairs the one is taken whose rod meets the motion of its point least squarely off;
 - a link with three known points has a frame;
 - a point at known distances from three known points is placed; a link that hangs on three slides
-  only moves without turning, and is one point.
+  only moves without turning, and is one point;
+- if there is none of these, the smallest set of joints that close together is a knot.
 
 The pose gives the sign of each closed step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
 from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
@@ -54,6 +55,7 @@ from linkage_ros.kinematics.space.steps import (
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
+    drop_rounding,
     GROUND_FRAME,
     length,
     minus,
@@ -73,9 +75,6 @@ _BETTER = 1e-6
 
 _SAME = 1e-9
 """Points of one link nearer to each other than this are one."""
-
-_CLEAN = 2.0**-50
-"""A component of a unit vector below this is rounding."""
 
 
 class SpaceGroup(NamedTuple):
@@ -97,10 +96,15 @@ class _Pair(NamedTuple):
 
 
 class SpacePlan:
-    """Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres."""
+    """
+    Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres.
 
-    def __init__(self, linkage: SpaceLinkage) -> None:
-        self._linkage = linkage
+    ``add_knot`` adds links that only close together as the next step, and says whether it could.
+    """
+
+    def __init__(self, linkage: SpaceLinkage, add_knot: Callable[[SpacePlan], bool]) -> None:
+        self.linkage = linkage
+        self._add_knot = add_knot
         self.scale = ldexp(1.0, frexp(size_of(linkage))[1])
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
@@ -114,24 +118,24 @@ class SpacePlan:
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
         self._collect_points()
-        self._state = LinkState([0.0, *map(self._value, linkage.driven)], [])
+        self.state = LinkState([0.0, *map(self.pose_value, linkage.driven)], [])
         """The pose as the steps so far find it."""
         self.frames[GROUND] = 0
-        self._add(GroundStep())
+        self.add_step(GroundStep())
         while self._find_next():
             pass
         unknown = self._unknown_links()
         self.idle = tuple(
             link
             for link in self.rods
-            if link in unknown and all(map(self._is_known, self.carried[link]))
+            if link in unknown and all(map(self.is_known, self.carried[link]))
         )
         """Rods whose ends are known: nothing holds their turn about themselves."""
         self._measure_published()
 
     def _collect_points(self) -> None:
         """Collect the places in the pose, and which links carry each point."""
-        linkage, unit = self._linkage, 1.0 / self.scale
+        linkage, unit = self.linkage, 1.0 / self.scale
         self.places: dict[str, Vector] = {
             name: scale(unit, place) for name, place in linkage.points.items()
         }
@@ -180,8 +184,8 @@ class SpacePlan:
         self.carriers[point].append(link)
         self.carried[link].append(point)
 
-    def _add(self, step: Any) -> None:
-        if not step.close(self._state).status.has_pose:
+    def add_step(self, step: Any) -> None:
+        if not step.close(self.state).status.has_pose:
             raise DefinitionError(
                 'points', 'the linkage is at a toggle in the pose', 'draw another pose'
             )
@@ -189,14 +193,14 @@ class SpacePlan:
         self.step_groups.append(len(self.groups))
 
     @property
-    def _next_pin(self) -> int:
+    def next_pin(self) -> int:
         """Return the index of the pin that the next step appends."""
-        return len(self._state.pins)
+        return len(self.state.pins)
 
     @property
     def rods(self) -> list[str]:
         """Return the links of points on one line that no joint holds: they may spin."""
-        joints = self._linkage.pair_joints.values()
+        joints = self.linkage.pair_joints.values()
         held = {end for joint in joints for end in (joint.parent, joint.child)}
         return [
             link
@@ -214,37 +218,46 @@ class SpacePlan:
         )
 
     def _unknown_links(self) -> list[str]:
-        return [link for link in self._linkage.link_names if link not in self.frames]
+        return [link for link in self.linkage.link_names if link not in self.frames]
 
-    def _is_known(self, point: str) -> bool:
+    def is_known(self, point: str) -> bool:
+        """Return whether a point is placed, or on a link that is."""
         return point in self.points or any(link in self.frames for link in self.carriers[point])
 
-    def _point_index(self, point: str) -> int:
+    def point_index(self, point: str) -> int:
         """Return the index of a known point; it is placed when first asked for."""
         if point not in self.points:
             link = next(link for link in self.carriers[point] if link in self.frames)
-            place = _clean(self.pose_frames[link].locate(self.places[point]))
-            self.points[point] = self._next_pin
-            self._add(CarriedPoint(self.frames[link], place, self._next_pin))
+            place = drop_rounding(self.pose_frames[link].locate(self.places[point]))
+            self.points[point] = self.next_pin
+            self.add_step(CarriedPoint(self.frames[link], place, self.next_pin))
         return self.points[point]
 
     def _find_next(self) -> bool:
         """Add the next step; False if there is none."""
         return (
-            any(map(self._follow, self._linkage.ratios))
-            or any(map(self._give, self._linkage.pair_joints))
-            or any(map(self._aim, self._linkage.pair_joints))
-            or any(map(self._close, self._linkage.pair_joints))
+            any(map(self._follow, self.linkage.ratios))
+            or any(map(self._give, self.linkage.pair_joints))
+            or any(map(self._aim, self.linkage.pair_joints))
+            or any(map(self._close, self.linkage.pair_joints))
             or any(map(self._frame, self._unknown_links()))
             or any(map(self._place_point, self.carriers))
             or any(map(self._translate, self._unknown_links()))
+            or (self.has_unknown_joints and self._add_knot(self))
         )
+
+    @property
+    def has_unknown_joints(self) -> bool:
+        """Return whether a joint leads to a link that is not solved yet."""
+        joints = self.linkage.pair_joints.values()
+        held = {end for joint in joints for end in (joint.parent, joint.child)}
+        return not held.isdisjoint(self._unknown_links())
 
     # Joints
 
     def _ends(self, name: str) -> tuple[str, str] | None:
         """Return the known and the unknown link of a joint; None if there are not one of each."""
-        joint = self._linkage.pair_joints[name]
+        joint = self.linkage.pair_joints[name]
         ends = sorted((joint.parent, joint.child), key=lambda link: link not in self.frames)
         known, unknown = ends
         if known in self.frames and unknown not in self.frames:
@@ -253,24 +266,24 @@ class SpacePlan:
 
     def _axis_to(self, name: str, child: str) -> Vector:
         """Return the axis of a joint, reversed if the child is its parent in the file."""
-        joint = self._linkage.pair_joints[name]
+        joint = self.linkage.pair_joints[name]
         return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
 
-    def _value(self, name: str) -> float:
+    def pose_value(self, name: str) -> float:
         """Return the value of a joint in the pose, in the unit of the steps."""
-        value = self._linkage.pose_value(name)
+        value = self.linkage.pose_value(name)
         return value / self.scale if self._slides(name) else value
 
     def _slides(self, name: str) -> bool:
-        return name not in self._linkage.hinges
+        return name not in self.linkage.hinges
 
-    def _make_joint(
+    def make_joint(
         self, name: str, parent: str, child: str, toward: Vector | None = None
     ) -> tuple[LowerPair, SpaceFrame]:
         """Return a joint on a known link, and the frame of its child in the pose."""
         z = self._axis_to(name, child)
-        if name in self._linkage.hinges:
-            at = scale(1.0 / self.scale, self._linkage.hinges[name].at)
+        if name in self.linkage.hinges:
+            at = scale(1.0 / self.scale, self.linkage.hinges[name].at)
         else:
             at = self.places[self.carried[child][0]] if self.carried[child] else ZERO
         x = _across(z)
@@ -281,47 +294,47 @@ class SpacePlan:
             x = max(ways, key=lambda way: dot(way, arm))
         # The seat does not turn with the joint: the child turns or moves from it by the value.
         kind = SlidePair if self._slides(name) else HingePair
-        origin = minus(at, scale(self._value(name), z)) if self._slides(name) else at
+        origin = minus(at, scale(self.pose_value(name), z)) if self._slides(name) else at
         base = SpaceFrame(x, cross(z, x), z, origin)
         on = self.pose_frames[parent]
-        x, y, z = (_clean(on.resolve(axis)) for axis in base[:3])
+        x, y, z = (drop_rounding(on.resolve(axis)) for axis in base[:3])
         seat = SpaceFrame(x, y, z, on.locate(base.origin))
         joint = kind(self.frames[parent], seat)
-        return joint, joint.child_frame(base, self._value(name))
+        return joint, joint.child_frame(base, self.pose_value(name))
 
     def _set_frame(self, link: str, frame: SpaceFrame) -> int:
         """Keep the frame of a link that the next step appends; return its index."""
-        self.frames[link], self.pose_frames[link] = self._next_pin, frame
-        return self._next_pin
+        self.frames[link], self.pose_frames[link] = self.next_pin, frame
+        return self.next_pin
 
     def _give(self, name: str) -> bool:
         """Place the link of a joint whose value is known."""
         ends = self._ends(name)
         if ends is None or name not in self.coordinates:
             return False
-        joint, frame = self._make_joint(name, *ends)
+        joint, frame = self.make_joint(name, *ends)
         index = self._set_frame(ends[1], frame)
-        self._add(GivenJoint(joint, self.coordinates[name], index))
-        kind = 'input' if name in self._linkage.driven else 'joint'
-        self._end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
+        self.add_step(GivenJoint(joint, self.coordinates[name], index))
+        kind = 'input' if name in self.linkage.driven else 'joint'
+        self.end_group(kind, (ends[1],), f'{name}, on {ends[0]}')
         return True
 
-    def _end_group(
+    def end_group(
         self, kind: str, links: tuple[str, ...], method: str, assembly: str = ''
     ) -> None:
         self.groups.append(SpaceGroup(kind, links, method, assembly))
 
     def _follow(self, name: str) -> bool:
         """Give a joint that follows a known one its value."""
-        ratio = self._linkage.ratios[name]
+        ratio = self.linkage.ratios[name]
         if name in self.coordinates or ratio.of not in self.coordinates:
             return False
         own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
         of = self.coordinates[ratio.of]
-        self.coordinates[name] = len(self._state.coordinates)
+        self.coordinates[name] = len(self.state.coordinates)
         factor, offset = ratio.ratio * other / own, ratio.offset / own
-        self._add(FollowerJoint(name, of, 0, 0.0, factor, offset))
-        self._end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
+        self.add_step(FollowerJoint(name, of, 0, 0.0, factor, offset))
+        self.end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
         return True
 
     def _aim(self, name: str) -> bool:
@@ -330,46 +343,46 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         slides, axis = self._slides(name), self._axis_to(name, ends[1])
-        at = self._linkage.pair_joints[name].at
-        for point in filter(self._is_known, self.carried[ends[1]]):
+        at = self.linkage.pair_joints[name].at
+        for point in filter(self.is_known, self.carried[ends[1]]):
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             if not slides and length(cross(axis, arm)) < _SQUARE * length(arm):
                 continue
             if not slides and not length(arm):
                 continue
-            to = self._point_index(point)
-            joint, frame = self._make_joint(name, *ends, self.places[point])
+            to = self.point_index(point)
+            joint, frame = self.make_joint(name, *ends, self.places[point])
             place = frame.locate(self.places[point])
             index = self._set_frame(ends[1], frame)
-            self.coordinates[name] = len(self._state.coordinates)
+            self.coordinates[name] = len(self.state.coordinates)
             if isinstance(joint, HingePair):
-                x, y, _ = joint.base(self._state).locate(self.places[point])
+                x, y, _ = joint.base(self.state).locate(self.places[point])
                 direction = self._direction(place, atan2(y, x), name)
-                self._add(AimedHinge(joint, direction, to, index))
+                self.add_step(AimedHinge(joint, direction, to, index))
             else:
                 self._add_resolved((name,), ends[0], to, self.places[point])
-                self._add(GivenJoint(joint, self.coordinates[name], index))
-            self._end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
+                self.add_step(GivenJoint(joint, self.coordinates[name], index))
+            self.end_group('aimed', (ends[1],), f'{name}, on {ends[0]}, at point {point}')
             return True
         return False
 
     def _direction(self, place: Vector, found: float, name: str) -> float:
         """Return the direction of a place, with the turns of the pose; it gives `found` with 0."""
         direction = atan2(place[1], place[0])
-        return direction + tau * round((found - direction - self._value(name)) / tau)
+        return direction + tau * round((found - direction - self.pose_value(name)) / tau)
 
     def _distances(self, point: str) -> Iterator[_Pair]:
         """Yield the known points at known distances from a point."""
         for link in self.carriers[point]:
             for other in self.carried[link]:
                 size = dist(self.places[point], self.places[other])
-                if other != point and size and self._is_known(other):
+                if other != point and size and self.is_known(other):
                     yield _Pair(point, other, Rod(size), link)
-        for name, points in self._linkage.struts.items():
+        for name, points in self.linkage.struts.items():
             ends = [self.same[end] for end in points]
             if name in self.coordinates and point in ends:
                 other = ends[1 - ends.index(point)]
-                if self._is_known(other):
+                if self.is_known(other):
                     yield _Pair(point, other, Rod(0.0, self.coordinates[name]), name)
 
     def _close(self, name: str) -> bool:
@@ -378,7 +391,7 @@ class SpacePlan:
         if ends is None or name in self.coordinates:
             return False
         best, choice = _SQUARE, None
-        axis, at = self._axis_to(name, ends[1]), self._linkage.pair_joints[name].at
+        axis, at = self._axis_to(name, ends[1]), self.linkage.pair_joints[name].at
         for point in self.carried[ends[1]]:
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
             slope = axis if self._slides(name) else cross(axis, arm)
@@ -390,46 +403,46 @@ class SpacePlan:
         if choice is None:
             return False
         (point, known, bar, by), sign = choice
-        to = self._point_index(known)
-        joint, frame = self._make_joint(name, *ends, self.places[known])
-        place = _clean(frame.locate(self.places[point]))
+        to = self.point_index(known)
+        joint, frame = self.make_joint(name, *ends, self.places[known])
+        place = drop_rounding(frame.locate(self.places[point]))
         index = self._set_frame(ends[1], frame)
-        self.coordinates[name] = len(self._state.coordinates)
+        self.coordinates[name] = len(self.state.coordinates)
         if isinstance(joint, HingePair):
             radius = hypot(place[0], place[1])
             step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
             # Where 0 lies among the whole turns follows from the value in the pose.
-            trial = LinkState([*self._state.coordinates], [*self._state.pins])
+            trial = LinkState([*self.state.coordinates], [*self.state.pins])
             if step.close(trial).status.has_pose:
                 found = trial.coordinates[-1]
                 step = replace(step, direction=self._direction(place, found, name))
         else:
             step = ClosedSlide(joint, place, to, bar, sign, index)
-        self._add(step)
+        self.add_step(step)
         side = '+' if sign > 0.0 else '-'
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
-        self._end_group('closed', (ends[1],), method, f'{side}, as in the pose')
+        self.end_group('closed', (ends[1],), method, f'{side}, as in the pose')
         return True
 
     # Links and points
 
     def _frame(self, link: str) -> bool:
         """Find the frame of a link with three known points."""
-        known = list(filter(self._is_known, self.carried[link]))
+        known = list(filter(self.is_known, self.carried[link]))
         for names in combinations(known, 3):
             start, *ends = (self.places[name] for name in names)
             one, other = (minus(end, start) for end in ends)
             if length(cross(one, other)) > 1e-3 * length(one) * length(other):
-                indices = tuple(map(self._point_index, names))
+                indices = tuple(map(self.point_index, names))
                 index = self._set_frame(link, frame_of(start, one, other))
-                self._add(FramedLink((indices[0], indices[1], indices[2]), index))
-                self._end_group('framed', (link,), f'by points {list_names(names)}')
+                self.add_step(FramedLink((indices[0], indices[1], indices[2]), index))
+                self.end_group('framed', (link,), f'by points {list_names(names)}')
                 return True
         return False
 
     def _place_point(self, point: str) -> bool:
         """Place a point at three known distances."""
-        if self._is_known(point):
+        if self.is_known(point):
             return False
         return self._meet(point, list(self._distances(point)), {})
 
@@ -452,20 +465,20 @@ class SpacePlan:
                 continue
             to = []
             for pair in three:
-                to.append(self._point_index(pair.known))
+                to.append(self.point_index(pair.known))
                 if shifts and length(shifts[pair][1]):
                     root, offset = shifts[pair]
-                    offset = _clean(self.pose_frames[root].resolve(offset))
-                    self._add(CarriedPoint(self.frames[root], offset, self._next_pin, to[-1]))
-                    to[-1] = self._next_pin - 1
+                    offset = drop_rounding(self.pose_frames[root].resolve(offset))
+                    self.add_step(CarriedPoint(self.frames[root], offset, self.next_pin, to[-1]))
+                    to[-1] = self.next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
-            self.points[point] = self._next_pin
+            self.points[point] = self.next_pin
             lengths = tuple(pair.rod for pair in three)
-            self._add(ThreeDistances(tuple(to), lengths, sign, self._next_pin))
+            self.add_step(ThreeDistances(tuple(to), lengths, sign, self.next_pin))
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'
-            self._end_group('three distances', (), method, f'{side}, as in the pose')
+            self.end_group('three distances', (), method, f'{side}, as in the pose')
             return True
         return False
 
@@ -475,7 +488,7 @@ class SpacePlan:
         while link not in self.frames:
             ways = [
                 (name, joint)
-                for name, joint in self._linkage.slides.items()
+                for name, joint in self.linkage.slides.items()
                 if link in (joint.parent, joint.child) and name not in chain
             ]
             # A chain, not a tree: the first slide that leads on.
@@ -505,7 +518,7 @@ class SpacePlan:
 
     def _add_resolved(self, names: tuple[str, ...], root: str, point: int, place: Vector) -> None:
         """Measure the slides that lead from a link to a point."""
-        on, chain = self.pose_frames[root], self._linkage.pair_joints
+        on, chain = self.pose_frames[root], self.linkage.pair_joints
         link, axes = root, []
         for name in names:
             joint = chain[name]
@@ -513,18 +526,18 @@ class SpacePlan:
             axes.append(self._axis_to(name, link))
         start = place
         for name, axis in zip(names, axes, strict=True):
-            start = minus(start, scale(self._value(name), axis))
-        first = len(self._state.coordinates)
+            start = minus(start, scale(self.pose_value(name), axis))
+        first = len(self.state.coordinates)
         self.coordinates |= {name: first + number for number, name in enumerate(names)}
         duals = _dual_basis(axes)
-        directions = tuple(_clean(on.resolve(dual)) for dual in duals)
-        self._add(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
+        directions = tuple(drop_rounding(on.resolve(dual)) for dual in duals)
+        self.add_step(ResolvedSlides(self.frames[root], on.locate(start), directions, point))
 
     # What is published
 
     def _measure_published(self) -> None:
         """Measure published joints that no step found."""
-        linkage = self._linkage
+        linkage = self.linkage
         wanted = [*linkage.published, *(ratio.of for ratio in linkage.ratios.values())]
         self.lost: list[str] = []
         """Published joints that no step can find."""
@@ -533,13 +546,13 @@ class SpacePlan:
                 continue
             if name in linkage.struts:
                 ends = [self.same[point] for point in linkage.struts[name]]
-                if not all(map(self._is_known, ends)):
+                if not all(map(self.is_known, ends)):
                     self.lost.append(name)
                     continue
-                one, other = map(self._point_index, ends)
-                self.coordinates[name] = len(self._state.coordinates)
+                one, other = map(self.point_index, ends)
+                self.coordinates[name] = len(self.state.coordinates)
                 step = MeasuredStrut((one, other), self.coordinates[name])
-                self._add(step)
+                self.add_step(step)
             else:
                 joint = linkage.pair_joints[name]
                 if joint.parent not in self.frames or joint.child not in self.frames:
@@ -548,36 +561,36 @@ class SpacePlan:
                 if self._slides(name):
                     self._measure_slide(name, joint)
                 else:
-                    pair, frame = self._make_joint(name, joint.parent, joint.child)
+                    pair, frame = self.make_joint(name, joint.parent, joint.child)
                     assert isinstance(pair, HingePair)
                     # The x axis of the seat, turned with the child.
-                    mark = _clean(self.pose_frames[joint.child].resolve(frame.x))
-                    self.coordinates[name] = len(self._state.coordinates)
-                    self._add(MeasuredHinge(pair, mark, self.frames[joint.child]))
-            self._end_group('measured', (), name)
+                    mark = drop_rounding(self.pose_frames[joint.child].resolve(frame.x))
+                    self.coordinates[name] = len(self.state.coordinates)
+                    self.add_step(MeasuredHinge(pair, mark, self.frames[joint.child]))
+            self.end_group('measured', (), name)
         for point in linkage.traced:
-            if self._is_known(self.same[point]):
-                self._point_index(self.same[point])
+            if self.is_known(self.same[point]):
+                self.point_index(self.same[point])
         self.step_groups = [min(number, len(self.groups) - 1) for number in self.step_groups]
 
     def _measure_slide(self, name: str, joint: SpatialJoint) -> None:
         child = joint.child
         place = self.places[self.carried[child][0]] if self.carried[child] else ZERO
-        point = self._next_pin
+        point = self.next_pin
         local = self.pose_frames[child].locate(place)
-        self._add(CarriedPoint(self.frames[child], local, point))
+        self.add_step(CarriedPoint(self.frames[child], local, point))
         self._add_resolved((name,), joint.parent, point, place)
 
     @property
     def ratio_turns(self) -> int:
         """Return the turns of a single input after which the joints that follow it repeat."""
         turns = 1
-        for name in self._linkage.ratios:
+        for name in self.linkage.ratios:
             total, of = 1.0, name
-            while of in self._linkage.ratios:
-                total *= self._linkage.ratios[of].ratio
-                of = self._linkage.ratios[of].of
-            if of in self._linkage.driven and not (self._slides(of) or self._slides(name)):
+            while of in self.linkage.ratios:
+                total *= self.linkage.ratios[of].ratio
+                of = self.linkage.ratios[of].of
+            if of in self.linkage.driven and not (self._slides(of) or self._slides(name)):
                 turns = lcm(turns, count_turns(total))
         return turns
 
@@ -585,13 +598,7 @@ class SpacePlan:
 def _unit(vector: Vector) -> Vector:
     size = hypot(*vector)
     x, y, z = (one / size for one in vector)
-    return _clean((x, y, z))
-
-
-def _clean(vector: Vector) -> Vector:
-    """Return a vector without the components that are rounding, and with exact axes."""
-    x, y, z = (0.0 if abs(one) < _CLEAN else one for one in vector)
-    return x, y, z
+    return drop_rounding((x, y, z))
 
 
 def _across(axis: Vector) -> Vector:
@@ -608,6 +615,6 @@ def _dual_basis(axes: list[Vector]) -> list[Vector]:
     one, other, third = axes
     volume = dot(one, cross(other, third))
     return [
-        _clean(scale(1.0 / volume, cross(*two)))
+        drop_rounding(scale(1.0 / volume, cross(*two)))
         for two in ((other, third), (third, one), (one, other))
     ]

@@ -22,6 +22,9 @@ Vector = tuple[float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 
+_ROUNDING = 2.0**-50
+"""A component of a unit vector below this is rounding."""
+
 
 class SpaceFrame(NamedTuple):
     """The axes and the origin of a link, in the frame of the ground."""
@@ -130,6 +133,12 @@ def hypotenuse(one: float, other: float) -> float:
 def length(vector: Vector) -> float:
     """Return the length of a vector."""
     return sqrt(dot(vector, vector))
+
+
+def drop_rounding(vector: Vector) -> Vector:
+    """Return a vector without the components that are rounding, and with exact axes."""
+    x, y, z = (0.0 if abs(one) < _ROUNDING else one for one in vector)
+    return x, y, z
 
 
 def direction_of(vector: Vector) -> Vector:

@@ -19,10 +19,11 @@ from linkage_ros.tools.drawing.drawing_data import (
     drawn_in_frames as drawn_in_frames,
     pose_in_frames as pose_in_frames,
 )
+from linkage_ros.tools.drawing.drawn_linkage import draw_linkage as draw_linkage
 from linkage_ros.tools.drawing.dxf import links_dxf as links_dxf
 from linkage_ros.tools.drawing.figure import (
     assemblies_picture as assemblies_picture,
-    paint_background as paint_background,
+    paint_linkage as paint_linkage,
     paint_picture as paint_picture,
 )
 from linkage_ros.tools.drawing.painting import (
@@ -46,6 +47,10 @@ from linkage_ros.tools.drawing.plot_command import (
     crank_curves as crank_curves,
     curves_over_time as curves_over_time,
     is_after_gap as is_after_gap,
+)
+from linkage_ros.tools.drawing.space_drawing import (
+    Camera as Camera,
+    SpaceDrawing as SpaceDrawing,
 )
 from linkage_ros.tools.drawing.spread import draw_spread as draw_spread, JointSpread as JointSpread
 from linkage_ros.tools.drawing.svg_picture import svg as svg

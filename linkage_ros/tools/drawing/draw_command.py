@@ -9,14 +9,19 @@
 """
 Draw a linkage in a pose, its range behind it, and beside it its joints over the input.
 
+A spatial linkage is seen from a camera far away, with the z axis of its ground upward. Without
+--azimuth and --elevation it stands where places of the linkage hide each other least.
+
 A DXF holds the links as flat parts with holes instead, in millimetres, to be cut.
 """
 
 from __future__ import annotations
 
 import argparse
+from math import radians
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 from linkage_ros.cli import (
     add_at,
@@ -33,7 +38,7 @@ from linkage_ros.description import (
     find_assemblies,
     linkage_content,
     pose_text,
-    read_closure,
+    read_any_closure,
     read_yaml,
     written_linkage,
 )
@@ -54,13 +59,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser,
         'pose to draw, in degrees, or metres for a slide; further ones are drawn in light grey',
     )
-    parser.add_argument('--names', action='store_true', help='write the names of pins and links')
+    parser.add_argument(
+        '--names', action='store_true', help='write the names of points, joints and links'
+    )
     parser.add_argument(
         '--assemblies',
         action='store_true',
         help='draw each assembly that closes, with the pose for the file, which is printed too',
     )
 
+    camera = parser.add_argument_group('camera, for a spatial linkage')
+    camera.add_argument(
+        '--azimuth',
+        type=bounded_number(-360.0, 360.0),
+        metavar='DEGREES',
+        help='direction in which it stands, from x to y',
+    )
+    camera.add_argument(
+        '--elevation',
+        type=bounded_number(-90.0, 90.0),
+        metavar='DEGREES',
+        help='how far it stands above the x-y plane',
+    )
     parts = parser.add_argument_group('parts, in a DXF')
     parts.add_argument(
         '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
@@ -72,12 +92,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
-    if arguments.assemblies:
-        return _draw_assemblies(arguments)
     named = named_file(arguments.file, 'linkages')
     content = linkage_content(named)
-    closure = read_closure(content, named.stem)
-    if arguments.output and arguments.output.suffix.lower() == '.dxf':
+    is_dxf = arguments.output and arguments.output.suffix.lower() == '.dxf'
+    if 'points' in content and (arguments.assemblies or is_dxf):
+        remedy = 'leave --assemblies out, and name an SVG, PNG or PDF'
+        raise LinkageError(arguments.file, 'is a spatial linkage', remedy)
+    for option in () if 'points' in content else ('azimuth', 'elevation'):
+        if getattr(arguments, option) is not None:
+            raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
+    if arguments.assemblies:
+        return _draw_assemblies(arguments)
+    closure: Any = read_any_closure(content, named.stem)
+    if is_dxf:
         return _write_parts(closure, arguments)
     for option in ('width', 'hole'):
         if getattr(arguments, option) is not None:
@@ -87,7 +114,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
-    paint_picture(prepare_view(closure, pose, ghosts), name, file, names=arguments.names)
+    shown = prepare_view(closure, pose, ghosts)
+    camera = [
+        None if angle is None else radians(angle)
+        for angle in (arguments.azimuth, arguments.elevation)
+    ]
+    paint_picture(shown, name, file, names=arguments.names, camera=camera)
     print(file)
     return 0
 

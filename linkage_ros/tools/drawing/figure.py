@@ -19,29 +19,28 @@ from typing import Any
 from linkage_ros.kinematics import (
     all_places,
     bounding_corners,
-    Circle,
     COLOURS,
     Curve,
     draw_shapes,
-    draw_skeleton,
-    GROUND,
     INK,
     LinkageView,
-    Polygon,
     pose_text,
     SAME_ANGLE,
-    Shape,
     shape_outline,
     symbol_size,
 )
 from linkage_ros.names import picture_text
+from linkage_ros.tools.drawing.drawn_linkage import draw_linkage
 from linkage_ros.tools.drawing.painting import (
     degree_step,
+    DrawnLinkage,
     GHOST,
     label_ends,
     LAYERS,
+    make_faint,
     NAME_INK,
     NameLabels,
+    paint_frame,
     paint_shapes,
     picture_settings,
     plot_places,
@@ -63,37 +62,43 @@ def _beyond_text(shown: LinkageView) -> str:
     return f' (limited: {beyond})' if beyond else ''
 
 
-def paint_picture(shown: LinkageView, title: str, file: Path, *, names: bool = False) -> None:
+def paint_picture(
+    shown: LinkageView,
+    title: str,
+    file: Path,
+    *,
+    names: bool = False,
+    camera: Sequence[float | None] = (None, None),
+) -> None:
     """
-    Paint a picture to a file.
+    Paint a picture to a file; a spatial linkage from a camera, as `draw_linkage` does.
 
     A LinkageError is raised if matplotlib is not installed, or the file cannot be written.
     """
     context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
-    size = symbol_size(shown)
-    drawn = draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = bounding_corners(
-        [*all_places(shown), *(p for shape in drawn for p in shape_outline(shape))]
-    )
-    margin = complex(3.0, 3.0) * size
-    width, height = (high - low + 2.0 * margin).real, (high - low + 2.0 * margin).imag
+    drawn = draw_linkage(shown, camera)
+    low, high = drawn.corners(3.0)
+    width, height = (high - low).real, (high - low).imag
     wide = min(max(4.9 * width / height, 3.0), 6.4)
     tall = min(max(wide * height / width, 3.2), 4.9)
+    joints = shown.sweep.joints
     with context:
         figure = Figure(figsize=(wide + 5.4, tall + 0.5), dpi=110, layout='constrained')
         grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
-        left, joints = figure.add_subplot(grid[0]), shown.sweep.joints
+        left = figure.add_subplot(grid[0])
         panels = joint_axes(grid[1], joints)
         heading = (
             f'{title}, {pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
             f'{_beyond_text(shown)}'
         )
-        left.set_title(picture_text(heading, 120), loc='left', fontsize=9)
-        set_plane(left, low - margin, high + margin)
-        paint_background(left, shown)
-        paint_shapes(left, drawn)
+        heading = picture_text(heading, 120)
+        if drawn.camera:
+            azimuth, elevation = map(degrees, drawn.camera)
+            heading += f'\nfrom azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'
+        left.set_title(heading, loc='left', fontsize=9)
+        paint_linkage(left, drawn, 3.0)
         turning_input = not shown.closure.linkage.inputs[0].slider
         lines = plot_joints(panels, joints, degrees_x=turning_input)
         # A pose beyond the limits has no place on the axis.
@@ -106,8 +111,23 @@ def paint_picture(shown: LinkageView, title: str, file: Path, *, names: bool = F
         label_joints(panels, joints, lines)
         if names:
             figure.draw_without_rendering()
-            _write_names(left, shown, drawn, size)
+            _write_names(left, drawn)
         save_picture(figure, file)
+
+
+def paint_linkage(axes: Any, drawn: DrawnLinkage, margin: float) -> None:
+    """Paint a linkage to axes that show all of it, with a margin in half widths of a bar."""
+    low, high = drawn.corners(margin)
+    if drawn.camera:
+        low -= complex(0.0, 0.16 * abs(high - low))  # for the frame
+    set_plane(axes, low, high)
+    paint_background(axes, drawn)
+    artists = paint_shapes(axes, drawn.shapes)
+    for artist, strength in zip(artists, drawn.strengths, strict=False):
+        make_faint(artist, strength)
+    if drawn.camera:
+        axes.set_axis_off()
+        paint_frame(axes, drawn.camera.axes, low, high, has_lengths=drawn.has_lengths)
 
 
 def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
@@ -139,29 +159,28 @@ def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
             axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
             set_plane(axes, low - margin, high + margin)
             axes.set_axis_off()
-            paint_background(axes, shown)
+            paint_background(axes, draw_linkage(shown))
             paint_shapes(
                 axes, draw_shapes(shown.closure, shown.position, size, shown.sweep.travels)
             )
         save_picture(figure, file)
 
 
-def paint_background(axes: Any, shown: LinkageView) -> None:
+def paint_background(axes: Any, drawn: DrawnLinkage) -> None:
     """Paint poses in light grey, and the paths of the traced points dashed."""
-    for index, position in enumerate(shown.ghosts):
-        for line in draw_skeleton(shown.closure, position):
+    for index, ghost in enumerate(drawn.ghosts):
+        for line in ghost:
             plot_places(
                 axes,
                 (line.start, line.end),
                 color=GHOST,
-                alpha=1.0 - 0.75 * index / len(shown.ghosts),  # the later, the paler
+                alpha=1.0 - 0.75 * index / len(drawn.ghosts),  # the later, the paler
                 linewidth=1.0,
-                marker='o',
+                marker='' if drawn.camera else 'o',
                 markersize=2.0,
                 zorder=LAYERS['ghost'],
             )
-    points = shown.closure.points(shown.position)
-    for index, (name, path) in enumerate(shown.sweep.paths.items()):
+    for index, (name, path) in enumerate(drawn.paths.items()):
         colour = COLOURS[index % len(COLOURS)]
         plot_places(
             axes,
@@ -171,8 +190,8 @@ def paint_background(axes: Any, shown: LinkageView) -> None:
             linestyle=(0, (5, 2)),
             zorder=LAYERS['path'],
         )
-        place = next(place for (_, point), place in points.items() if point == name)
-        plot_places(axes, [place], 'o', color=colour, markersize=3.5, zorder=LAYERS['label'])
+        dot = [drawn.dots[name]]
+        plot_places(axes, dot, 'o', color=colour, markersize=3.5, zorder=LAYERS['label'])
 
 
 def joint_axes(place: Any, joints: Sequence[Curve]) -> dict[bool, Any]:
@@ -237,33 +256,15 @@ def label_across(axes: Any, name: str, unit: str) -> None:
         axes.set_xlabel(f'{name} [{unit}]')
 
 
-def _write_names(axes: Any, shown: LinkageView, drawn: Sequence[Shape], size: float) -> None:
-    """Write the names of pins and links where they hide little."""
+def _write_names(axes: Any, drawn: DrawnLinkage) -> None:
+    """Write the names where they hide little."""
     names = NameLabels(axes)
-    radius = abs(names.to_pixel(complex(size, 0.0)) - names.to_pixel(0j))
-    pins = {shape.name: shape.centre for shape in drawn if isinstance(shape, Circle)}
-    points = shown.closure.points(shown.position)
-    for (link, name), place in points.items():
-        if link in shown.closure.linkage.links and link != GROUND:
-            pins.setdefault(name, place)
-    for name, place in pins.items():
-        names.add_name(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=INK)
-    for link, named in shown.closure.linkage.links.items():
-        if link == GROUND:
-            continue
-        places = [points[link, point] for point in named]
-        bodies = [shape for shape in drawn if isinstance(shape, Polygon) and shape.name == link]
-        middle = sum(places) / len(places)
-        if bodies:
-            edge = bodies[-1].corners
-            middle = sum(edge) / len(edge)
-        anchors = [middle]
-        if len(places) > 1:
-            one, other = places[0], places[-1]
-            anchors += [one + (other - one) * part for part in (0.35, 0.65, 0.25, 0.75)]
-        names.add_name(
-            link, anchors, 1.1 * radius, fontsize=6.5, fontstyle='italic', color=NAME_INK
-        )
-    lines = [shape_outline(shape) for shape in drawn]
-    lines += [(line.start, line.end) for line in draw_skeleton(shown.closure, shown.position)]
+    radius = abs(names.to_pixel(complex(drawn.size, 0.0)) - names.to_pixel(0j))
+    for text, anchors, is_link, clear in drawn.names:
+        look: dict[str, Any] = {'fontsize': 7.5, 'fontweight': 'bold', 'color': INK}
+        if is_link:
+            look = {'fontsize': 6.5, 'fontstyle': 'italic', 'color': NAME_INK}
+        names.add_name(text, anchors, clear * radius, **look)
+    lines = [shape_outline(shape) for shape in drawn.shapes]
+    lines += [shape_outline(line) for line in drawn.skeleton]
     names.place_names(lines)

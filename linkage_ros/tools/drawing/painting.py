@@ -11,11 +11,11 @@
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
-from math import ceil, isnan, pi
+from math import ceil, floor, isnan, log10, pi
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -23,7 +23,17 @@ from warnings import catch_warnings, filterwarnings
 
 from linkage_ros.description import atomic_write
 from linkage_ros.errors import check_installed, LinkageError
-from linkage_ros.kinematics import Circle, COLOURS, FACES, INK, Polygon, Shape
+from linkage_ros.kinematics import (
+    bounding_corners,
+    Circle,
+    COLOURS,
+    FACES,
+    INK,
+    Polygon,
+    Segment,
+    Shape,
+    shape_outline,
+)
 from linkage_ros.names import picture_text
 
 _DIRECTIONS = 16
@@ -46,13 +56,53 @@ _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 
 _FONT_SIZE = 7.0
 """Of names beside lines, in points."""
-STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+STROKES = {
+    'rail': (INK, 1.3),
+    'hatch': (INK, 0.7),
+    'slot': ('#ffffff', 2.2),
+    'axis': (NAME_INK, 0.7),
+}
+_DASH_DOT = (0, (9, 2, 1.5, 2))
 _SETTINGS: Any = {
     'font.size': 8.0,
     'svg.hashsalt': 'linkage_ros',
     'axes.linewidth': 0.6,
     'text.parse_math': False,  # a name between dollar signs is not a formula
 }
+
+
+class DrawnName(NamedTuple):
+    """A name to be written beside one of some places, the first the best."""
+
+    text: str
+    anchors: Sequence[complex]
+    is_link: bool = False
+    clear: float = 1.2  # Of the anchor, in half widths of a bar
+
+
+class DrawnLinkage(NamedTuple):
+    """A linkage as it is painted; all lengths in [m]."""
+
+    size: float  # Half the width of a bar
+    shapes: Sequence[Shape]  # The topmost last
+    skeleton: Sequence[Segment]  # The links as lines
+    ghosts: Sequence[Sequence[Segment]]  # Poses in the background
+    paths: Mapping[str, Sequence[complex]]  # Of the traced points
+    dots: Mapping[str, complex]  # The traced points
+    names: Sequence[DrawnName]
+    strengths: Sequence[float] = ()  # How strong shapes are painted; those behind are fainter
+    camera: Any = None  # The `Camera` of a spatial linkage
+    has_lengths: bool = True
+
+    def corners(self, margin: float) -> tuple[complex, complex]:
+        """Return lower left and upper right of all, with a margin in half widths of a bar."""
+        places = [place for shape in self.shapes for place in shape_outline(shape)]
+        places += [place for path in self.paths.values() for place in path]
+        for lines in (self.skeleton, *self.ghosts):
+            places += [end for line in lines for end in shape_outline(line)]
+        low, high = bounding_corners(places)
+        edge = margin * self.size * (1.0 + 1.0j)
+        return low - edge, high + edge
 
 
 class Label(NamedTuple):
@@ -287,7 +337,7 @@ def paint_shapes(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
             circle = patches.Circle(
                 centre,
                 shape.radius,
-                facecolor='white',
+                facecolor=FACES.get(shape.role, 'white'),
                 edgecolor=INK,
                 linewidth=0.9,
                 zorder=LAYERS['shape'],
@@ -300,10 +350,54 @@ def paint_shapes(axes: Any, drawn: Sequence[Shape]) -> list[Any]:
                 (shape.start, shape.end),
                 color=colour,
                 linewidth=width,
+                linestyle=_DASH_DOT if shape.role == 'axis' else '-',
                 solid_capstyle='round',
                 zorder=LAYERS['shape'],
             )
     return painted
+
+
+def make_faint(artist: Any, strength: float) -> None:
+    """Mix the colours of a painted shape with white; of strength 1 nothing changes."""
+    from matplotlib.colors import to_rgba  # local import: an extra, and slow to load
+
+    for part in ('color',) if hasattr(artist, 'get_color') else ('facecolor', 'edgecolor'):
+        *colour, opacity = to_rgba(getattr(artist, f'get_{part}')())
+        mixed = [1.0 - strength * (1.0 - each) for each in colour]
+        getattr(artist, f'set_{part}')((*mixed, opacity))
+
+
+def paint_frame(
+    axes: Any, directions: Any, low: complex, high: complex, *, has_lengths: bool
+) -> None:
+    """
+    Paint the directions x, y and z in the lower left corner of a picture, and a bar to scale.
+
+    The first two rows of ``directions`` are what is right and up in the picture.
+    """
+    arm = 0.05 * abs(high - low)
+    origin = low + arm * (1.5 + 2.0j)
+    for name, right, up in zip('xyz', *directions[:2], strict=True):
+        way = arm * complex(right, up)
+        plot_places(axes, (origin, origin + way), color=INK, linewidth=1.0)
+        letter = origin + 1.4 * way
+        axes.text(
+            letter.real, letter.imag, name, ha='center', va='center', fontsize=_FONT_SIZE,
+            color=INK,
+        )  # fmt: skip
+    if not has_lengths:
+        return
+    unit, factor = unit_of_length(abs(high - low))
+    longest = 0.4 * (high - low).real
+    power = 10.0 ** floor(log10(longest))
+    length = next(k * power for k in (5.0, 2.0, 1.0) if k * power <= longest)
+    start = low + arm * (0.4 + 0.1j)
+    ends = (start + 0.15j * arm, start, start + length, start + length + 0.15j * arm)
+    plot_places(axes, ends, color=INK, linewidth=1.0)
+    axes.text(
+        ends[-1].real + 0.2 * arm, start.imag, f'{length * factor:g} {unit}', va='bottom',
+        fontsize=_FONT_SIZE, color=INK,
+    )  # fmt: skip
 
 
 class NameLabels:

@@ -11,33 +11,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 from xml.sax.saxutils import escape
 
 from linkage_ros.errors import quote
 from linkage_ros.kinematics import (
-    all_places,
-    bounding_corners,
     Circle,
     Closure,
     COLOURS,
-    draw_shapes,
-    draw_skeleton,
     FACES,
     INK,
     Polygon,
     Position,
     prepare_view,
     shape_outline,
-    symbol_size,
+    SpaceClosure,
     usual_inputs,
 )
+from linkage_ros.tools.drawing.drawn_linkage import draw_linkage
 from linkage_ros.tools.drawing.painting import GHOST, STROKES
 
 _LONGER_SIDE = 420.0
 """Longer side of a picture, in pixels."""
 
 
-def svg(shown: Closure | Position) -> str:
+def svg(shown: Closure | SpaceClosure | Position) -> str:
     """
     Draw a linkage as SVG.
 
@@ -61,19 +59,13 @@ def svg(shown: Closure | Position) -> str:
         If it is neither.
 
     """
-    position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown
+    position: Any = shown
+    if isinstance(shown, (Closure, SpaceClosure)):
+        position = shown.position(*usual_inputs(shown))
     if not isinstance(position, Position):
         raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
-    closure = position.closure
-    assert isinstance(closure, Closure)
-    seen = prepare_view(closure, position.inputs)
-    size = symbol_size(seen)
-    drawn = draw_shapes(closure, position, size, seen.sweep.travels)
-    low, high = bounding_corners(
-        [*all_places(seen), *(p for shape in drawn for p in shape_outline(shape))]
-    )
-    margin = complex(2.0, 2.0) * size
-    low, high = low - margin, high + margin
+    drawn = draw_linkage(prepare_view(position.closure, position.inputs))
+    low, high = drawn.corners(2.0)
     scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)
     width, height = scale * (high - low).real, scale * (high - low).imag
 
@@ -84,13 +76,13 @@ def svg(shown: Closure | Position) -> str:
 
     lines = [
         polyline_svg(shape_outline(bar), f'stroke="{GHOST}"')
-        for ghost in seen.ghosts
-        for bar in draw_skeleton(closure, ghost)
+        for ghost in drawn.ghosts
+        for bar in ghost
     ]
-    for index, path in enumerate(seen.sweep.paths.values()):
+    for index, path in enumerate(drawn.paths.values()):
         colour = COLOURS[index % len(COLOURS)]
         lines.append(polyline_svg(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
-    for shape in drawn:
+    for shape in drawn.shapes:
         if isinstance(shape, Polygon):
             colour, opacity = FACES[shape.role][:7], int(FACES[shape.role][7:] or 'ff', 16) / 255
             style = f'fill="{colour}" fill-opacity="{opacity:.2f}" stroke="{INK}"'
@@ -99,7 +91,7 @@ def svg(shown: Closure | Position) -> str:
             centre, radius = shape.centre - low, shape.radius * scale
             lines.append(
                 f'<circle cx="{centre.real * scale:.1f}" cy="{height - centre.imag * scale:.1f}" '
-                f'r="{radius:.1f}" fill="#ffffff" stroke="{INK}"/>'
+                f'r="{radius:.1f}" fill="{FACES.get(shape.role, "#ffffff")}" stroke="{INK}"/>'
             )
         else:
             colour, weight = STROKES[shape.role]

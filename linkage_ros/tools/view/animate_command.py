@@ -22,7 +22,7 @@ from threading import Event
 from linkage_ros.bag import is_bag_name, layout_of
 from linkage_ros.cli import add_output, open_bag, output_or, show_progress
 from linkage_ros.description import load
-from linkage_ros.kinematics import prepare_view, usual_inputs
+from linkage_ros.kinematics import check_planar, prepare_view, usual_inputs
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.drawing import (
     animate,
@@ -82,6 +82,7 @@ def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Ani
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
         return find_run_motion(found, scene.name if scene else given.name, arguments.seconds)
     closure = load(arguments.file)
+    check_planar(closure.name, closure.linkage)
     shown = prepare_view(closure, usual_inputs(closure))
     seconds = _TURN if arguments.seconds is None else arguments.seconds
     return range_motion(shown, given.stem, seconds)

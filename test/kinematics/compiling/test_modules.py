@@ -10,14 +10,21 @@
 
 from array import array
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 import json
 import math
 from math import ulp
 from pathlib import Path
+from random import Random
 import subprocess
 from typing import Any
 
+from campaigns.topologies.families import FAMILIES
+import linkage_ros as lr
+from linkage_ros.kinematics import Closure, Limits
 from linkage_ros.tools.models.source_code import (
+    C,
     FUNCTIONS,
     JavaScript,
     PythonModule,
@@ -62,6 +69,51 @@ def test_python_has_the_bits_of_the_steps(name):
     solve = python_of(subject(closure))['motion']
     for state in states(closure, COUNT, name):
         assert told_by(solve, state) == plain(closure, state), state
+
+
+def planar_group_of_two_inputs():
+    """Return links that only two inputs close together, with limits about their pose."""
+    linkage = FAMILIES['class III two inputs'].make(Random(2)).linkage
+    inputs = [
+        replace(given, limits=Limits(value - 0.2, value + 0.2))
+        for given, value in zip(linkage.inputs, linkage.pose.inputs, strict=True)
+    ]
+    return Closure(replace(linkage, inputs=tuple(inputs)))
+
+
+@pytest.mark.parametrize(
+    ('make', 'reach'),
+    [(partial(closure_of, 'ankle_motors'), 0.6), (planar_group_of_two_inputs, 0.2)],
+)
+def test_python_has_the_cells_of_several_inputs(make, reach):
+    closure, random = make(), Random(1)
+    solve = python_of(subject(closure))['motion']
+    pose = closure.linkage.pose.inputs
+    closed = 0
+    for _ in range(300):
+        inputs = tuple(value + random.uniform(-reach, reach) for value in pose)
+        state = (*inputs, *(random.uniform(-9.0, 9.0) for _ in range(4)))
+        told = told_by(solve, state)
+        if told.status != 'UNDECIDED':
+            assert told == plain(closure, state), state
+            closed += told.status == 'CLOSED'
+    assert closed > 290
+    for beyond in (0.65, 3.0):
+        state = (pose[0] + beyond, pose[1], 1.0, 1.0, 1.0, 1.0)
+        assert told_by(solve, state).status in ('LIMITED', 'UNDECIDED')
+
+
+@pytest.mark.parametrize(
+    ('name', 'language', 'told'),
+    [
+        ('ankle_motors', JavaScript(), 'close only together, by 2 inputs; .* x.py'),
+        ('ankle_motors', C('ankle', header=False), 'close only together, by 2 inputs; .* x.py'),
+        ('hexapod', PythonModule(2), '6 inputs .* too many cells; give these inputs limits'),
+    ],
+)
+def test_what_has_no_cells_is_not_written(name, language, told):
+    with pytest.raises(lr.DefinitionError, match=told):
+        write_source(subject(closure_of(name)), language)
 
 
 def test_python_needs_nothing_but_math():

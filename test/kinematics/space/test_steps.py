@@ -10,7 +10,7 @@
 from math import hypot
 from random import Random
 
-from campaigns.space import FAMILIES, LIMIT, ORDERS
+from campaigns.space import FAMILIES, LIMIT, ORDERS, SLOWER
 from campaigns.space_reference import errors_of
 from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
@@ -29,7 +29,7 @@ from ...support.sampling import sample_count
 @pytest.mark.parametrize('family', FAMILIES)
 def test_what_is_closed_is_as_exact_as_its_numbers(family):
     random, draw = Random(family), FAMILIES[family]
-    for _ in range(sample_count(300, 20)):
+    for _ in range(sample_count(300 // SLOWER.get(family, 1), 20 // SLOWER.get(family, 1))):
         case = draw(random)
         for order, error in zip(ORDERS, case.errors, strict=True):
             assert error <= LIMIT, (order, case.given)

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics import Grid
 from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
@@ -52,6 +54,8 @@ class PythonModule(Language):
         if operation.name == 'hypot':
             # The root that C's hypot() gives; the last digits of math.hypot() differ.
             return f'abs(complex({parts[0]}, {parts[1]}))'
+        if operation.name == 'found':
+            return f'({parts[0]} is not None)'
         return super().write_call(operation, parts)
 
     def write_choice(self, condition: str, one: str, other: str) -> str:
@@ -89,6 +93,32 @@ class PythonModule(Language):
             '',
             f'def {name}(x):',
             f'    return _{name}_rows[bisect_left(_{name}_ends, x)]',
+            '',
+            '',
+        ]
+
+    def write_grid(self, name: str, grid: Grid) -> list[str]:
+        cells = grid.fill()
+        if cells is None:
+            raise DefinitionError(
+                'input',
+                f'{len(grid.home)} inputs move links that close only together, and within their '
+                'limits are too many cells',
+                'give these inputs limits, or narrower ones',
+            )
+        return [
+            f'_{name}_cells = {{',
+            *(f'    {key}: ({self.write_list(cell)}),' for key, cell in sorted(cells.items())),
+            '}',
+            '',
+            '',
+            f'def {name}(*inputs):',
+            f'    for level, width in enumerate(({self.write_list(grid.widths)})):',
+            f'        home = ({self.write_list(grid.home)},)',
+            '        key = (level, *(round((x - at) / width) for x, at in zip(inputs, home)))',
+            f'        if key in _{name}_cells:',
+            f'            return _{name}_cells[key]',
+            '    return None',
             '',
             '',
         ]

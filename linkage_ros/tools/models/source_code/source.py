@@ -24,9 +24,11 @@ import textwrap
 from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros import __version__
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     Bound,
     Closure,
+    Grid,
     Linkage,
     RevoluteJoint,
     ROUNDING,
@@ -142,7 +144,7 @@ class Language(ABC):
         if operation.name == 'item':
             return f'{parts[0]}[{parts[1]}]'
         if operation.name == 'call':
-            return f'{parts[0]}({parts[1]})'
+            return f'{parts[0]}({", ".join(parts[1:])})'
         if operation.name == 'round':
             return f'{self.nearest}({parts[0]})'
         return f'{self.functions.get(operation.name, operation.name)}({", ".join(parts)})'
@@ -199,6 +201,15 @@ class Language(ABC):
 
         Each but the last of the rows ends at one of ``ends``, which belongs to it.
         """
+
+    def write_grid(self, name: str, grid: Grid) -> list[str]:
+        """Write a function that returns the numbers of the cell at several inputs, or nothing."""
+        raise DefinitionError(
+            'links',
+            f'some close only together, by {len(grid.home)} inputs; their cells are written in '
+            'Python only',
+            'name the output x.py',
+        )
 
     def write_list(self, numbers: Sequence[float]) -> str:
         """Write numbers, separated by commas."""
@@ -270,7 +281,7 @@ class _SourceBody:
         self._lengths = _length_names(subject.closure)
         self._often = Counter(_used_constants(roots))
         self._named: dict[float, str] = {}
-        self._tables: dict[StartTable, str] = {}
+        self._tables: dict[StartTable | Grid, str] = {}
         self._writer = TextWriter(
             roots,
             self._constant_text,
@@ -390,6 +401,9 @@ class _SourceBody:
         language = self._language
         lines = []
         for table, name in self._tables.items():
+            if isinstance(table, Grid):
+                lines += language.write_grid(name, table)
+                continue
             rows = list(map(language.write_list, table.rows))
             ends = [language.write_constant(end) for end in table.ends]
             lines += language.write_table(name, ends, rows)
@@ -398,7 +412,7 @@ class _SourceBody:
     def _constant_text(self, value: Any) -> str:
         if isinstance(value, str):
             return value
-        if isinstance(value, StartTable):
+        if isinstance(value, StartTable | Grid):
             function = self._language.function_name(self._subject.derivatives)
             number = len(self._tables) or ''
             return self._tables.setdefault(value, f'{function}_row{number}')

@@ -218,8 +218,8 @@ class SceneCurves:
         moving = scene.linkages[:MOST_LINKAGES]
         names = (name for each in moving for name in (*each.input_names, *each.joint_names))
         self._places = {name: place for place, name in enumerate(dict.fromkeys(names))}
-        # Beside the joint values, the page holds three numbers for the frame of each link, and the
-        # distance by which loops are open.
+        # Beside the joint values, the page holds three numbers for the frame of each link, or for
+        # each place of a spatial linkage, and the distance by which loops are open.
         size = 8 * (1 + len(self._places)) + 12 * bodies + 4 * len(moving)
         most = min(MOST_FRAMES, FRAME_BYTES // size)
         self._frames = Decimation(len(self._places), max(2, most - most % 2))

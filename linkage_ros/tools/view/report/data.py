@@ -20,7 +20,8 @@ published joints, as in a robot model (`linkage_ros.tools.models.tree`), and eac
 its own recorded value. The loops are not solved: where a sensor is wrong or late relative to
 another, links that share a pin come apart there, and the page shows the distance. If the published
 joints do not determine the position of a link, the loops are closed at the recorded inputs
-instead.
+instead. So are those of a spatial linkage, of which the page has places in space: see
+`linkage_ros.tools.drawing.space_drawing`.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ from linkage_ros.kinematics import (
     GROUND,
     prepare_view,
     separate_blocks,
+    SpaceClosure,
     usual_inputs,
 )
-from linkage_ros.tools.drawing import drawn_in_frames
+from linkage_ros.tools.drawing import drawn_in_frames, SpaceDrawing
 from linkage_ros.tools.models import grow_tree, prefix_names, Tree
 from linkage_ros.tools.view.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.tools.view.report.labels import (
@@ -77,7 +79,7 @@ class Poses(NamedTuple):
 
     links: tuple[str, ...]  # The moving links, and the blocks of sliders, which are not links
     # Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape (instants, links,
-    # 3); NaN where it is unknown.
+    # 3); of a spatial linkage its places instead; NaN where it is unknown.
     frames: Numbers
     # Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
     apart: Numbers
@@ -313,18 +315,24 @@ def _frames_json(frames: Frames) -> dict[str, Any]:
 def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
     found, space = [], SHAPE_BYTES
     for linkage in linkages:
-        drawn, size, undrawn = _drawing_of(linkage.closure, space)
+        closure: Any = linkage.closure
+        drawing: dict[str, Any] | None = None
+        if isinstance(closure, Closure):
+            poses = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
+        else:
+            poses, drawing = _spatial_poses(closure, [frames.values[n] for n in linkage.inputs])
+        drawn, size, undrawn = _drawing_of(closure, drawing, space)
         space -= size
-        found.append({**_linkage_json(linkage, frames), 'drawn': drawn, 'undrawn': undrawn})
+        found.append({**_linkage_json(linkage, poses), 'drawn': drawn, 'undrawn': undrawn})
     return found
 
 
-def _drawing_of(closure: Any, space: int) -> tuple[dict[str, Any] | None, int, str]:
+def _drawing_of(
+    closure: Any, drawn: dict[str, Any] | None, space: int
+) -> tuple[dict[str, Any] | None, int, str]:
     """Return the drawing of a linkage and its size in [bytes], or why there is none."""
-    if not isinstance(closure, Closure):
-        return None, 0, 'a spatial linkage'
     try:
-        drawn = drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
+        drawn = drawn or drawn_in_frames(prepare_view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)
     except LinkageError as error:
         return None, 0, shorten_text(str(error), 200)
@@ -333,13 +341,22 @@ def _drawing_of(closure: Any, space: int) -> tuple[dict[str, Any] | None, int, s
     return (drawn, size, '') if size <= space else (None, 0, 'no room on the page')
 
 
-def _linkage_json(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:
-    closure: Any = linkage.closure
-    if isinstance(closure, Closure):
-        found = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
-    else:
-        count = len(frames.times)
-        found = Poses((), np.empty((count, 0, 3)), np.full(count, np.nan), '')
+def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Poses, Any]:
+    """Return places of a spatial linkage instead of frames, and its drawing."""
+    drawing, count = SpaceDrawing(closure), len(inputs[0])
+    found = np.full((count, drawing.count, 3), np.nan)
+    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        if all(abs(value) < _FARTHEST for value in given):
+            position = closure.position(*given)
+            if position.joints:
+                found[i] = drawing.places(position)
+    known = found[np.isfinite(found).all(axis=(1, 2))]
+    if not len(known):
+        known = drawing.places(closure.position(*usual_inputs(closure)))[None]
+    return Poses((), found, np.full(count, np.nan), ''), drawing.page_data(known)
+
+
+def _linkage_json(linkage: LinkageRun, found: Poses) -> dict[str, Any]:
     return {
         'name': linkage.name,
         'inputs': linkage.inputs,

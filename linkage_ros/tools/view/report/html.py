@@ -39,6 +39,7 @@ from linkage_ros.tools.view.report.labels import (
     POSE_NOTE,
     seconds_text,
     shorten_text,
+    SPACE_NOTE,
 )
 from linkage_ros.tools.view.report.run import Curves, LinkageRun, ReportedRun
 import numpy as np
@@ -50,7 +51,7 @@ _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 """Upper bound of the HTML around each cell, in [bytes]."""
 
 _HERE = 'linkage_ros.tools.view.report'
-_FILES = ('report.css', 'over_time.js', 'over_others.js', 'plots.js', 'report.js')
+_FILES = ('report.css', 'over_time.js', 'over_others.js', 'plots.js', 'space.js', 'report.js')
 
 _LONGEST_FACT = 400
 """Maximum number of characters of a fact or a warning."""
@@ -215,7 +216,9 @@ def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Ite
         yield f'<figure data-linkage="{index}">'
         if linkage.name:
             yield f'<figcaption>{name}</figcaption>'
-        yield f'<canvas role="img" aria-label="{name} in its recorded pose"></canvas>'
+        spatial = 'camera' in (drawn[index]['drawn'] or {})
+        turned = ' tabindex="0" class="orbit"' if spatial else ''
+        yield f'<canvas{turned} role="img" aria-label="{name} in its recorded pose"></canvas>'
         if drawn[index]['undrawn']:
             yield f'<p class="note">Not drawn: {escape(drawn[index]["undrawn"])}</p>'
         yield '</figure>'
@@ -233,8 +236,11 @@ def _player_html(linkages: Sequence[LinkageRun], data: dict[str, object]) -> Ite
     yield '<label><input type="checkbox" id="traces" checked> traced curves</label>'
     yield '</div><dl class="readout" id="readout" aria-live="off"></dl>'
     why = next((each['untold'] for each in drawn if each['untold']), '')
-    if any(each['drawn'] for each in drawn):
+    kinds = {'camera' in each['drawn'] for each in drawn if each['drawn']}
+    if False in kinds:
         yield f'<p class="note">{escape(CLOSED_NOTE.format(why=why) if why else POSE_NOTE)}</p>'
+    if True in kinds:
+        yield f'<p class="note">{escape(SPACE_NOTE)}</p>'
     yield '</section>'
 
 

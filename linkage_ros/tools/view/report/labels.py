@@ -66,6 +66,10 @@ POSE_NOTE = (
     'again. Where a sensor is wrong or late against another, links come apart at a pin that they '
     'share. Where no joint state was recorded there is no pose.'
 )
+SPACE_NOTE = (
+    'The loops are closed at the recorded inputs. Drag the picture to look at it from elsewhere, '
+    'or press arrow keys once it has the focus; a double click takes you back.'
+)
 CLOSED_NOTE = (
     'The published joints do not determine where every link stands ({why}); the loops are closed '
     'at the recorded inputs.'

@@ -31,6 +31,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure, CODES, Status
 from linkage_ros.messages import JOINT_STATE_TYPE, WRENCHES
 from linkage_ros.replay import own_joint_states, recorded_scene
+from linkage_ros.tools.drawing import SpaceDrawing
 from linkage_ros.tools.view.report.blocks import (
     Blocks,
     Entry,
@@ -276,8 +277,9 @@ class SceneRun:
         self._health = RecordedDiagnostics(self._event_tracks, from_beginning)
         bodies = sum(
             len(each.closure.structure.links)
-            for each in self._linkages[:MOST_LINKAGES]
             if isinstance(each.closure, Closure)
+            else SpaceDrawing(each.closure).count
+            for each in self._linkages[:MOST_LINKAGES]
         )
         topics = run.joint_states_topic, run.crank_topic
         self._curves = SceneCurves(scene, topics, bodies, window)

@@ -15,7 +15,9 @@ const Report = (() => {
       Object.entries(data.frames.values).map(([n, v]) => [n, Curves.unpacked(v, Float64Array)]),
     ),
   };
-  const linkages = frames ? data.linkages.map((said) => new Picture.Linkage(said, frames)) : [];
+  const kind = (linkage) => (linkage.drawn?.camera ? Space : Picture);
+  const linkages = frames
+    ? data.linkages.map((said) => new (kind(said).Linkage)(said, frames)) : [];
   const posed = frames ? frames.times.findIndex(
     (time, number) => linkages.every((linkage) => linkage.hasPose(number, time)),
   ) : -1;
@@ -168,7 +170,7 @@ const Report = (() => {
       const linkage = linkages[Number(figure.dataset.linkage)];
       const canvas = figure.querySelector('canvas');
       canvas.hidden = !linkage.drawn;
-      return linkage.drawn ? [new Picture.Canvas(canvas, linkage)] : [];
+      return linkage.drawn ? [new (kind(linkage).Canvas)(canvas, linkage, show)] : [];
     });
     plots = [...document.querySelectorAll('figure[data-plot]')].map((f) => new Plots.Plot(f));
     // All of them have to have their size before the first is shown.

@@ -1,0 +1,395 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Solutions of links that close only together, as a function of their inputs, without history.
+
+A grid lies over the inputs. A cell has the solution at its centre, and the form of second order
+about it. It is made when it is first met, from its neighbour on the straight line to the pose, and
+that one likewise: there is one way to each cell, so the order of visits cannot matter. A cell is
+accepted if the theorem of Kantorovich proves, at each quarter of the way and at the corners of the
+cell, that the prediction leads to one solution::
+
+    η·ω ≤ 1/4    η = |J⁻¹F|, the first step of Newton's method    ω a bound of |J⁻¹·J'|
+
+(≤ 1/2 is needed.) Otherwise the way and the cell are halved, four times at most. What no cell
+covers lies next to a singularity, or beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, islice, product
+from math import isfinite, ldexp, prod, tau
+from typing import Any, NamedTuple, Protocol
+
+from linkage_ros.kinematics.arithmetic import call, has_result
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
+from linkage_ros.kinematics.compiling import compile_line
+from linkage_ros.kinematics.linkage import Input
+
+_WIDTH = 0.125
+"""Width of the widest cells, in [rad] or lengths."""
+
+_LEVELS = 5
+"""Number of widths; each is half the one before."""
+
+_KEPT = 4096
+"""Most cells that are kept: any other is made again, to the same bits."""
+
+_FARTHEST = 128
+"""Widest cells from the pose to the farthest state: some 16 rad, or lengths."""
+
+_PROVEN = 0.25
+"""Largest η·ω that is accepted."""
+
+_MOST_CORNERED = 3
+"""Of more inputs only the ends of the axes and two diagonals are tested: 64 corners take long."""
+
+_DIGITS = 28
+"""Binary digits after the point of the numbers of a cell: a start needs no more."""
+
+_RETURNED = 1e-9
+"""Farthest from the pose, apart from whole turns, that links are back."""
+
+_SHORTEST = 2.0**-50
+"""Shortest step beyond the cells, as a part of the way."""
+
+_HOPELESS = 2.0**-12
+"""The same, as a part of what is left: a way that needs shorter ones ends before the inputs."""
+
+Key = tuple[int, ...]
+
+
+class GridInput(NamedTuple):
+    """An input: its value in the pose, its limits, and whether it turns without any."""
+
+    home: float
+    low: float
+    high: float
+    turns: bool
+
+
+def grid_inputs(
+    inputs: Sequence[Input], pose: Sequence[float], scale: float
+) -> tuple[GridInput, ...]:
+    """Return the inputs of a linkage as coordinates; lengths are in units of ``scale`` metres."""
+    found = []
+    for given, home in zip(inputs, pose, strict=True):
+        unit, limits = scale if given.slider else 1.0, given.limits
+        turns = not given.slider and not limits.is_bounded
+        found.append(GridInput(home, limits.low / unit, limits.high / unit, turns))
+    return tuple(found)
+
+
+class GridCell(NamedTuple):
+    """A solution at certain inputs, and the quadratic form of the unknowns about it."""
+
+    inputs: tuple[float, ...]
+    unknowns: tuple[float, ...]
+    slopes: tuple[tuple[float, ...], ...]  # For each input
+
+    # For each input, and each from it on, the factors of the product of both.
+    bends: tuple[tuple[float, ...], ...]
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Return all numbers, one after the other."""
+        return (*self.inputs, *self.unknowns, *chain(*self.slopes, *self.bends))
+
+
+class _Found(NamedTuple):
+    """A cell, or None if it is not proven; and the last proven one on the way to it."""
+
+    cell: GridCell | None
+    last: GridCell
+    numbers: tuple[float, ...] | None  # Of the cell: inputs, unknowns, slopes
+
+
+class GridFunctions(Protocol):
+    """The equations of a group of links, at its inputs."""
+
+    def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
+        """Return η·ω of Kantorovich's theorem; infinite where there is none."""
+
+    def solve_from(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[float] | None:
+        """Return the solution that Newton's method leads to."""
+
+    def forms_at(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
+        """Return slopes and bends at a solution, as a cell has them."""
+
+
+class Grid:
+    """The cells of a group of links about a pose, whose unknowns are given."""
+
+    def __init__(
+        self, group: GridFunctions, inputs: Sequence[GridInput], unknowns: Sequence[float]
+    ) -> None:
+        self._group, self._inputs = group, inputs
+        count = len(inputs)
+        level = (0.0,) * len(unknowns)
+        bends = (level,) * (count * (count + 1) // 2)
+        self.home = tuple(given.home for given in inputs)
+        """The inputs of the pose, at the centre of the first cell."""
+        self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
+        self._kept: dict[tuple[int, Key], _Found] = {}
+        self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
+        self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
+        if count > _MOST_CORNERED:
+            axes = [
+                tuple(sign * (k == axis) for k in range(count))
+                for axis in range(count)
+                for sign in (-0.5, 0.5)
+            ]
+            self._corners = [*axes, self._corners[0], self._corners[-1]]
+
+    def __call__(self, *inputs: float) -> tuple[float, ...] | None:
+        """
+        Return inputs, unknowns and slopes of the widest proven cell at inputs; None if none is.
+
+        This is what `find_start` calls in compiled code.
+        """
+        home, kept = self.home, self._kept
+        for level, width in enumerate(self.widths):
+            key = tuple([round((x - at) / width) for x, at in zip(inputs, home, strict=True)])
+            found = kept.get((level, key))
+            if found is None:
+                with BUILD_LOCK:
+                    found = self._follow(level, key)
+            if found.numbers is not None:
+                return found.numbers
+        return None
+
+    def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
+        """Return where Newton's method starts, with symbols too; None if no cell is there."""
+        turned, gains = self.turn_back(inputs)
+        found = call(self, *turned)
+        if not has_result(found):
+            return None
+        values = _predict(found, turned, len(self._given.unknowns))
+        return [value + gain if gain else value for value, gain in zip(values, gains, strict=True)]
+
+    def turn_back(self, inputs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+        """
+        Return the inputs within half a turn of the pose, and what the unknowns gain by the turns.
+
+        Only inputs are turned after a turn of which the links are back.
+        """
+        turned, gains = [*inputs], [0.0] * len(self._given.unknowns)
+        for k, gained in enumerate(self._gained_in_turns):
+            if gained is not None:
+                turns = round((inputs[k] - self.home[k]) / tau)
+                turned[k] = inputs[k] - tau * turns
+                gains = [
+                    gain + by * turns if by else gain
+                    for gain, by in zip(gains, gained, strict=True)
+                ]
+        return turned, gains
+
+    @BuiltProperty
+    def _gained_in_turns(self) -> list[tuple[float, ...] | None]:
+        """Return for each input what the unknowns gain in a turn; None if it does not return."""
+        found: list[tuple[float, ...] | None] = []
+        for k, given in enumerate(self._inputs):
+            later = tuple(x + tau * (i == k) for i, x in enumerate(self.home))
+            cell, left = self.reach(later) if given.turns else (self._start, 1.0)
+            moved = [b - a for a, b in zip(self._start.unknowns, cell.unknowns, strict=True)]
+            gained = tuple(tau * round(each / tau) for each in moved)
+            returns = all(abs(a - b) < _RETURNED for a, b in zip(moved, gained, strict=True))
+            found.append(gained if returns and not left else None)
+        return found
+
+    def fill(self) -> dict[Key, tuple[float, ...]] | None:
+        """
+        Make all cells within the limits of the inputs; return their numbers by level and place.
+
+        None where an input has no limits, or where these are more cells than are kept.
+        """
+        cells: dict[Key, tuple[float, ...]] = {}
+        limits = [(given.low, given.high) for given in self._inputs]
+        if not all(map(isfinite, chain(*limits))):
+            return None
+        waiting = [(0, self._keys_between(0, limits))]
+        while waiting:
+            level, keys = waiting.pop()
+            if len(cells) + prod(map(len, keys)) > _KEPT:
+                return None
+            for key in product(*keys):
+                if (level, *key) in cells:
+                    continue
+                with BUILD_LOCK:
+                    numbers = self._follow(level, key).numbers
+                if numbers is not None:
+                    cells[(level, *key)] = numbers
+                elif level + 1 < _LEVELS:
+                    half = 0.5 * self.widths[level]
+                    within = [
+                        (max(low, x - half), min(high, x + half))
+                        for x, (low, high) in zip(self._centre(level, key), limits, strict=True)
+                    ]
+                    waiting.append((level + 1, self._keys_between(level + 1, within)))
+        return cells
+
+    def _keys_between(self, level: int, limits: Sequence[tuple[float, float]]) -> list[range]:
+        """Return for each input the places of the cells between two values."""
+        width = self.widths[level]
+        return [
+            range(*(round((end - at) / width) + k for k, end in enumerate(ends)))
+            for at, ends in zip(self.home, limits, strict=True)
+        ]
+
+    def _centre(self, level: int, key: Key) -> list[float]:
+        width = self.widths[level]
+        return [at + k * width for at, k in zip(self.home, key, strict=True)]
+
+    def predict(self, cell: GridCell, inputs: Sequence[float]) -> Sequence[float]:
+        """Return the unknowns at inputs near a cell."""
+        (unknowns,) = self._prediction(*inputs, *cell.numbers)
+        return tuple(unknowns)
+
+    @BuiltProperty
+    def _prediction(self) -> Callable[..., Any]:
+        count, unknowns = len(self.home), len(self._given.unknowns)
+
+        def compute(*numbers: Any) -> list[Any]:
+            return _predict(numbers[count:], numbers[:count], unknowns)
+
+        return compile_line(compute, [*self.home, *self._given.numbers])
+
+    @BuiltProperty
+    def _start(self) -> GridCell:
+        """Return the solution in the pose, with its forms."""
+        return self._step_to(self._given, self.home) or self._given
+
+    def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
+        """Yield the corners of the cell about the pose, with the unknowns predicted there."""
+        home = tuple(0 for _ in self.home)
+        for level, width in enumerate(self.widths):
+            with BUILD_LOCK:
+                cell = self._follow(level, home).cell
+            if cell is not None:
+                for corner in self._corners:
+                    at = [c + part * width for c, part in zip(cell.inputs, corner, strict=True)]
+                    yield at, self.predict(cell, at)
+                return
+
+    def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
+        """
+        Follow the straight line from the last cell to inputs, in proven steps; or from the pose.
+
+        Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
+        them.
+        """
+        width = self.widths[-1]
+        key = tuple(round((x - at) / width) for x, at in zip(inputs, self.home, strict=True))
+        with BUILD_LOCK:
+            begins = self._follow(_LEVELS - 1, key).last, self._start
+            ends = (self._follow_line(begin, inputs) for begin in begins)
+            return min(ends, key=lambda end: end[1])
+
+    def _follow_line(self, begin: GridCell, inputs: Sequence[float]) -> tuple[GridCell, float]:
+        cell, done, step = begin, 0.0, 1.0
+        while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
+            part = min(1.0, done + step)
+            found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
+            if found is None:
+                step *= 0.5
+            else:
+                cell, done, step = found, part, 2.0 * step
+        return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
+
+    def _follow(self, level: int, key: Key) -> _Found:
+        """Return a cell, made from its neighbour on the straight line to the pose."""
+        way: list[Key] = []
+        while (found := self._kept.get((level, key))) is None:
+            way.append(key)
+            count = max(map(abs, key), default=0)
+            if count > _FARTHEST << level:
+                return _Found(None, self._start, None)
+            if not count:
+                found = _Found(self._start, self._start, None)
+                break
+            key = tuple(round(k * (count - 1) / count) for k in key)
+        for key in reversed(way):
+            if found.cell is None:
+                break
+            # Wider cells lead to where they are no longer proven.
+            wider = None if key is way[0] else self._wider_cell(level, key)
+            cell = wider or self._make_cell(level, key, found.cell)
+            found = _Found(cell, cell or found.last, cell.numbers if cell else None)
+            if wider is None:
+                if len(self._kept) >= _KEPT:
+                    del self._kept[next(iter(self._kept))]
+                self._kept[level, key] = found
+        return found
+
+    def _wider_cell(self, level: int, key: Key) -> GridCell | None:
+        """Return the widest proven cell, of wider ones, at the centre of a cell."""
+        for wider in range(level):
+            at = tuple(round(k / (1 << level - wider)) for k in key)
+            cell = self._follow(wider, at).cell
+            if cell is not None:
+                return cell
+        return None
+
+    def _make_cell(self, level: int, key: Key, known: GridCell) -> GridCell | None:
+        """Return a cell, if it is proven from a known one."""
+        width, centre = self.widths[level], self._centre(level, key)
+        found = self._step_to(known, centre)
+        if found is None:
+            return None
+        # The last digits of functions differ from machine to machine.
+        forms = (tuple(map(_round_binary, each)) for each in (found.slopes, found.bends))
+        cell = GridCell(found.inputs, _round_binary(found.unknowns), *forms)
+        for corner in self._corners:
+            at = [c + part * width for c, part in zip(centre, corner, strict=True)]
+            if not self._group.proof(at, self.predict(cell, at)) <= _PROVEN:
+                return None
+        return cell
+
+    def _step_to(self, known: GridCell, inputs: Sequence[float]) -> GridCell | None:
+        """Return the solution that a known one is proven to lead to."""
+        group = self._group
+        for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
+            at = _part_of_way(known.inputs, inputs, part)
+            if not group.proof(at, self.predict(known, at)) <= _PROVEN:
+                return None
+        unknowns = group.solve_from(inputs, self.predict(known, inputs))
+        forms = None if unknowns is None else group.forms_at(inputs, unknowns)
+        if unknowns is None or forms is None:
+            return None
+        slopes, bends = (tuple(map(tuple, each)) for each in forms)
+        return GridCell(tuple(inputs), tuple(unknowns), slopes, bends)
+
+
+def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:
+    """Return the unknowns by the numbers of a cell; both may be symbols."""
+    n, number = len(inputs), len(inputs) * (1 + count) + count
+    offs = [value - numbers[i] for i, value in enumerate(inputs)]
+    unknowns = [numbers[n + k] for k in range(count)]
+    for i, off in enumerate(offs):
+        slopes = [numbers[n + count * (1 + i) + k] for k in range(count)]
+        for other in islice(offs, i, None):
+            slopes = [slope + other * numbers[number + k] for k, slope in enumerate(slopes)]
+            number += count
+        unknowns = [one + off * slope for one, slope in zip(unknowns, slopes, strict=True)]
+    return unknowns
+
+
+def _part_of_way(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
+    """Return inputs at a part of the way; the other end itself at 1."""
+    if part == 1.0:
+        return other
+    return [a + part * (b - a) for a, b in zip(one, other, strict=True)]
+
+
+def _round_binary(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(ldexp(float(round(ldexp(value, _DIGITS))), -_DIGITS) for value in values)

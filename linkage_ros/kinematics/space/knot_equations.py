@@ -1,0 +1,270 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+The equations of links in space that close only together, and their derivatives.
+
+The unknowns are the joints of a tree. Each rod is one equation, ½(|C − B|² − L²) = 0, between
+places on two links. All functions take numbers or symbols, and decide nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations_with_replacement
+from math import hypot, prod
+from typing import NamedTuple
+
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.elimination import Elimination
+from linkage_ros.kinematics.grid_group import Solve
+from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
+from linkage_ros.kinematics.space.steps import Rod
+from linkage_ros.kinematics.space.vectors import (
+    dot,
+    minus,
+    plus,
+    SpaceFrame,
+    subtract,
+    Vector,
+)
+from linkage_ros.kinematics.step import LinkState
+
+_AMID = 1.3
+"""Longest that a rod may be between two solutions, relative to its length."""
+
+_SLID = 0.25
+"""How far a slide may move between two solutions, in lengths."""
+
+
+class Mover(NamedTuple):
+    """A joint of the tree: the frame of its child follows those of the movers before it."""
+
+    joint: LowerPair
+    unknown: int  # Number of its value among the unknowns, or −1
+    coordinate: int = 0  # If it is known, its index among the coordinates
+
+    def value(self, unknowns: Sequence[float], state: LinkState) -> float:
+        """Return its value, or a derivative of it."""
+        return unknowns[self.unknown] if self.unknown >= 0 else state.coordinates[self.coordinate]
+
+
+class RodEnd(NamedTuple):
+    """A place on the link that a mover moves; or, if that is −1, beside a known point."""
+
+    mover: int
+    pin: int  # Index, among the pins, of the frame of the link, or of the point
+    place: Vector
+
+    def locate(self, state: LinkState) -> Vector:
+        """Return the place in the frame of the ground."""
+        pin = state.pins[self.pin]
+        return plus(pin, self.place) if self.mover < 0 else pin.place(self.place)
+
+    def arm(self, state: LinkState) -> Vector:
+        """Return the place from the origin of its link."""
+        frame: SpaceFrame = state.pins[self.pin]
+        return frame.turn(self.place)
+
+
+class KnotRod(NamedTuple):
+    """Two places at a known distance."""
+
+    start: RodEnd
+    end: RodEnd
+    rod: Rod
+
+
+class KnotEquations:
+    """
+    As many rods as there are unknown joints among the movers of a tree.
+
+    ``first`` is the index of the first mover's frame among the pins.
+    """
+
+    def __init__(self, movers: Sequence[Mover], rods: Sequence[KnotRod], first: int) -> None:
+        self._movers, self.rods, self.first = tuple(movers), tuple(rods), first
+        self._chains = [self._moving_chains(rod) for rod in rods]
+
+    def solve_rates(
+        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
+    ) -> list[float]:
+        """Return the rates of the unknowns: (C − B)·(Ċ − Ḃ) = L·L̇ for each rod."""
+        state = self.place_links(known, unknowns)
+        still = self.add_motions(state, velocities, [0.0] * len(self.rods))
+        right = [
+            subtract(rod.rod.power(state, velocities), dot(vector, slip))
+            for rod, vector, slip in self._slips(state, still)
+        ]
+        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        unknowns: Sequence[float],
+        velocities: LinkState,
+        rates: Sequence[float],
+        changes: LinkState,
+    ) -> list[float]:
+        """Return the accelerations: (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² = L·L̈ + L̇² for each rod."""
+        state = self.place_links(known, unknowns)
+        moving = self.add_motions(state, velocities, rates)
+        before = self.add_changes(state, moving, changes, rates, [0.0] * len(self.rods))
+        right = []
+        for rod, vector, slip in self._slips(state, moving):
+            one, other = (
+                before.pins[end.pin]
+                if end.mover < 0
+                else moving.pins[end.pin].acceleration(before.pins[end.pin], end.arm(state))
+                for end in (rod.start, rod.end)
+            )
+            bend = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
+            right.append(subtract(bend, dot(vector, minus(other, one))))
+        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
+
+    def place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
+        """Return the state with the frames of the links."""
+        first = self.first
+        state = LinkState(known.coordinates, known.pins[:first])
+        for mover in self._movers:
+            value = mover.value(unknowns, known)
+            state.pins.append(mover.joint.child_frame(mover.joint.base(state), value))
+        return state
+
+    def add_motions(
+        self, state: LinkState, velocities: LinkState, rates: Sequence[float]
+    ) -> LinkState:
+        """Return the velocities with the motions of the links."""
+        first = self.first
+        moving = LinkState(velocities.coordinates, velocities.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            rate = mover.value(rates, velocities)
+            moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
+        return moving
+
+    def add_changes(
+        self,
+        state: LinkState,
+        moving: LinkState,
+        changes: LinkState,
+        rates: Sequence[float],
+        accelerations: Sequence[float],
+    ) -> LinkState:
+        """Return the accelerations with the derivatives of the motions."""
+        first = self.first
+        changing = LinkState(changes.coordinates, changes.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            given = mover.value(rates, moving), mover.value(accelerations, changes)
+            frame = state.pins[number]
+            changing.pins.append(mover.joint.change(state, moving, changing, frame, *given))
+        return changing
+
+    def _slips(
+        self, state: LinkState, moving: LinkState
+    ) -> Iterator[tuple[KnotRod, Vector, Vector]]:
+        """Yield each rod, its vector, and the velocity of its end relative to its start."""
+        for rod in self.rods:
+            one, other = (
+                moving.pins[end.pin]
+                if end.mover < 0
+                else moving.pins[end.pin].velocity(end.arm(state))
+                for end in (rod.start, rod.end)
+            )
+            vector = minus(rod.end.locate(state), rod.start.locate(state))
+            yield rod, vector, minus(other, one)
+
+    def linearize(self, known: LinkState, unknowns: Sequence[float]) -> tuple[list[float], Solve]:
+        """Return the residuals, and a function that solves with their derivatives."""
+        errors, rows = self.evaluate(known, unknowns)
+        matrix = Elimination(rows, ())
+        divisors = matrix.divisors
+        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+            raise UndecidedError
+        return errors, matrix.solve
+
+    def evaluate(
+        self, known: LinkState, unknowns: Sequence[float]
+    ) -> tuple[list[float], list[list[float]]]:
+        """Return the residuals, and their derivatives by the unknowns."""
+        state = self.place_links(known, unknowns)
+        errors, rows = [], []
+        for rod, chains in zip(self.rods, self._chains, strict=True):
+            places = rod.start.locate(state), rod.end.locate(state)
+            vector, size = minus(places[1], places[0]), rod.rod.length(state)
+            errors.append(0.5 * (dot(vector, vector) - size * size))
+            row = [0.0] * len(self.rods)
+            for sign, place, chain in zip((-1.0, 1.0), places, chains, strict=True):
+                for number in chain:
+                    joint, unknown, _ = self._movers[number]
+                    frame = state.pins[self.first + number]
+                    slope = dot(vector, joint.slope(frame.z, minus(place, frame.origin)))
+                    if unknown >= 0:
+                        row[unknown] = slope if sign > 0.0 else subtract(0.0, slope)
+            rows.append(row)
+        return errors, rows
+
+    def _moving_chains(self, rod: KnotRod) -> tuple[list[int], list[int]]:
+        """Return the movers that move one end of a rod only, for both ends, the last first."""
+        chains: list[list[int]] = []
+        for end in (rod.start, rod.end):
+            chain, number = [], end.mover
+            while number >= 0:
+                chain.append(number)
+                number = max(self._movers[number].joint.parent - self.first, -1)
+            chains.append(chain)
+        one, other = chains
+        return [k for k in one if k not in other], [k for k in other if k not in one]
+
+    @BuiltProperty
+    def _axis_cosines(self) -> dict[tuple[int, int], float]:
+        """Return the |cosines| between the axes of slides that no hinge turns against another."""
+        found: dict[tuple[int, int], float] = {}
+        for one, mover in enumerate(self._movers):
+            other, axis = one, mover.joint.seat.z
+            while other >= 0 and isinstance(self._movers[other].joint, SlidePair):
+                joint = self._movers[other].joint
+                if other != one:
+                    # The axis in the frame of the child of the other.
+                    found[one, other] = abs(dot(axis, (0.0, 0.0, 1.0)))
+                axis, other = joint.seat.turn(axis), joint.parent - self.first
+        return found
+
+    def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[float]) -> list[float]:
+        """
+        Return bounds of the second derivatives of an equation: one for each pair of unknowns.
+
+        An end is never farther from an axis than the links between reach. It moves by no more for
+        a turn, and by 1 for a slide; only what is nearer to the ground turns that.
+        """
+        start, end, rod = self.rods[number]
+        size, count = _AMID * rod.length(known), len(unknowns)
+        bounds = dict.fromkeys(combinations_with_replacement(range(count), 2), 0.0)
+        moves: list[tuple[int, float]] = []
+
+        def bound(one: int, other: int, by: float) -> None:
+            pair = sorted((self._movers[one].unknown, self._movers[other].unknown))
+            bounds[pair[0], pair[1]] += by
+
+        for at, chain in zip((start, end), self._chains[number], strict=True):
+            reach, outer = hypot(*at.place), len(moves)
+            for k in chain:
+                mover = self._movers[k]
+                slides = isinstance(mover.joint, SlidePair)
+                if mover.unknown >= 0:
+                    moves.append((k, 1.0 if slides else reach))
+                    # A turn nearer to the ground turns what the others move, and itself.
+                    for other, move in () if slides else moves[outer:]:
+                        bound(k, other, size * move * (1.0 if other == k else 2.0))
+                reach += hypot(*mover.joint.seat.origin)
+                reach += abs(mover.value(unknowns, known)) + _SLID if slides else 0.0
+        aligned = self._axis_cosines
+        for one, move in moves:
+            for other, more in moves:
+                aligned_pair = max(one, other), min(one, other)
+                bound(one, other, move * more * aligned.get(aligned_pair, 1.0))
+        return [*bounds.values()]

@@ -1,0 +1,204 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""Links that close only together: they depend on the inputs alone, and are exact."""
+
+from math import dist, remainder, tau
+from pathlib import Path
+from random import Random
+
+from linkage_ros.description import load
+from linkage_ros.kinematics import Status
+from linkage_ros.kinematics.compiling import Compiled
+import numpy as np
+import pytest
+
+from ...support.sampling import sample_count
+
+FOLDER = Path(__file__).parent / 'linkages'
+BOTH_WAYS = {'ankle': 'ankle_motors', 'hexapod_inverse': 'hexapod'}
+
+
+def closure_of(name):
+    own = FOLDER / f'{name}.yaml'
+    return load(own if own.is_file() else name)
+
+
+def random_inputs(closure, count, reach):
+    random = Random(closure.name)
+    pose = closure.linkage.pose.inputs
+    return [
+        [
+            value + reach * random.uniform(-1.0, 1.0) * (0.1 if given.slider else 1.0)
+            for value, given in zip(pose, closure.linkage.inputs, strict=True)
+        ]
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize('name', BOTH_WAYS)
+def test_there_and_back_is_the_identity(name):
+    there, back = closure_of(name), closure_of(BOTH_WAYS[name])
+    met = 0
+    for inputs in random_inputs(there, 50, 0.3):
+        position = there.position(*inputs)
+        if position.status is not Status.CLOSED:
+            continue
+        met += 1
+        found = back.position(*position.joints)
+        assert found.status is Status.CLOSED
+        assert found.joints == pytest.approx(inputs, abs=1e-14)
+        product = back.jacobian(found) @ there.jacobian(position)
+        assert product == pytest.approx(np.eye(len(inputs)), abs=1e-11)
+    assert met > 25
+
+
+def test_the_order_of_visits_does_not_matter():
+    states = random_inputs(closure_of('ankle_motors'), sample_count(10_000, 300), 0.7)
+    one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
+    forward = [one.close_unlimited(*inputs).joints for inputs in states]
+    assert [other.close_unlimited(*inputs).joints for inputs in reversed(states)] == forward[::-1]
+    assert sum(map(bool, forward)) > 0.9 * len(states)
+
+
+def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypatch):
+    from linkage_ros.kinematics import grid
+
+    states = random_inputs(closure_of('ankle_motors'), 60, 0.6)
+    whole = closure_of('ankle_motors')
+    expected = [whole.position(*inputs).joints for inputs in states]
+    monkeypatch.setattr(grid, '_KEPT', 4)
+    few = closure_of('ankle_motors')
+    assert [few.position(*inputs).joints for inputs in states] == expected
+
+
+@pytest.mark.parametrize('turns', [-7, 1, 3, 1000])
+def test_a_crank_that_turns_on_and_on_meets_the_same_links(turns):
+    closure = closure_of('ankle_of_one_motor')
+    gear, *others = range(len(closure.joint_names))
+    for (x,) in random_inputs(closure, 20, 3.0):
+        one, later = closure.position(x), closure.position(x + tau * turns)
+        assert later.status is one.status is Status.CLOSED
+        assert later.joints[gear] - one.joints[gear] == pytest.approx(-tau * turns)
+        for k in others:
+            assert later.joints[k] == pytest.approx(one.joints[k], abs=1e-11)
+    wound = 0.3 + tau * turns
+    position = closure.position(wound)
+    rates = closure.velocity(position, 1.0).joints
+    assert Compiled(closure, 1)(wound, 1.0).values == (position.joints, rates)
+
+
+def test_the_cells_within_limits_are_those_that_states_meet():
+    one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
+    (grid,), (met,) = one.grids, other.grids
+    cells = grid.fill()
+    assert {key[0] for key in cells} == {0}
+    for inputs in random_inputs(other, 300, 0.6):
+        assert met(*inputs) in cells.values()
+    assert closure_of('hexapod').grids[0].fill() is None
+
+
+def test_a_state_is_where_a_walk_from_the_pose_ends():
+    """The motors are closed forms of the joints; the walk inverts these by Newton's method."""
+    motors = Compiled(closure_of('ankle'), 1, within_limits=False)
+    joints = closure_of('ankle_motors')
+    for inputs in random_inputs(joints, sample_count(10_000, 10), 0.6):
+        now, steps = np.zeros(2), 4000
+        for step in range(1, steps + 1):
+            wanted = np.array(inputs) * (step / steps)
+            for _ in range(2):
+                place, first = motors(*now.tolist(), 1.0, 0.0).values
+                _, second = motors(*now.tolist(), 0.0, 1.0).values
+                now = now + np.linalg.solve(np.transpose([first, second]), wanted - place)
+        assert joints.close_unlimited(*inputs).joints == pytest.approx(now, abs=1e-13)
+
+
+def last_with(attribute, closure, inputs):
+    """Return the part of the way to inputs up to which the linkage has a pose, or rates."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        status = closure.close_unlimited(*(middle * value for value in inputs)).status
+        if getattr(status, attribute):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
+    closure = closure_of('ankle_motors')
+    far = [3.0, 3.0]
+    end = last_with('has_pose', closure, far)
+    assert 0.0 < end < 1.0
+    parts = np.linspace(0.0, min(1.0, 1.2 * end), 60).tolist()
+    there = [closure.close_unlimited(*(part * value for value in far)) for part in parts]
+    back = [closure.close_unlimited(*(part * value for value in far)) for part in parts[::-1]]
+    assert [one.joints for one in there] == [one.joints for one in back[::-1]]
+    statuses = {one.status for one in there}
+    assert {Status.CLOSED, Status.OPEN} <= statuses
+
+
+def test_a_toggle_from_both_sides():
+    closure = closure_of('ankle_motors')
+    far = np.array([3.0, 3.0])
+    begin, end = (last_with(what, closure, far) for what in ('has_rates', 'has_pose'))
+    # Within the rounding of the equations, the pose is valid and its rates are not.
+    assert 0.0 < end - begin < 2e-13
+    for part in np.linspace(begin, end, 7)[1:-1].tolist():
+        assert closure.close_unlimited(*(far * part)).status is Status.TOGGLE
+    gaps = []
+    for power in range(-12, -2):
+        apart = 10.0**power
+        inside = closure.close_unlimited(*(far * (end - apart)))
+        outside = closure.close_unlimited(*(far * (end + apart)))
+        assert inside.status is Status.CLOSED, power
+        assert closure.residual(inside) < 1e-14
+        assert outside.status is Status.OPEN, power
+        gaps.append(outside.gap / apart)
+    # The gap grows with the distance.
+    assert gaps == pytest.approx([gaps[-1]] * len(gaps), rel=0.2)
+
+
+def test_a_knot_is_named_and_its_equations_counted():
+    groups = [group for group in closure_of('ankle_motors').groups if group.kind == 'knot']
+    assert [(group.links, group.assembly) for group in groups] == [
+        (('cross', 'foot'), 'as in the pose')
+    ]
+    assert '2 equations for pitch, roll' in groups[0].method
+
+
+def test_a_knot_follows_closed_steps_and_others_follow_it():
+    """Two legs: each knot depends on its own motors."""
+    closure = closure_of('two_ankles')
+    kinds = [group.kind for group in closure.groups]
+    assert kinds.count('knot') == 2
+    knots = [step for step in closure.steps if hasattr(type(step), 'grid')]
+    assert [step.inputs for step in knots] == [(0, 1), (2, 3)]
+    one = closure_of('ankle_motors')
+    found = closure.position(0.1, -0.2, 0.3, 0.1)
+    assert found.joints[:2] == pytest.approx(one.position(0.1, -0.2).joints, abs=1e-15)
+    assert found.joints[2:] == pytest.approx(one.position(0.3, 0.1).joints, abs=1e-13)
+    assert remainder(found.joints[0], tau) == found.joints[0]
+    assert dist(found.points['c1'], found.points['left_c1']) > 0.1
+
+
+@pytest.mark.parametrize(
+    ('name', 'unknown'), [('three_arms', ('b1', 'c1')), ('three_elbows', ('a1', 'c1'))]
+)
+def test_a_knot_closed_by_hinges_with_known_joints_within(name, unknown):
+    closure = closure_of(name)
+    (knot,) = (group for group in closure.groups if group.kind == 'knot')
+    assert '4 equations' in knot.method
+    assert all(joint in knot.method for joint in unknown)
+    other = closure_of('three_arms' if name == 'three_elbows' else 'three_elbows')
+    for inputs in random_inputs(closure, 20, 0.1):
+        position = closure.position(*inputs)
+        assert position.status is Status.CLOSED
+        back = other.close_unlimited(*(position[joint] for joint in other.input_names))
+        for joint, value in zip(closure.input_names, inputs, strict=True):
+            assert back[joint] == pytest.approx(value, abs=1e-13)
