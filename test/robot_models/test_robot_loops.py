@@ -198,6 +198,18 @@ def test_dialects_of_one_robot_have_the_same_states(tmp_path, dialect, kind):
         assert closure.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
 
 
+def test_motors_move_the_ankle_that_moves_them():
+    given = {'input': ['m1', 'm2']}
+    closure, motors = (
+        load(ROBOTS / 'ankle.urdf', CHOICES['ankle'][0]),
+        load(ROBOTS / 'ankle.urdf', given),
+    )
+    for inputs in near_pose(closure, 0.25, 10):
+        found = dict(zip(closure.joint_names, closure.position(*inputs).joints, strict=True))
+        joints = motors.position(found['m1'], found['m2']).joints
+        assert joints[:2] == pytest.approx(inputs, abs=1e-14)
+
+
 def test_rods_may_be_links_without_a_joint(tmp_path):
     """A <constraint type="link"> is a rod between two balls (urdfdom#264)."""
     text = OPEN.sub('', (ROBOTS / 'ankle.urdf').read_text())
@@ -289,7 +301,7 @@ def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
     assert 1e-5 < max(map(abs, pose.values())) < 1e-2
 
 
-@pytest.mark.parametrize('name', spatial_linkage_names())
+@pytest.mark.parametrize('name', sorted({*spatial_linkage_names()} - {'hexapod'}))
 def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
     file = tmp_path / f'{name}.urdf'
     file.write_bytes(model_of(name, urdf_model))
@@ -306,6 +318,11 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
             assert joints == pytest.approx(one.joints, abs=1e-12)
             count += 1
     assert count > 10
+
+
+def test_a_length_that_is_a_joint_has_no_urdf():
+    with pytest.raises(LinkageError, match='struts.leg1: is a length, for which a URDF has no'):
+        model_of('hexapod', urdf_model)
 
 
 SCENE = 'linkage: {urdf: robots/ankle.urdf, input: [pitch, roll]}\nrate: 200\n'
