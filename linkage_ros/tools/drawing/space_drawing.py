@@ -275,13 +275,15 @@ class SpaceDrawing:
 
     def _hinge_parts(self, centres: dict[str, list[Places]]) -> Iterator[Part]:
         together = Counter(hinge.at for hinge in self.linkage.hinges.values())
+        balls: set[tuple[float, float, float]] = set()
         for name, hinge in self.linkage.hinges.items():
             joins = (hinge.parent, hinge.child)
             if not self._radius and together[hinge.at] > 2:
                 # Three hinges through one point are a ball.
-                yield Part(
-                    'ball', name, (self._carry(hinge.child, centres[name][0]),), joins=joins
-                )
+                if hinge.at not in balls:
+                    (centre,) = centres[name]
+                    yield Part('ball', name, (self._carry(hinge.child, centre),), joins=joins)
+                balls.add(hinge.at)
                 continue
             link = hinge.child if hinge.parent == GROUND else hinge.parent
             way = self.size * _unit(hinge)
