@@ -56,7 +56,8 @@ def test_every_point_has_its_dot_where_it_is_and_joints_are_where_links_meet(nam
     position = closure.position(*inputs)
     points = closure.points(position)
     dots = {each.name: each.centre for each in shapes if isinstance(each, Circle)}
-    assert dots.keys() == points.keys()
+    # Three hinges through one point are a ball.
+    assert dots.keys() - closure.linkage.hinges.keys() == points.keys()
     for point, place in points.items():
         (seen,), _ = Camera(0.4, 0.5).project(np.array([place]))
         assert dots[point] == pytest.approx(seen, abs=1e-12)

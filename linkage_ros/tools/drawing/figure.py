@@ -93,7 +93,7 @@ def paint_picture(
             f'{title}, {pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
             f'{_beyond_text(shown)}'
         )
-        heading = picture_text(heading, 120)
+        heading = fill(picture_text(heading, 160), max(40, round(12.0 * wide)))
         if drawn.camera:
             azimuth, elevation = map(degrees, drawn.camera)
             heading += f'\nfrom azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'

@@ -20,6 +20,7 @@ in which it stands, and the z axis of the ground points up in the picture.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 from math import dist, radians
@@ -137,8 +138,12 @@ class SpaceDrawing:
         places = np.array([*self.linkage.points.values(), *hinges] or [(0.0, 0.0, 0.0)])
         extent = float(np.linalg.norm(np.ptp(places, axis=0)))
         self.has_lengths, self.extent = extent > 0.0, extent or 2.0
+        ends = {
+            end for hinge in self.linkage.hinges.values() for end in (hinge.parent, hinge.child)
+        }
+        on_axes = ends.issuperset(self.linkage.link_names) and not self.linkage.struts
         one_place = len(hinges) > 2 and np.ptp(hinges, axis=0).max() <= _SAME * self.extent
-        self._radius = 0.5 * self.extent if one_place else 0.0
+        self._radius = 0.5 * self.extent if one_place and on_axes else 0.0
         self._add_places(GROUND, np.zeros(3))  # one place there is, if there are only slides
         # What links carry comes first: it determines the size of symbols.
         for link, names in self.linkage.links.items():
@@ -269,8 +274,17 @@ class SpaceDrawing:
         return found
 
     def _hinge_parts(self, centres: dict[str, list[Places]]) -> Iterator[Part]:
+        together = Counter(hinge.at for hinge in self.linkage.hinges.values())
+        balls: set[tuple[float, float, float]] = set()
         for name, hinge in self.linkage.hinges.items():
             joins = (hinge.parent, hinge.child)
+            if not self._radius and together[hinge.at] > 2:
+                # Three hinges through one point are a ball.
+                if hinge.at not in balls:
+                    (centre,) = centres[name]
+                    yield Part('ball', name, (self._carry(hinge.child, centre),), joins=joins)
+                balls.add(hinge.at)
+                continue
             link = hinge.child if hinge.parent == GROUND else hinge.parent
             way = self.size * _unit(hinge)
             first, *_, last = [centres[name][0], *centres[name]]
