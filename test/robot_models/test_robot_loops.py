@@ -140,7 +140,7 @@ def test_states_are_those_of_newtons_method_on_the_urdf(name):
     walk = Walk((ROBOTS / f'{name}.urdf').read_text(), loops)
     names = [*closure.linkage.driven, *closure.joint_names]
     pose = {k: closure.linkage.pose_value(k) for k in names}
-    for inputs in near_pose(closure, reach, 3):
+    for inputs in near_pose(closure, reach, 2):
         given = dict(zip(closure.linkage.driven, inputs.tolist(), strict=True))
         expected = walk.go(pose, given)
         position = closure.position(*given.values())
@@ -193,7 +193,7 @@ def test_dialects_of_one_robot_have_the_same_states(tmp_path, dialect, kind):
         axis = AXES.get(dialect, '<axis xyz="0 0 1"/>') if kind == 'revolute' else ''
         tag = TAGS[dialect].replace('{t}', kind).replace('{x}', axis)
         closure = read(tmp_path, text.replace('</robot>', ends(tag, *pairs) + '</robot>'), **told)
-    for inputs in near_pose(expected, reach, 30):
+    for inputs in near_pose(expected, reach, 20):
         joints = expected.position(*inputs).joints
         assert closure.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
 
@@ -309,7 +309,7 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
     assert robot.linkage.driven == linkage.linkage.driven
     assert {k: robot.linkage.limits[k] for k in linkage.linkage.limits} == linkage.linkage.limits
     count = 0
-    for inputs in near_pose(linkage, 0.1, 30):
+    for inputs in near_pose(linkage, 0.1, 15):
         one, other = linkage.position(*inputs), robot.position(*inputs)
         assert one.status == other.status
         if one.status.has_pose:
@@ -317,11 +317,11 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
             joints = [found[joint] for joint in linkage.joint_names]
             assert joints == pytest.approx(one.joints, abs=1e-12)
             count += 1
-    assert count > 10
+    assert count > 5
 
 
 def test_a_length_that_is_a_joint_has_no_urdf():
-    with pytest.raises(LinkageError, match='struts.leg1: is a length, for which a URDF has no'):
+    with pytest.raises(LinkageError, match=r'struts\.leg1: is a length, for which a URDF has no'):
         model_of('hexapod', urdf_model)
 
 
