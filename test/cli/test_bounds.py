@@ -207,8 +207,8 @@ def test_an_index_that_names_a_chunk_again_and_again_is_damaged(tmp_path: Path) 
 
 
 SCENES = {
-    'a flow list': (f'effects: [{"1," * 490_000}]\n', 'it holds more than 200,000 values'),
     'brackets': ('effects: ' + '[' * 10_000, 'is nested too deeply'),
+    'a flow list': (f'effects: [{"1," * 490_000}]\n', 'it holds more than 200,000 values'),
     'aliases': (f'effects: {BOMB}\n', 'aliases are not read'),
     'a long key': (f'{"x" * 900_000}: 1\n', 'has a key without a colon; write key: value'),
 }

@@ -43,8 +43,8 @@ def random_inputs(closure, count, reach):
 @pytest.mark.parametrize('name', BOTH_WAYS)
 def test_there_and_back_is_the_identity(name):
     there, back = closure_of(name), closure_of(BOTH_WAYS[name])
-    met = 0
-    for inputs in random_inputs(there, 50, 0.3):
+    met, count = 0, sample_count(200, 20)
+    for inputs in random_inputs(there, count, 0.3):
         position = there.position(*inputs)
         if position.status is not Status.CLOSED:
             continue
@@ -54,7 +54,7 @@ def test_there_and_back_is_the_identity(name):
         assert found.joints == pytest.approx(inputs, abs=1e-14)
         product = back.jacobian(found) @ there.jacobian(position)
         assert product == pytest.approx(np.eye(len(inputs)), abs=1e-11)
-    assert met > 25
+    assert met > 0.5 * count
 
 
 def test_the_order_of_visits_does_not_matter():
@@ -106,7 +106,7 @@ def test_a_state_is_where_a_walk_from_the_pose_ends():
     """The motors are closed forms of the joints; the walk inverts these by Newton's method."""
     motors = Compiled(closure_of('ankle'), 1, within_limits=False)
     joints = closure_of('ankle_motors')
-    for inputs in random_inputs(joints, sample_count(10_000, 10), 0.6):
+    for inputs in random_inputs(joints, sample_count(10_000, 4), 0.6):
         now, steps = np.zeros(2), 4000
         for step in range(1, steps + 1):
             wanted = np.array(inputs) * (step / steps)

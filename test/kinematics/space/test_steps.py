@@ -29,7 +29,8 @@ from ...support.sampling import sample_count
 @pytest.mark.parametrize('family', FAMILIES)
 def test_what_is_closed_is_as_exact_as_its_numbers(family):
     random, draw = Random(family), FAMILIES[family]
-    for _ in range(sample_count(300 // SLOWER.get(family, 1), 20 // SLOWER.get(family, 1))):
+    slower = SLOWER.get(family, 1)
+    for _ in range(sample_count(300 // slower, max(6 // slower, 1))):
         case = draw(random)
         for order, error in zip(ORDERS, case.errors, strict=True):
             assert error <= LIMIT, (order, case.given)
