@@ -41,7 +41,6 @@ import pytest
 
 from .kinematics.compiling.emitted import COMPILERS, needs
 from .support.commands import linkage as run
-from .support.sampling import sample_count
 
 HOSTILE = [
     # C, JavaScript, Python: ends of comments and strings, trigraphs, line continuations.
@@ -230,7 +229,7 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
 ) -> None:
     monkeypatch.setitem(painting._SETTINGS, 'svg.fonttype', 'none')
     file = tmp_path / 'a.svg'
-    for closure in linkages(sample_count(12, 4)):
+    for closure in linkages(12):
         joints = list(closure.linkage.joints)
         pose = usual_inputs(closure)
         paint_picture(prepare_view(closure, pose), closure.name, file, names=True)

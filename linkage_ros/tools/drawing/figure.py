@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import ceil, degrees, sqrt
 from pathlib import Path
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any
 
 from linkage_ros.kinematics import (
@@ -89,11 +89,11 @@ def paint_picture(
         grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
         left = figure.add_subplot(grid[0])
         panels = joint_axes(grid[1], joints)
-        heading = (
-            f'{title}, {pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}'
-            f'{_beyond_text(shown)}'
-        )
-        heading = fill(picture_text(heading, 160), max(40, round(12.0 * wide)))
+        pose = f'{pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}{_beyond_text(shown)}'
+        heading, width = picture_text(f'{title}, {pose}', 120), max(40, round(12.0 * wide))
+        if len(heading) > width:
+            broken = wrap(pose, width, break_long_words=False, break_on_hyphens=False)
+            heading = '\n'.join(picture_text(line, 120) for line in (title, *broken))
         if drawn.camera:
             azimuth, elevation = map(degrees, drawn.camera)
             heading += f'\nfrom azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'
