@@ -92,7 +92,9 @@ def paint_picture(
         pose = f'{pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}{_beyond_text(shown)}'
         heading, width = picture_text(f'{title}, {pose}', 120), max(40, round(12.0 * wide))
         if len(heading) > width:
-            broken = wrap(pose, width, break_long_words=False, break_on_hyphens=False)
+            # Between inputs only: a space that does not break is no space for `wrap`.
+            whole = pose.replace(' ', '\u00a0').replace(',\u00a0', ', ')
+            broken = wrap(whole, width, break_long_words=False, break_on_hyphens=False)
             heading = '\n'.join(picture_text(line, 120) for line in (title, *broken))
         if drawn.camera:
             azimuth, elevation = map(degrees, drawn.camera)
