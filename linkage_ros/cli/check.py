@@ -39,6 +39,7 @@ from linkage_ros.kinematics import (
     conditioning_curves,
     Driven,
     Dyad,
+    find_worst_states,
     four_bars,
     Group,
     InputSweep,
@@ -54,7 +55,6 @@ from linkage_ros.kinematics import (
     SweptCurve,
     transmission_angles,
     usual_inputs,
-    worst_residual,
 )
 from linkage_ros.resources import named_file
 
@@ -132,7 +132,7 @@ def describe_linkage(
     account |= tables_json(tables[1:])
     # Most of the time goes by here.
     parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
-        *(_examine_reach, _examine_residual, _other_assemblies),
+        *(_examine_reach, _examine_states, _other_assemblies),
         *(_transmission_table, _conditioning_table),
     )
     for index, part in enumerate(parts):
@@ -239,13 +239,24 @@ def _is_reached(sweep: InputSweep, value: float) -> bool:
     return not sweep.closure.bounds or any(sweep.range_about(value + turn) for turn in turns)
 
 
-def _examine_residual(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
-    """Return the worst residual; None if the loops close nowhere on a grid."""
-    found = worst_residual(closure)
-    if found is None:
-        return {'worst_residual': None}
-    residual, inputs, count = found
-    return {'worst_residual': {'residual_m': residual, 'inputs': list(inputs), 'positions': count}}
+def _examine_states(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+    """Return the worst residual, and of several inputs the nearest singularity; None if open."""
+    worst = find_worst_states(closure)
+    if worst is None:
+        return {'worst_residual': None, 'nearest_singularity': None}
+    return {
+        'worst_residual': {
+            'residual_m': worst.residual,
+            'inputs': list(worst.inputs),
+            'positions': worst.positions,
+        },
+        'nearest_singularity': worst.margin
+        and {
+            'conditioning': worst.margin.conditioning,
+            'group': worst.margin.group + 1,
+            'inputs': list(worst.nearest),
+        },
+    }
 
 
 def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
@@ -343,7 +354,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
         'limits': _limits_json(linkage),
         **_examine_reach(closure, sweep),
-        **_examine_residual(closure, sweep),
+        **_examine_states(closure, sweep),
         'robot_open_by_m': linkage.open_by,
         'left_out': list(linkage.left_out),
         'groups': [group._asdict() for group in closure.groups],
@@ -540,14 +551,20 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     if worst is None:
         yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
         return
-    place = ', '.join(
-        units.value_text(value, given['unit'] == 'rad')
-        for value, given in zip(worst['inputs'], account['inputs'], strict=True)
-    )
+
+    def place_text(inputs: Sequence[float]) -> str:
+        return ', '.join(
+            units.value_text(value, given['unit'] == 'rad')
+            for value, given in zip(inputs, account['inputs'], strict=True)
+        )
+
+    if (nearest := account['nearest_singularity']) and nearest['group']:
+        where = f'of group {nearest["group"]}, at {place_text(nearest["inputs"])}'
+        yield 'nearest singularity', f'conditioning {nearest["conditioning"]:.2g} {where}'
     residual = units.format_length(worst['residual_m'], '.1e')
     yield (
         'worst residual',
-        f'{residual}, of {worst["positions"]} positions, at {place}',
+        f'{residual}, of {worst["positions"]} positions, at {place_text(worst["inputs"])}',
     )
 
 

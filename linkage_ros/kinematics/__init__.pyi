@@ -185,6 +185,7 @@ from linkage_ros.kinematics.sweep_analysis import (
     check_turns as check_turns,
     conditioning_curves as conditioning_curves,
     find_extremes as find_extremes,
+    find_worst_states as find_worst_states,
     grid_positions as grid_positions,
     InputSweep as InputSweep,
     pose_alone as pose_alone,
@@ -192,7 +193,6 @@ from linkage_ros.kinematics.sweep_analysis import (
     SweptCurve as SweptCurve,
     transmission_angles as transmission_angles,
     usual_inputs as usual_inputs,
-    worst_residual as worst_residual,
 )
 from linkage_ros.kinematics.topology import (
     assur_groups as assur_groups,

@@ -10,7 +10,8 @@
 
 from cmath import rect
 from dataclasses import replace
-from math import acos, cos, degrees, hypot, inf, pi, radians, remainder, sin, sqrt, tau
+from itertools import product
+from math import acos, asin, cos, degrees, hypot, inf, pi, radians, remainder, sin, sqrt, tau
 from pathlib import Path
 import random
 
@@ -20,6 +21,7 @@ from linkage_ros.kinematics import (
     Closure,
     describe_ranges,
     find_extremes,
+    find_worst_states,
     four_bar_type,
     four_bars,
     grid_positions,
@@ -33,7 +35,6 @@ from linkage_ros.kinematics import (
     Status,
     transmission_angles,
     usual_inputs,
-    worst_residual,
 )
 from mpmath import mp, mpf
 import pytest
@@ -347,12 +348,30 @@ def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file):
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file):
     closure = shipped(file.stem)
-    found = worst_residual(closure)
-    assert found is not None
-    worst, at, count = found
-    assert worst < 1e-14 * closure.scale
-    assert closure.residual(closure.position(*at)) == worst
-    assert count > 400
+    worst = find_worst_states(closure)
+    assert worst is not None
+    assert worst.residual < 1e-14 * closure.scale
+    assert closure.residual(closure.position(*worst.inputs)) == worst.residual
+    assert worst.positions > 400
+
+
+def test_the_nearest_singularity_of_several_inputs_is_where_the_forearms_are_straightest():
+    closure = shipped('five_bar')
+    worst = find_worst_states(closure)
+    assert worst is not None
+    assert worst.margin is not None
+
+    def angle(inputs):
+        """Return the angle between the forearms, folded into [0, π/2]: of their lengths."""
+        points = closure.points(closure.position(*inputs))
+        left = points['left_forearm', 'P'] - points['left_forearm', 'A']
+        right = points['right_forearm', 'P'] - points['right_forearm', 'B']
+        return abs(asin((left.conjugate() * right).imag / (abs(left) * abs(right))))
+
+    assert worst.margin.conditioning == pytest.approx(sqrt(2.0) * sin(angle(worst.nearest) / 2.0))
+    for inputs in product([radians(each) for each in (60, 75, 90, 105, 120)], repeat=2):
+        if closure.position(*inputs).joints:
+            assert angle(inputs) >= angle(worst.nearest) - 1e-12
 
 
 # A pose, and the start of a linkage with it; for a crank-rocker, and one that folds.
