@@ -283,7 +283,7 @@ class Grid:
 
     def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
         """
-        Follow the straight line from the last cell to inputs, in proven steps; or from the pose.
+        Follow the straight line from the last cell to inputs, in proven steps.
 
         Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
         them.
@@ -291,19 +291,15 @@ class Grid:
         width = self.widths[-1]
         key = tuple(round((x - at) / width) for x, at in zip(inputs, self.home, strict=True))
         with BUILD_LOCK:
-            begins = self._follow(_LEVELS - 1, key).last, self._start
-            ends = (self._follow_line(begin, inputs) for begin in begins)
-            return min(ends, key=lambda end: end[1])
-
-    def _follow_line(self, begin: GridCell, inputs: Sequence[float]) -> tuple[GridCell, float]:
-        cell, done, step = begin, 0.0, 1.0
-        while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
-            part = min(1.0, done + step)
-            found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
-            if found is None:
-                step *= 0.5
-            else:
-                cell, done, step = found, part, 2.0 * step
+            begin = cell = self._follow(_LEVELS - 1, key).last
+            done, step = 0.0, 1.0
+            while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
+                part = min(1.0, done + step)
+                found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
+                if found is None:
+                    step *= 0.5
+                else:
+                    cell, done, step = found, part, 2.0 * step
         return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
 
     def _follow(self, level: int, key: Key) -> _Found:
