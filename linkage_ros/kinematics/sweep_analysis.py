@@ -47,8 +47,8 @@ _SAMPLES = 720
 _GRID, _MOST_ON_GRID = 24, 14_000
 """Values of each input on a grid, and states on it at most."""
 
-_FEW, _MOST_OF_MANY = 3, 60
-"""Inputs that the states on a grid are meant for; and how many states there are of more."""
+_FEW, _MOST_OF_MANY, _MOST_ITERATED = 3, 60, 1000
+"""Inputs that so many states are meant for; how many of more inputs, and of iterated links."""
 
 _SAME = 1e-9
 """Largest difference of values that count as equal, in [rad] or relative to a length."""
@@ -299,7 +299,8 @@ def grid_positions(
 ) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
     ways, inputs_count = [], len(closure.linkage.inputs)
-    most = _MOST_ON_GRID if inputs_count <= _FEW else _MOST_OF_MANY
+    most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
+    most = most if inputs_count <= _FEW else _MOST_OF_MANY
     count = min(count, max(1, int(most ** (1.0 / inputs_count))))
     for number, given in enumerate(closure.linkage.inputs):
         low, high = given.limits.low, given.limits.high

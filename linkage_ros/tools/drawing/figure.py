@@ -92,10 +92,11 @@ def paint_picture(
         pose = f'{pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}{_beyond_text(shown)}'
         heading, width = picture_text(f'{title}, {pose}', 120), max(40, round(12.0 * wide))
         if len(heading) > width:
-            # Between inputs only: a space that does not break is no space for `wrap`.
+            # A character that breaks no line stands for the spaces that are not between inputs.
             whole = pose.replace(' ', '\u00a0').replace(',\u00a0', ', ')
             broken = wrap(whole, width, break_long_words=False, break_on_hyphens=False)
-            heading = '\n'.join(picture_text(line, 120) for line in (title, *broken))
+            lines_of_heading = (title, *(line.replace('\u00a0', ' ') for line in broken))
+            heading = '\n'.join(picture_text(line, 120) for line in lines_of_heading)
         if drawn.camera:
             azimuth, elevation = map(degrees, drawn.camera)
             heading += f'\nfrom azimuth {azimuth:.4g}°, elevation {elevation:.4g}°'
