@@ -14,7 +14,7 @@ import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
-from math import ceil, tau
+from math import tau
 import sys
 from threading import Event
 from typing import Any, NamedTuple
@@ -27,6 +27,7 @@ from linkage_ros.cli.arguments import (
     finite_or_none,
     robot_of,
 )
+from linkage_ros.cli.linkage_facts import linkage_facts
 from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, facts_table, Quantity, Table, UNIT
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
@@ -50,7 +51,6 @@ from linkage_ros.kinematics import (
     sides_at,
     SpaceClosure,
     SpaceLinkage,
-    Status,
     StepwiseClosure,
     SweptCurve,
     transmission_angles,
@@ -58,18 +58,8 @@ from linkage_ros.kinematics import (
 )
 from linkage_ros.resources import named_file
 
-_SINGULAR = {
-    Status.TOGGLE: 'toggles',
-    Status.CHANGE_POINT: 'change points',
-    Status.INDETERMINATE: 'without a pose',
-}
-"""Names of singular inputs, by kind."""
-
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
-
-_SAME = 1e-9
-"""Largest difference of inputs that is rounding, in [rad] or [m]."""
 
 EXAMPLE = 'linkage check jansen_leg'
 
@@ -399,8 +389,7 @@ def _linkage_tables(
     account: Mapping[str, Any], tables: Sequence[Table], units: DisplayUnits
 ) -> Iterator[Table]:
     """Yield the tables that describe a linkage."""
-    facts = _linkage_facts if 'loops' in account else _spatial_facts
-    yield facts_table(account['file'], facts(account, units))
+    yield facts_table(account['file'], linkage_facts(account, units))
     yield tables[0]
     input_units = [given['unit'] for given in account['inputs']]
     for group in account.get('other_assemblies', ()):
@@ -497,151 +486,6 @@ def _branches_table(closure: Closure) -> Table:
     )
     title = 'Branches: between their ends a joint moves one way'
     return Table(title, columns, [*_list_branches(closure)], 'branches')
-
-
-def _linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
-    blocks, inputs = account['slot_blocks'], account['inputs']
-    beside = f' and {blocks} block(s) in slots' if blocks else ''
-    yield 'moving links', f'{account["moving_links"]}{beside}'
-    twice = ' (one of three links counts twice)' if account['shared_pins'] else ''
-    yield 'joints', f'{account["pins"]} pins{twice}, {account["sliders"]} sliders'
-    yield 'loops', str(account['loops'])
-    yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
-    for given in inputs:
-        driven = (
-            f'slide of {given["slider"]} [{units.length}]'
-            if given['slider']
-            else f'angle of {given["child"]} to {given["parent"]}'
-        )
-        yield 'input', f'{given["joint"]}: {driven}'
-    yield from _reach_facts(account, units)
-
-
-def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
-    yield 'moving links', str(account['moving_links'])
-    kinds = ('hinges', 'slides', 'balls', 'struts')
-    counts = [(account[kind], kind) for kind in kinds if account[kind]]
-    yield 'joints', ', '.join(f'{n} {kind[:-1] if n == 1 else kind}' for n, kind in counts)
-    yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
-    if account['spinning_rods']:
-        yield 'rods that may spin', ', '.join(account['spinning_rods'])
-    for given in account['inputs']:
-        turns = given['unit'] == 'rad'
-        unit = 'angle' if turns else f'length [{units.length}]'
-        yield 'input', f'{given["joint"]}: {unit}'
-    if account['redundant_equations']:
-        met = 'equations, met within the worst residual'
-        yield 'redundant', f'{account["redundant_equations"]} {met}'
-    if account['robot_open_by_m'] is not None:
-        yield (
-            'loops open by',
-            f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose',
-        )
-    if account['left_out']:
-        yield 'left out, in no loop', ', '.join(account['left_out'])
-    yield from _reach_facts(account, units)
-
-
-def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
-    """Yield the limits, the range, its singular places and the worst residual."""
-    for limits in account['limits']:
-        yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
-    yield from _range_facts(account, units)
-    worst = account['worst_residual']
-    if worst is None:
-        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
-        return
-
-    def place_text(inputs: Sequence[float]) -> str:
-        return ', '.join(
-            units.value_text(value, given['unit'] == 'rad')
-            for value, given in zip(inputs, account['inputs'], strict=True)
-        )
-
-    if (nearest := account['nearest_singularity']) and nearest['group']:
-        where = f'of group {nearest["group"]}, at {place_text(nearest["inputs"])}'
-        yield 'nearest singularity', f'conditioning {nearest["conditioning"]:.2g} {where}'
-    residual = units.format_length(worst['residual_m'], '.1e')
-    yield (
-        'worst residual',
-        f'{residual}, of {worst["positions"]} positions, at {place_text(worst["inputs"])}',
-    )
-
-
-def _range_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
-    if account['ranges'] is None:
-        yield 'range', 'not a single one: it depends on every input'
-        if account['unwrapped']:
-            yield 'turns', 'they count: send unwrapped angles, a turn leads to another assembly'
-        return
-    turning = account['inputs'][0]['unit'] == 'rad'
-    for interval in account['ranges']:
-        turns = round((interval['high'] - interval['low']) / tau)
-        if not interval['whole']:
-            each = '; each turn has different poses' if turning and not interval['turns'] else ''
-            followed = any(interval['limited']) or not each
-            ends = '' if followed else ', and was not followed farther'
-            yield 'range', f'{_range_text(interval, turning, units)}{each}{ends}'
-        elif turns > 1:
-            count = 'two' if turns == 2 else str(turns)
-            yield 'range', f'every angle; the motion repeats after {count} turns'
-        else:
-            yield 'range', 'every angle'
-    for status, name in _SINGULAR.items():
-        found = sorted(
-            (not one['within_limits'], _brought_within(one['input'], account['ranges'], turning))
-            for one in account['singular_inputs']
-            if one['status'] == status.value
-        )
-        places = [
-            units.value_text(value, turning) + (' beyond the limits' if beyond else '')
-            for beyond, value in found
-        ]
-        if places or status is not Status.INDETERMINATE:
-            yield name, ', '.join(places) or 'none'
-
-
-def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: bool) -> float:
-    """Return an input, an angle in the turn in which it lies within a range, if it does."""
-    for interval in ranges if turning else ():
-        turn = tau * ceil((interval['low'] - value) / tau - _SAME)
-        if value + turn <= interval['high'] + _SAME:
-            return float(value + turn)
-    return 0.0 if abs(value) < _SAME else value
-
-
-def _limits_text(limits: Mapping[str, Any], units: DisplayUnits) -> str:
-    turning = limits['unit'] == 'rad'
-    texts = []
-    low, high = (
-        '' if limits[end] is None else units.value_text(limits[end], turning)
-        for end in ('low', 'high')
-    )
-    if low or high:
-        texts.append(
-            f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
-        )
-    if limits['velocity'] is not None:
-        rate = f'{limits["unit"]}/s'
-        velocity = units.convert(limits['velocity'], rate)
-        texts.append(f'at most {velocity:.6g} {units.name_unit(rate)}')
-    if limits['effort'] is not None:
-        texts.append(f'at most {limits["effort"]:.6g} {"N·m" if turning else "N"}')
-    return ', '.join(texts)
-
-
-def _range_text(interval: Mapping[str, Any], turning: bool, units: DisplayUnits) -> str:
-    """Return a range; if limits end it, with their names."""
-    low, high = (units.value_text(interval[end], turning) for end in ('low', 'high'))
-    if interval['limited_by'] == [None, None]:
-        return f'{low} to {high}'
-    ends = [
-        f'{end}, {f"limit of {by}" if by else "toggle"}'
-        for end, by in zip((low, high), interval['limited_by'], strict=True)
-    ]
-    if all(interval['limited']):
-        return f'{ends[0]}, to {ends[1]}'
-    return f'{ends[0]}, and on' if interval['limited'][0] else f'up to {ends[1]}'
 
 
 def _assemblies_table(
