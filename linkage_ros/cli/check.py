@@ -58,6 +58,9 @@ from linkage_ros.kinematics import (
 )
 from linkage_ros.resources import named_file
 
+_STARTS = 64
+"""Starts from which other assemblies of a spatial linkage are sought."""
+
 _PLACES = 4
 """Maximum number of places shown for one extreme value."""
 
@@ -330,6 +333,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
     tables = [
         Table('Solved in this order', _ORDER, rows, 'groups'),
         _transmission_table(closure, sweep),
+        _other_poses_table(closure),
     ]
     return {
         'moving_links': len(linkage.link_names) - 1,
@@ -392,7 +396,7 @@ def _linkage_tables(
     yield facts_table(account['file'], linkage_facts(account, units))
     yield tables[0]
     input_units = [given['unit'] for given in account['inputs']]
-    for group in account.get('other_assemblies', ()):
+    for group in account['other_assemblies'] if 'loops' in account else ():
         yield _assemblies_table(group, input_units, units)
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 
@@ -510,6 +514,25 @@ def _assemblies_table(
         rows or [('none',)],
         'other_assemblies' if rows else '',
     )
+
+
+def _other_poses_table(closure: SpaceClosure) -> Table:
+    """Return the other assemblies of what closes only together, at the inputs of the pose."""
+    rows = [
+        (number + 1, joints)
+        for number, found in closure.other_assemblies(_STARTS).items()
+        for joints in found
+    ]
+
+    def joints_text(joints: Mapping[str, float], units: DisplayUnits) -> str:
+        hinges = closure.linkage.hinges
+        return ', '.join(
+            f'{name} {units.value_text(value, name in hinges)}' for name, value in joints.items()
+        )
+
+    title = f'Other assemblies at the inputs of the pose, from {_STARTS} starts each'
+    return Table(title, (_GROUP, Column('joints', 'joints', form=joints_text)), rows,
+                 'other_assemblies')  # fmt: skip
 
 
 def _points_text(points: Mapping[str, Sequence[float]], units: DisplayUnits) -> str:

@@ -212,6 +212,10 @@ class GridGroup:
             raise UndecidedError
         return [subtract(value, change) for value, change in zip(values, step, strict=True)]
 
+    def known_in_pose(self) -> LinkState:
+        """Return the state of the steps before, in the pose."""
+        return _require(self._before.known_at(self._before.inputs))
+
     def close_slowly(
         self, solved: LinkState, conditioning: Callable[[Sequence[float]], float]
     ) -> tuple[Status, Sequence[float]]:

@@ -251,6 +251,29 @@ class SpaceClosure(StepwiseClosure):
         """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
         return 4.0 * self.scale
 
+    def other_assemblies(self, starts: int) -> dict[int, list[dict[str, float]]]:
+        """
+        Return for each group of joints that close only together its other assemblies.
+
+        They are sought at the inputs of the pose, from random starts. Each has the values of these
+        joints, in [rad] or [m]: another assembly is another pose of the file.
+        """
+        found: dict[int, list[dict[str, float]]] = {}
+        for step, number in zip(self.steps, self.step_groups, strict=True):
+            solve = getattr(step, 'other_solutions', None)
+            if solve is None:
+                continue
+            names = step.unknown  # type: ignore[attr-defined]
+            units = [1.0 if name in self.linkage.hinges else self.scale for name in names]
+            found[number] = [
+                {
+                    name: value * unit
+                    for name, value, unit in zip(names, values, units, strict=True)
+                }
+                for values in solve(starts)
+            ]
+        return found
+
     def slide_reach(self, number: int) -> tuple[float, float]:
         """Return between which values an input that slides is worth a trial, in [m]."""
         at, some = self.linkage.pose.inputs[number], 0.125 * self.scale

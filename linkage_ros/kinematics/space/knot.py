@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import islice
+from math import dist, pi, remainder, tau
+from random import Random
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.grid import Grid, GridInput
@@ -27,6 +29,9 @@ from linkage_ros.kinematics.space.steps import missing_length
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.steps_before import StepsBefore
+
+_APART, _DIGITS = 1e-6, 12
+"""Smallest distance of the ends of rods in two solutions, in lengths; and their digits."""
 
 _MOVED = 2.0**-20
 """A gap that shrinks to less, relative to itself, is closed by another assembly."""
@@ -45,7 +50,7 @@ class Knot:
     """
     Links on a tree of joints, closed by as many rods as there are unknown joints.
 
-    ``start`` has the unknowns in the pose.
+    ``start`` has the unknowns in the pose, ``unknown`` the names of these joints.
     """
 
     def __init__(
@@ -54,8 +59,10 @@ class Knot:
         before: StepsBefore,
         start: Sequence[float],
         given_inputs: Sequence[GridInput],
+        unknown: tuple[str, ...],
     ) -> None:
         self._equations, self._start = equations, tuple(start)
+        self.unknown = unknown
         self._group = GridGroup(equations, before, start, given_inputs)
 
     @property
@@ -104,6 +111,33 @@ class Knot:
         changed = self._equations.add_changes(solved, velocities, changes, rates, found)
         changes.coordinates.extend(found)
         changes.pins.extend(islice(changed.pins, self._equations.first, None))
+
+    def other_solutions(self, count: int) -> list[list[float]]:
+        """Return other solutions at the inputs of the pose, that random starts lead to."""
+        random, turns = Random(count), self._equations.turns
+        known, found = self._group.known_in_pose(), [[*self._start]]
+        places = [self._equations.rod_ends(known, self._start)]
+        for _ in range(count):
+            begin = [
+                random.uniform(-pi, pi) if turned else value + random.uniform(-1.0, 1.0)
+                for value, turned in zip(self._start, turns, strict=True)
+            ]
+            solution = self._group.solve_from(self.grid.home, begin)
+            if solution is None:
+                continue
+            ends = self._equations.rod_ends(known, solution)
+            # A ball has two triples of angles for each place of its link.
+            if all(max(map(dist, ends, others)) > _APART for others in places):
+                places.append(ends)
+                values = zip(solution, turns, strict=True)
+                # Without the digits that differ from machine to machine.
+                found.append(
+                    [
+                        round(remainder(value, tau) if turned else value, _DIGITS) + 0.0
+                        for value, turned in values
+                    ]
+                )
+        return sorted(found[1:])
 
     def conditioning(self, pose: KnotPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""

@@ -90,6 +90,9 @@ class KnotEquations:
     def __init__(self, movers: Sequence[Mover], rods: Sequence[KnotRod], first: int) -> None:
         self._movers, self.rods, self.first = tuple(movers), tuple(rods), first
         self._chains = [self._moving_chains(rod) for rod in rods]
+        unknown = sorted((one for one in movers if one.unknown >= 0), key=lambda one: one.unknown)
+        self.turns = [not isinstance(one.joint, SlidePair) for one in unknown]
+        """For each unknown whether it is an angle."""
 
     def solve_rates(
         self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
@@ -177,6 +180,11 @@ class KnotEquations:
             )
             vector = minus(rod.end.locate(state), rod.start.locate(state))
             yield rod, vector, minus(other, one)
+
+    def rod_ends(self, known: LinkState, unknowns: Sequence[float]) -> list[Vector]:
+        """Return the ends of all rods, in the frame of the ground."""
+        state = self.place_links(known, unknowns)
+        return [end.locate(state) for rod in self.rods for end in (rod.start, rod.end)]
 
     def linearize(self, known: LinkState, unknowns: Sequence[float]) -> tuple[list[float], Solve]:
         """Return the residuals, and a function that solves with their derivatives."""

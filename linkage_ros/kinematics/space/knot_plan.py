@@ -107,7 +107,7 @@ def add_knot(plan: SpacePlan) -> bool:
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
     given = grid_inputs(plan.linkage.inputs, before.inputs, plan.scale)
-    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, given))
+    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, given, found.unknown))
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))
     what = f'{len(rods)} equations for {list_names(found.unknown)}'
     method = f"iterated: Newton's method, {what}: {by}"

@@ -7,6 +7,7 @@
 # language governing permissions and limitations under the License.
 """Links that close only together: they depend on the inputs alone, and are exact."""
 
+from itertools import product
 from math import dist, remainder, tau
 from pathlib import Path
 from random import Random
@@ -16,6 +17,8 @@ from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.compiling import Compiled
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
 
 from ...support.sampling import sample_count
 
@@ -170,6 +173,32 @@ def test_a_knot_is_named_and_its_equations_counted():
         (('cross', 'foot'), 'as in the pose')
     ]
     assert '2 equations for pitch, roll' in groups[0].method
+
+
+def test_the_other_assemblies_of_an_ankle_are_all_that_its_rods_allow():
+    """A library's method from a grid of starts, with turned points, finds no more."""
+    closure = closure_of('ankle_motors')
+    points = {name: np.array(place) for name, place in closure.linkage.points.items()}
+    at = np.array(closure.linkage.hinges['roll'].at)
+
+    def misses(joints):
+        pitch, roll = (Rotation.from_euler(axis, x) for axis, x in zip('yx', joints, strict=True))
+        return [
+            dist(pitch.apply(at + roll.apply(points[foot] - at)), points[bar])
+            - dist(points[foot], points[bar])
+            for bar, foot in (('b1', 'c1'), ('b2', 'c2'))
+        ]
+
+    ends = set()
+    for start in product(np.linspace(-3.0, 3.0, 9), repeat=2):
+        joints, _, status, _ = fsolve(misses, start, full_output=True)
+        if status == 1 and max(map(abs, misses(joints))) < 1e-12:
+            ends.add(tuple(round(remainder(x, tau), 6) + 0.0 for x in joints))
+    ((group, found),) = closure.other_assemblies(64).items()
+    assert closure.groups[group].kind == 'knot'
+    others = {tuple(round(x, 6) + 0.0 for x in joints.values()) for joints in found}
+    assert others | {(0.0, 0.0)} == ends
+    assert all(max(map(abs, misses([*joints.values()]))) < 1e-11 for joints in found)
 
 
 def test_a_knot_follows_closed_steps_and_others_follow_it():
