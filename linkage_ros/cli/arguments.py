@@ -63,15 +63,15 @@ def robot_of(arguments: argparse.Namespace) -> dict[str, Any]:
     return {key: value for key, value in told.items() if value}
 
 
-def read_joint_value(text: str) -> tuple[str, float]:
-    """Read JOINT=VALUE, in [rad] or [m]."""
-    joint, equal, value = text.rpartition('=')
+def read_joint_value(text: str, example: str = 'JOINT=0.5') -> tuple[str, float]:
+    """Read JOINT=VALUE, a finite number in the unit of the option."""
+    joint, _, value = text.rpartition('=')
     try:
         number = float(value)
     except ValueError:
         number = nan
-    if not (joint and equal and isfinite(number)):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a value; write JOINT=0.5')
+    if not (joint and isfinite(number)):
+        raise argparse.ArgumentTypeError(f'{text!r} is not a joint with a value; write {example}')
     return joint, number
 
 

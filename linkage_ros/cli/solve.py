@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite, nan
+from functools import partial
 import sys
 from threading import Event
 from typing import Any, NamedTuple
@@ -31,6 +31,7 @@ from linkage_ros.cli.arguments import (
     bounded_number,
     DisplayUnits,
     read_inputs,
+    read_joint_value,
     read_numbers,
     robot_of,
     wrap_angle,
@@ -70,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--joint',
         action='append',
-        type=_joint_value,
+        type=partial(read_joint_value, example='NAME=40'),
         default=[],
         metavar='NAME=VALUE',
         help='solve for every input at which a dependent joint, or a coordinate of a traced point '
@@ -234,18 +235,6 @@ def _unreached_error(
     ends = min(branch.low for branch in within), max(branch.high for branch in within)
     low, high = (angles.value_text(end, free[0].turning) for end in ends)
     return LinkageError(option, 'is not reached', f'{joint} goes from {low} to {high}')
-
-
-def _joint_value(text: str) -> tuple[str, float]:
-    """Read NAME=VALUE."""
-    name, _, value = text.rpartition('=')
-    try:
-        number = float(value)
-    except ValueError:
-        number = nan
-    if not name or not isfinite(number):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a joint with a value; write NAME=40')
-    return name, number
 
 
 def _show_reach(

@@ -22,12 +22,11 @@ from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
     check_pose,
+    GROUND_FRAME,
     SpaceClosure,
     SpaceLinkage,
     SpatialJoint,
 )
-
-_AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0)}
 
 
 def is_spatial(content: Section) -> bool:
@@ -112,11 +111,11 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
 
 def _hinges_of_ball(name: str, parent: str, child: str, at: Any) -> dict[str, SpatialJoint]:
     """Return the three hinges of a ball, with two links between them."""
-    hinges = [f'{name}_{axis}' for axis in _AXES]
+    hinges = [f'{name}_{axis}' for axis in 'xyz']
     ends = pairwise((parent, *hinges[:2], child))
     return {
         hinge: SpatialJoint(on, link, axis, at)
-        for hinge, (on, link), axis in zip(hinges, ends, _AXES.values(), strict=True)
+        for hinge, (on, link), axis in zip(hinges, ends, GROUND_FRAME[:3], strict=True)
     }
 
 

@@ -107,7 +107,7 @@ class _Found(NamedTuple):
 
     cell: GridCell | None
     last: GridCell
-    numbers: tuple[float, ...] | None  # Of the cell: inputs, unknowns, slopes
+    numbers: tuple[float, ...] | None  # Of the cell, if it is proven
 
 
 class GridFunctions(Protocol):
