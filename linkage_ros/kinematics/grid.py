@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice, product
-from math import isfinite, ldexp, prod, tau
+from math import copysign, inf, isfinite, ldexp, prod, tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import call, has_result
@@ -52,6 +52,9 @@ _MOST_CORNERED = 3
 
 _DIGITS = 28
 """Binary digits after the point of the numbers of a cell: a start needs no more."""
+
+_BEYOND = 0.5 + 2.0**-20
+"""In widths of a cell: how far from its centre the next one is looked for."""
 
 _RETURNED = 1e-9
 """Farthest from the pose, apart from whole turns, that links are back."""
@@ -128,12 +131,20 @@ class GridFunctions(Protocol):
 
 
 class Grid:
-    """The cells of a group of links about a pose, whose unknowns are given."""
+    """
+    The cells of a group of links about a pose, whose unknowns are given.
+
+    ``numbers`` are those of its inputs among all that the linkage has.
+    """
 
     def __init__(
-        self, group: GridFunctions, inputs: Sequence[GridInput], unknowns: Sequence[float]
+        self,
+        group: GridFunctions,
+        inputs: Sequence[GridInput],
+        numbers: Sequence[int],
+        unknowns: Sequence[float],
     ) -> None:
-        self._group, self._inputs = group, inputs
+        self._group, self._inputs, self.numbers = group, inputs, numbers
         count = len(inputs)
         level = (0.0,) * len(unknowns)
         bends = (level,) * (count * (count + 1) // 2)
@@ -167,6 +178,27 @@ class Grid:
             if found.numbers is not None:
                 return found.numbers
         return None
+
+    def look_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
+        """Make the cell that inputs at these rates enter next, from one that is made."""
+        turned, _ = self.turn_back(inputs)
+        for level, width in enumerate(self.widths):
+            key = self._key_of(turned, width)
+            found = self._kept.get((level, key))
+            if found is not None and found.numbers is not None:
+                break
+        else:
+            return
+        soonest = inf
+        for x, rate, centre in zip(turned, rates, self._centre(level, key), strict=True):
+            if rate:
+                edge = centre + copysign(_BEYOND * width, rate)
+                soonest = min(soonest, (edge - x) / rate)
+        if soonest < inf:
+            self(*(x + rate * soonest for x, rate in zip(turned, rates, strict=True)))
+
+    def _key_of(self, inputs: Sequence[float], width: float) -> Key:
+        return tuple([round((x - at) / width) for x, at in zip(inputs, self.home, strict=True)])
 
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
@@ -289,7 +321,7 @@ class Grid:
         them.
         """
         width = self.widths[-1]
-        key = tuple(round((x - at) / width) for x, at in zip(inputs, self.home, strict=True))
+        key = self._key_of(inputs, width)
         with BUILD_LOCK:
             begin = cell = self._follow(_LEVELS - 1, key).last
             done, step = 0.0, 1.0

@@ -135,7 +135,8 @@ class GridGroup:
     @BuiltProperty
     def grid(self) -> Grid:
         """Return the cells from which the equations are solved."""
-        return Grid(self, [self._given_inputs[k] for k in self.inputs], self._start)
+        inputs = [self._given_inputs[k] for k in self.inputs]
+        return Grid(self, inputs, self.inputs, self._start)
 
     @BuiltProperty
     def _step_count(self) -> int:

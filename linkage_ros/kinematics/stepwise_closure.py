@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 _FILLED = 2
-"""Inputs that cells within limits are made of before the first state."""
+"""Most inputs of a grid whose cells within limits are made before the first state."""
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -430,6 +430,19 @@ class StepwiseClosure:
         """Return the cells of links that close only together, by several inputs."""
         found = (getattr(step, 'grid', None) for step in self.steps)
         return [grid for grid in found if grid is not None]
+
+    @property
+    def makes_cells_in_motion(self) -> bool:
+        """Whether some cells are made only where a motion leads."""
+        return any(len(grid.home) > _FILLED for grid in self.grids)
+
+    def make_cells_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
+        """Make the cells that inputs at these rates meet next, in [rad] or [m] and per second."""
+        factors = self._factors or [1.0] * len(inputs)
+        for grid in self.grids:
+            grid.look_ahead(
+                *([each[k] * factors[k] for k in grid.numbers] for each in (inputs, rates))
+            )
 
     def slide_reach(self, _number: int) -> tuple[float, float]:
         """Return between which values an input that slides is worth a trial, in [m]."""

@@ -193,6 +193,7 @@ class TickLoop:
         self._rejected_old = 0
         """Samples that the last tick rejected as older than the last one."""
         self._pipeline = build()
+        self._meets_cells = [closure.makes_cells_in_motion for closure in self._pipeline.closures]
         self._earlier_chatter: Sequence[int] = [0] * len(self._pipeline.linkages)
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
@@ -455,6 +456,8 @@ class TickLoop:
         ):
             recorder.offer(withheld, now, solve_time, time_message(solve_time))
         counts.ticks += 1
+        if True in self._meets_cells:
+            self._make_cells_ahead(tick)
         for index, one in enumerate(tick.computed):
             if not isinstance(one, LinkageState):
                 continue
@@ -470,6 +473,14 @@ class TickLoop:
                 counts.last_unclosed[position.status] = index, position
             if one.reading is None and position.joints:
                 counts.suppressed += 1
+
+    def _make_cells_ahead(self, tick: Tick) -> None:
+        """Make what the next ticks need, after this one is published."""
+        for linkage, meets, state in zip(
+            tick.linkages, self._meets_cells, tick.states, strict=True
+        ):
+            if meets and (crank := state.crank) is not None:
+                linkage.closure.make_cells_ahead(crank.angles, crank.rates)
 
     def _guard_pace(self, pace: Pace) -> None:
         # A defect here must be reported, and without a traceback.

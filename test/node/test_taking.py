@@ -16,15 +16,18 @@ from functools import partial
 from itertools import count
 from time import time_ns
 
-from linkage_ros.description import parse_scene
+from linkage_ros.description import load, parse_scene
+from linkage_ros.kinematics import Grid
 from linkage_ros.messages import JointStateWriter, NANOSECONDS, Rejection
 from linkage_ros.replay import own_joint_states
+from linkage_ros.resources import named_file
 from linkage_ros.tick import Pipeline, TickLoop
 import pytest
 
 MS = 1_000_000
 BEGIN = 1_700_000_000 * NANOSECONDS
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+HEXAPOD = named_file('hexapod', 'linkages')
 ONE = 'linkage: l.yaml\n'
 TWO = 'linkages: [{name: left, linkage: l.yaml}, {name: right, linkage: l.yaml}]\n'
 TWO_FILES = {'scene.yaml': TWO.encode(), 'linkage_1.yaml': FOUR_BAR, 'linkage_2.yaml': FOUR_BAR}
@@ -304,3 +307,23 @@ def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, exp
     assert rig.loop.counts.own_interleaved == expected
     assert rig.loop.counts.interleaved == 0
     assert rig.counts()[0] == len(numbers)
+
+
+def test_cells_of_many_inputs_are_made_after_the_state_is_published(monkeypatch):
+    closure, done, waiting = load('hexapod'), [], []
+    look = Grid.look_ahead
+    monkeypatch.setattr(Grid, 'look_ahead', lambda *given: done.append('cells') or look(*given))
+    files = {'scene.yaml': b'linkage: l.yaml\n', 'linkage.yaml': HEXAPOD.read_bytes()}
+    made = parse_scene('t', 't', files)
+    loop = TickLoop(
+        lambda: Pipeline(made), lambda: waiting.pop() if waiting else None,
+        lambda _: done.append('published'),
+    )  # fmt: skip
+    loop.tick_at(BEGIN)
+    assert done == []
+    legs = JointStateWriter(closure.input_names)
+    message = legs.write(BEGIN, closure.linkage.pose.inputs, [0.01] * 6)
+    for index in range(1, 4):
+        waiting.append((message, {'source_timestamp': 0}))
+        loop.tick_at(BEGIN + index * MS)
+    assert done == ['published', 'cells'] * 3

@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 
 from linkage_ros.description import load
-from linkage_ros.kinematics import Status
+from linkage_ros.kinematics import Grid, Status
 from linkage_ros.kinematics.compiling import Compiled
 import numpy as np
 import pytest
@@ -103,6 +103,30 @@ def test_the_cells_within_limits_are_those_that_states_meet():
     for inputs in random_inputs(other, 300, 0.6):
         assert met(*inputs) in cells.values()
     assert closure_of('hexapod').grids[0].fill() is None
+
+
+@pytest.mark.parametrize('ahead', [True, False])
+def test_a_motion_finds_cells_of_many_inputs_made_ahead_of_it(monkeypatch, ahead):
+    closure, made, counts = closure_of('hexapod'), [], []
+    make = Grid._make_cell
+    monkeypatch.setattr(Grid, '_make_cell', lambda *given: made.append(given) or make(*given))
+    begin, rates = closure.linkage.pose.inputs, (0.0, -0.1, 0.0, 0.0, 0.0, 0.0)
+    closure.position(*begin)
+    for tick in range(100):
+        inputs = [value + rate * 0.01 * tick for value, rate in zip(begin, rates, strict=True)]
+        before = len(made)
+        assert closure.position(*inputs).status is Status.CLOSED
+        counts.append(len(made) - before)
+        if ahead:
+            closure.make_cells_ahead(inputs, rates)
+    assert made
+    assert (sum(counts) == 0) == ahead
+
+
+def test_only_what_has_many_inputs_makes_cells_in_motion():
+    assert closure_of('hexapod').makes_cells_in_motion
+    for name in ('ankle_motors', 'hexapod_inverse', 'four_bar'):
+        assert not closure_of(name).makes_cells_in_motion
 
 
 def test_a_state_is_where_a_walk_from_the_pose_ends():
