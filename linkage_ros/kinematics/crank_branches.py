@@ -25,15 +25,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from math import atan2, ceil, floor, inf, isfinite, nan, pi, remainder, sin, sqrt, tau
-from typing import NamedTuple
+from math import ceil, floor, inf, isfinite, nan, pi, remainder, sin, tau
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names
-from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import (
+    atan2,
+    call,
+    remainder as nearest_remainder,
+    sqrt,
+    UndecidedError,
+    UNIT_ROUNDOFF,
+    where,
+)
+from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import golden_section, last_inside, sample_inputs
 from linkage_ros.kinematics.results import InputRange, PlanarClosure
+from linkage_ros.kinematics.start_table import StartTable
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _CELLS = 32
@@ -213,6 +224,34 @@ class CrankBranch:
             for (p, q), (s, e) in zip(pairwise(self.cranks), pairwise(tangents), strict=True)
         ]
         self._known = self._evaluate.fast, self.turning, self._greatest_last, self.least, self.most
+        self._least_steps = self._count_steps()
+
+    def _count_steps(self) -> int:
+        """Return how many steps of Newton's method suffice in all cells, but those at toggles."""
+        most = 1
+        for i in range(self._cells):
+            if i in self._steep_cells:
+                continue
+            for t in (0.25, 0.75):
+                y, _ = self._output_at((i + t) / self._cells)
+                crank = self._start_at(self._cubics[i], t)
+                for count in range(1, _STEPS):
+                    value, slope = self._evaluate(crank)
+                    step = self._without_turns(value - y) / slope if slope else nan
+                    crank -= step
+                    most = max(most, count)
+                    if not abs(step) >= self._greatest_last:
+                        break
+        return most
+
+    @staticmethod
+    def _start_at(cubic: Sequence[Any], t: Any) -> Any:
+        p, s, bend, twist = cubic
+        return p + t * (s + t * (bend + t * twist))
+
+    def _without_turns(self, difference: Any) -> Any:
+        """Return a difference of outputs, without whole turns."""
+        return nearest_remainder(difference, tau) if self.turning else difference
 
     def _output_at(self, s: float) -> tuple[float, float]:
         """Return the output at s, and its derivative by s."""
@@ -272,11 +311,10 @@ class CrankBranch:
         place = self._table_parameter(y) * cells
         i = min(int(place), cells - 1)
         t = place - i
-        p, s, bend, twist = self._cubics[i]
-        crank = p + t * (s + t * (bend + t * twist))
+        crank = self._start_at(self._cubics[i], t)
         if i not in self._steep_cells:
             fast, turning, last, least, most = self._known
-            for _ in range(_STEPS):
+            for count in range(1, 1 + _STEPS):
                 found = fast(crank, 1.0)
                 if found is None:
                     break
@@ -288,7 +326,7 @@ class CrankBranch:
                     break
                 step = off / slope
                 crank -= step
-                if -last < step < last:
+                if count >= self._least_steps and -last < step < last:
                     if least <= crank <= most:
                         return crank + turns, slope
                     break
@@ -297,8 +335,53 @@ class CrankBranch:
             if (way := abs(y - value)) < moved:
                 # So near the toggle the closed form has too few digits: the crank goes as y².
                 return end + (beside - end) * (way / moved) ** 2 + turns, inf
-        crank, slope = self._refine_crank(y, p, self.cranks[i + 1], crank)
+        crank, slope = self._refine_crank(y, self.cranks[i], self.cranks[i + 1], crank)
         return crank + turns, slope
+
+    def trace_crank(
+        self, y: Any, evaluate: Callable[[Any], tuple[Any, Any]]
+    ) -> tuple[Status, Any]:
+        """
+        Return status and crank at a symbol, as `find_crank` finds it: a fixed number of steps.
+
+        ``evaluate`` gives output and slope at a crank. An UndecidedError is raised next to a
+        toggle of the crank, and where the last step is no rounding.
+        """
+        turns = 0.0
+        if self.rise:
+            count = round((y - self.low) / self.rise - 0.5)
+            y, turns = y - self.rise * count, (self.period if self.rises else -self.period) * count
+        elif self.turning:
+            middle = 0.5 * (self.low + self.high)
+            away = abs(y - middle) > 0.5 * (self.high - self.low)
+            y = y - tau * where(away, round((y - middle) / tau), 0.0)
+        below, above = self.low - y, y - self.high
+        if where(below > above, below, above) > self.slack:
+            return Status.OPEN, None
+        low_back, high_back = self.turns_back
+        if (low_back and y <= self._lowest) or (high_back and y >= self._highest):
+            return Status.TOGGLE, None
+        y = where(below > 0.0, self.low, where(above > 0.0, self.high, y))
+        for (_, value), _, moved in self._steep_cells.values():
+            if abs(y - value) < moved:
+                raise UndecidedError
+        place = self._table_parameter(y) * self._cells
+        number, *cubic = (call(self._table, place)[k] for k in range(5))
+        crank, step = self._start_at(cubic, place - number), 0.0
+        for _ in range(self._least_steps):
+            found, slope = evaluate(crank)
+            if not abs(slope) > self.flat:
+                raise UndecidedError
+            step = self._without_turns(found - y) / slope
+            crank = crank - step
+        if not abs(step) < self._greatest_last:
+            raise UndecidedError
+        return Status.CLOSED, crank + turns + 0.0
+
+    @BuiltProperty
+    def _table(self) -> StartTable:
+        rows = [(float(i), *cubic) for i, cubic in enumerate(self._cubics)]
+        return StartTable([number + 1.0 for number, *_ in rows], rows)
 
     def evaluate(self, crank: float) -> tuple[float, float]:
         """Return the output at a crank of the branch, and its slope there."""

@@ -21,8 +21,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf, isfinite, tau
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.arithmetic import all_finite, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling import TracedMotion
@@ -58,6 +59,38 @@ def _given_state(value: float, coordinates: list[float], pins: list[complex]) ->
     state = _GivenState(coordinates, pins)
     state.given = (value,)
     return state
+
+
+class CrankPose(NamedTuple):
+    """The result of a `CrankStep`."""
+
+    status: Status
+    gap: float = 0.0
+
+
+class CrankStep:
+    """The first step of compiled code: the crank takes the place of the joint."""
+
+    def __init__(self, closure: InverseClosure) -> None:
+        self._closure = closure
+
+    def close(self, solved: LinkState) -> CrankPose:
+        """Replace the joint by the crank; only symbols come here."""
+        closure = self._closure
+        status, crank = closure.branch.trace_crank(solved.coordinates[1], self._output_at)
+        if crank is not None:
+            begin = closure.closed.initial_state(crank)
+            solved.coordinates[:], solved.pins[:] = begin.coordinates, begin.pins
+        return CrankPose(status)
+
+    def _output_at(self, crank: Any) -> tuple[Any, Any]:
+        closed = self._closure.closed
+        position = closed.close_unlimited(crank)
+        if position.status is not Status.CLOSED:
+            raise UndecidedError
+        motion = TracedMotion(position, closed.velocity(position, 1.0), None)
+        (value,), (slope,) = self._closure.inverse.output.wanted(motion)
+        return value, slope
 
 
 class InverseClosure(Closure):
@@ -116,6 +149,8 @@ class InverseClosure(Closure):
         unit.
         """
         (y,) = self._single_number('inputs', inputs)
+        if hasattr(y, 'apply'):
+            return self._trace_position(y)
         if not isfinite(y):
             return Position(Status.INDETERMINATE, 0.0, (), _given_state(y, [0.0], []), [], self)
         branch = self.branch
@@ -133,11 +168,27 @@ class InverseClosure(Closure):
             status, found.gap, joints, _given_state(y, *found.state), found.poses, self
         )
 
+    def _trace_position(self, y: Any) -> Position:
+        """Return the position at a symbol."""
+        state = self.initial_state(y)
+        status = self.program_steps[0].close(state).status
+        if not status.has_rates:
+            return Position(status, 0.0, (), _given_state(y, [0.0], []), [], self)
+        crank = self.closed.inputs_of(state)[0]
+        found = self.closed.close_unlimited(crank)
+        joints = self._joints_with(crank, found.joints)
+        given = _given_state(y, *found.state)
+        return Position(found.status, found.gap, joints, given, found.poses, self)
+
+    @property
+    def program_steps(self) -> tuple[Any, ...]:
+        return (CrankStep(self), *self.steps)
+
     def velocity(self, position: Position, *rates: float) -> Velocity:
         if getattr(position, 'closure', None) is not self:
             self._check_own('position', position)
         (rate,) = self._single_number('rates', rates)
-        if not (position.status.has_rates and isfinite(rate)):
+        if not (position.status.has_rates and all_finite((rate,))):
             return self._huge_velocity(position, (rate,))
         places = self._beside_toggle(position, position.joints[0])
         found = [
@@ -163,10 +214,8 @@ class InverseClosure(Closure):
         for place in places or [self._crank_position(position)]:
             moving = self._crank_velocity(place, rate)
             bent = self.closed.acceleration(place, moving, 0.0)
-            _, (slope,), (bend,) = self._output_groups(place, moving, bent)
-            # Not the slope itself: the output has the rate that is given.
-            (turn,) = self.closed.inputs_of(moving.state)
-            slope = slope / turn if turn else self._output_slope(place)
+            *_, (bend,) = self._output_groups(place, moving, bent)
+            slope = self._output_slope(place)
             found.append(self.closed.acceleration(place, moving, (change - bend) / slope))
         ends = [(*self.closed.inputs_of(one.state), *one.joints) for one in found]
         crank, *joints = _extrapolate(*ends) if places else ends[0]
@@ -282,9 +331,9 @@ class InverseClosure(Closure):
     def _output_groups(self, *motion: Any) -> Any:
         return self.inverse.output.wanted(TracedMotion(*motion))
 
-    def _output_slope(self, forward: Position) -> float:
+    def _output_slope(self, forward: Position) -> Any:
         _, (slope,) = self._output_groups(forward, self.closed.velocity(forward, 1.0), None)
-        return float(slope)
+        return slope
 
     def _crank_velocity(self, forward: Position, rate: float) -> Velocity:
         return self.closed.velocity(forward, rate / self._output_slope(forward))

@@ -99,6 +99,33 @@ class SpaceClosure(StepwiseClosure):
             for name, joint in linkage.joints.items()
         )
 
+    def driven_by(self, *joints: str) -> SpaceClosure:
+        """
+        Return the linkage with other joints as its inputs, in the assembly of the pose.
+
+        Its former inputs are published joints, before the others.
+
+        Parameters
+        ----------
+        *joints
+            As many joints as there are inputs, which may be among them.
+
+        Raises
+        ------
+        DefinitionError
+            If a joint is unknown, or these joints do not move all of the linkage.
+
+        """
+        linkage = self.linkage
+        if len(joints) != len(linkage.driven):
+            raise DefinitionError(
+                ', '.join(joints), f'{len(joints)} for {len(linkage.driven)} inputs',
+                f'name {len(linkage.driven)} different joints',
+            )  # fmt: skip
+        names = dict.fromkeys((*linkage.driven, *linkage.published))
+        published = tuple(name for name in names if name not in joints)
+        return SpaceClosure(replace(linkage, driven=joints, published=published), self.name)
+
     def points(self, position: Position) -> dict[str, Vector]:
         """
         Return every point in the frame of the ground, as (x, y, z), in [m].
