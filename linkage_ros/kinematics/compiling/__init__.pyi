@@ -42,4 +42,5 @@ from linkage_ros.kinematics.compiling.trace import (
 from linkage_ros.kinematics.compiling.writer import (
     count_uses as count_uses,
     TextWriter as TextWriter,
+    WrittenText as WrittenText,
 )

@@ -29,7 +29,7 @@ _NOTES = (
     'It returns the status and a tuple for each group of values, empty where the status has none.',
 )
 
-_CODING = '# -*- coding: utf-8 -*-'
+CODING = '# -*- coding: utf-8 -*-'
 """First line: Python looks for an encoding in the second, which holds a name, only without it."""
 
 _IMPORTS = 'from math import atan2, copysign, cos, inf, isfinite, sin, sqrt'
@@ -98,17 +98,10 @@ class PythonModule(Language):
         ]
 
     def write_grid(self, name: str, grid: Grid) -> list[str]:
-        cells = grid.fill()
-        if cells is None:
-            raise DefinitionError(
-                'input',
-                f'{len(grid.home)} inputs move links that close only together, and within their '
-                'limits are too many cells',
-                'give these inputs limits, or narrower ones',
-            )
+        cells = self.list_cells(grid)
         return [
             f'_{name}_cells = {{',
-            *(f'    {key}: ({self.write_list(cell)}),' for key, cell in sorted(cells.items())),
+            *(f'    {key}: ({self.write_list(cell)}),' for key, cell in cells),
             '}',
             '',
             '',
@@ -122,6 +115,20 @@ class PythonModule(Language):
             '',
             '',
         ]
+
+    def list_cells(
+        self, grid: Grid
+    ) -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
+        """Return level and place of each cell with its numbers."""
+        cells = grid.fill()
+        if cells is None:
+            raise DefinitionError(
+                'input',
+                f'{len(grid.home)} inputs move links that close only together, and within their '
+                'limits are too many cells',
+                'give these inputs limits, or narrower ones',
+            )
+        return sorted(cells.items())
 
     def return_status(self, status: str) -> str:
         return f'return ({", ".join([status, *["()"] * self._groups])})'
@@ -150,7 +157,7 @@ class PythonModule(Language):
         more = ', remainder' if any('remainder(' in line for line in body) else ''
         imports.append(_IMPORTS.replace(', sin', f'{more}, sin'))
         lines = [
-            _CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', *imports, '',
+            CODING, *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', *imports, '',
             *(f'{status} = {index}' for index, status in enumerate(STATUSES)), '', '', *tables,
             f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
         ]  # fmt: skip

@@ -83,7 +83,7 @@ STATUSES: dict[str, str] = {
 _PLAIN = frozenset((0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, inf))
 """Constants that need no name."""
 
-_THRESHOLDS = {SMALLEST: 'smallest', ROUNDING: 'rounding'}
+THRESHOLDS = {SMALLEST: 'smallest', ROUNDING: 'rounding'}
 """Smaller numbers count as 0; rounding error of a sum relative to its terms."""
 
 
@@ -160,6 +160,14 @@ class Language(ABC):
     def write_below(self, number: str, most: str) -> str:
         """Write that the size of a number is below a bound."""
         return f'{self.functions["abs"]}({number}) < {most}'
+
+    def write_outside(self, number: str, low: str, high: str) -> str:
+        """Write that a number is below or above two bounds, in brackets."""
+        return f'({number} < {low} {self.disjunction} {number} > {high})'
+
+    def write_threshold(self, name: str, value: float) -> str:
+        """Write one of the numbers that are small for a double."""
+        return self.write_constant(value)
 
     def write_block(self, condition: str, lines: Sequence[str]) -> list[str]:
         """Write lines that run if a condition holds."""
@@ -243,6 +251,14 @@ def write_source(subject: Subject, language: Language) -> str:
         If the linkage cannot be compiled.
 
     """
+    body = SourceBody(subject, language, compile_subject(subject))
+    head = head_lines(subject, language.function_name(subject.derivatives))
+    lines = body.write_lines()
+    return language.whole_source(subject, list(head), body.table_lines(), lines)
+
+
+def compile_subject(subject: Subject) -> Program:
+    """Return the tree of a linkage with the requested numbers, and then those that have limits."""
     closure = subject.closure
     names = list(closure.linkage.joints)
     asked = [names.index(name) for name in subject.joints]
@@ -254,11 +270,7 @@ def write_source(subject: Subject, language: Language) -> str:
             groups += frame_values(closure, motion)
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
-    compiled = compile_program(closure, subject.derivatives, wanted_numbers)
-    body = _SourceBody(subject, language, compiled)
-    head = _head_lines(subject, language.function_name(subject.derivatives))
-    lines = body.write_lines()
-    return language.whole_source(subject, list(head), body.table_lines(), lines)
+    return compile_program(closure, subject.derivatives, wanted_numbers)
 
 
 def frame_values(closure: Closure, motion: TracedMotion) -> list[list[Any]]:
@@ -270,8 +282,10 @@ def frame_values(closure: Closure, motion: TracedMotion) -> list[list[Any]]:
     return [[n for place, turn in each for n in (place.real, place.imag, turn)] for each in groups]
 
 
-class _SourceBody:
+class SourceBody:
     """Writes the lines of the function."""
+
+    writer_class: ClassVar[type[TextWriter]] = TextWriter
 
     def __init__(self, subject: Subject, language: Language, found: Program) -> None:
         self._language = language
@@ -281,8 +295,8 @@ class _SourceBody:
         self._lengths = _length_names(subject.closure)
         self._often = Counter(_used_constants(roots))
         self._named: dict[float, str] = {}
-        self._tables: dict[StartTable | Grid, str] = {}
-        self._writer = TextWriter(
+        self.tables: dict[StartTable | Grid, str] = {}
+        self._writer = self.writer_class(
             roots,
             self._constant_text,
             language.write_call,
@@ -320,17 +334,25 @@ class _SourceBody:
             ]
         given += self._write_unless(usual, lines)
         self._write_tree(self._program.tree)
-        constants = []
+        code = (f'    {line}' for line in (*given, *self._writer.lines))
+        wrapped = (part for line in code for part in language.wrap_line(line))
+        return [*(f'    {line}' for line in self._constant_lines()), *wrapped]
+
+    def _constant_lines(self) -> Iterator[str]:
+        """Yield the lines of the constants that have names."""
+        language = self._language
         for value, name in self._named.items():
-            line = language.assign(name, language.write_constant(value))
+            text = (
+                language.write_threshold(name, value)
+                if value in THRESHOLDS
+                else language.write_constant(value)
+            )
+            line = language.assign(name, text)
             if value in self._lengths:
                 length = value * self._subject.closure.scale
                 note = language.comment.format(f'{length:.9g} m')
                 line = f'{line}  {note}'
-            constants.append(line)
-        code = (f'    {line}' for line in (*given, *self._writer.lines))
-        wrapped = (part for line in code for part in language.wrap_line(line))
-        return [*(f'    {line}' for line in constants), *wrapped]
+            yield line
 
     def _write_unless(self, conditions: Sequence[str], lines: Sequence[str]) -> list[str]:
         """Write lines that run unless all conditions hold."""
@@ -360,23 +382,27 @@ class _SourceBody:
 
     def _write_solution(self, leaf: SolvedLeaf) -> None:
         language, writer = self._language, self._writer
-        *groups, bounded = leaf.outputs
+        beyond = self._write_limits(leaf)
+        texts = [[writer.write(number) for number in group] for group in leaf.outputs[:-1]]
+        status = language.status.format(leaf.status.name)
+        if beyond:
+            status = language.write_choice(
+                beyond, language.status.format(Status.LIMITED.name), status
+            )
+        writer.lines += language.return_solution(status, texts)
+
+    def _write_limits(self, leaf: SolvedLeaf) -> str:
+        """Write that a joint is beyond its limits; '' if there are none."""
+        language, writer = self._language, self._writer
         bounds = self._subject.closure.bounds
         beyond = [self._write_beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
-        for index, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
+        for index, (bound, value) in enumerate(zip(bounds.joints, leaf.outputs[-1], strict=True)):
             name = f'limited{index}'
             writer.lines.append(language.assign(name, writer.write(value)))
             if isinstance(value, Operation):
                 writer.name_operation(value, name)
             beyond.append(self._write_beyond(bound, name))
-        texts = [[writer.write(number) for number in group] for group in groups]
-        status = language.status.format(leaf.status.name)
-        if beyond:
-            condition = f' {language.disjunction} '.join(beyond)
-            status = language.write_choice(
-                condition, language.status.format(Status.LIMITED.name), status
-            )
-        writer.lines += language.return_solution(status, texts)
+        return f' {language.disjunction} '.join(beyond)
 
     def _write_beyond(self, bound: Bound, name: str) -> str:
         """Write that a value is beyond its limits, as `Bound.is_beyond` does."""
@@ -384,7 +410,7 @@ class _SourceBody:
 
         def compare_with_bounds(value: str) -> str:
             low, high = language.write_constant(bound.low), language.write_constant(bound.high)
-            return f'({value} < {low} {language.disjunction} {value} > {high})'
+            return language.write_outside(value, low, high)
 
         if bound.middle is None:
             return compare_with_bounds(name)
@@ -400,7 +426,7 @@ class _SourceBody:
         """Return the lines of the tables that the function uses."""
         language = self._language
         lines = []
-        for table, name in self._tables.items():
+        for table, name in self.tables.items():
             if isinstance(table, Grid):
                 lines += language.write_grid(name, table)
                 continue
@@ -414,10 +440,10 @@ class _SourceBody:
             return value
         if isinstance(value, StartTable | Grid):
             function = self._language.function_name(self._subject.derivatives)
-            number = len(self._tables) or ''
-            return self._tables.setdefault(value, f'{function}_row{number}')
+            number = len(self.tables) or ''
+            return self.tables.setdefault(value, f'{function}_row{number}')
         text = self._language.write_constant(value)
-        name = self._lengths.get(value) or _THRESHOLDS.get(value)
+        name = self._lengths.get(value) or THRESHOLDS.get(value)
         if abs(value) in _PLAIN or (self._often[value] < 2 and not name):
             return text
         if value not in self._named:
@@ -479,7 +505,7 @@ def _places_of(linkage: Linkage | SpaceLinkage) -> Mapping[str, Mapping[str, tup
     return linkage.links
 
 
-def _head_lines(subject: Subject, function: str) -> Iterator[str]:
+def head_lines(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage: Any = closure.linkage
