@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from math import dist, remainder, sqrt, tau
 from typing import TYPE_CHECKING

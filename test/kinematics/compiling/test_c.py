@@ -34,7 +34,7 @@ from .emitted import (
 from ..test_gallery import closure_of, KINDS
 
 ON_GRIDS = ('ankle_motors', 'hexapod')
-"""They need cells, which are written in Python."""
+"""Outside of their cells, which limits bound, sources are undecided."""
 GALLERY = [*KINDS, *(name for name in spatial_linkage_names() if name not in ON_GRIDS)]
 ITERATED_TWICE = 'class III two inputs'
 COMPILED = [family for family in FAMILIES if family != ITERATED_TWICE]

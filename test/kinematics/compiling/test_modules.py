@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 import json
 import math
-from math import ulp
+from math import inf, nan, ulp
 from pathlib import Path
 from random import Random
 import subprocess
@@ -33,7 +33,7 @@ from linkage_ros.tools.models.source_code import (
 )
 import pytest
 
-from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
+from .emitted import COUNT, needs, NUMBERS, parts, plain, run_c, State, states, subject, Told
 from .test_c import GALLERY, limited
 from ..test_gallery import closure_of
 
@@ -81,39 +81,11 @@ def planar_group_of_two_inputs():
     return Closure(replace(linkage, inputs=tuple(inputs)))
 
 
-@pytest.mark.parametrize(
-    ('make', 'reach'),
-    [(partial(closure_of, 'ankle_motors'), 0.6), (planar_group_of_two_inputs, 0.2)],
-)
-def test_python_has_the_cells_of_several_inputs(make, reach):
-    closure, random = make(), Random(1)
-    solve = python_of(subject(closure))['motion']
-    pose = closure.linkage.pose.inputs
-    closed = 0
-    for _ in range(300):
-        inputs = tuple(value + random.uniform(-reach, reach) for value in pose)
-        state = (*inputs, *(random.uniform(-9.0, 9.0) for _ in range(4)))
-        told = told_by(solve, state)
-        if told.status != 'UNDECIDED':
-            assert told == plain(closure, state), state
-            closed += told.status == 'CLOSED'
-    assert closed > 290
-    for beyond in (0.65, 3.0):
-        state = (pose[0] + beyond, pose[1], 1.0, 1.0, 1.0, 1.0)
-        assert told_by(solve, state).status in ('LIMITED', 'UNDECIDED')
-
-
-@pytest.mark.parametrize(
-    ('name', 'language', 'told'),
-    [
-        ('ankle_motors', JavaScript(), 'close only together, by 2 inputs; .* x.py'),
-        ('ankle_motors', C('ankle', header=False), 'close only together, by 2 inputs; .* x.py'),
-        ('hexapod', PythonModule(2), '6 inputs .* too many cells; give these inputs limits'),
-    ],
-)
-def test_what_has_no_cells_is_not_written(name, language, told):
+@pytest.mark.parametrize('language', [JavaScript(), C('hexapod', header=False), PythonModule(2)])
+def test_what_has_too_many_cells_is_not_written(language):
+    told = '6 inputs .* too many cells; give these inputs limits'
     with pytest.raises(lr.DefinitionError, match=told):
-        write_source(subject(closure_of(name)), language)
+        write_source(subject(closure_of('hexapod')), language)
 
 
 def test_python_needs_nothing_but_math():
@@ -170,6 +142,19 @@ def run_javascript(what: Subject, given: Sequence[State], folder: Path) -> list[
         Told(name, tuple(map(float, values)))
         for name, values in json.loads((folder / 'told').read_text())
     ]
+
+
+def run_python(what, given, _folder):
+    """Return what a linkage in Python says of states."""
+    solve = python_of(what)['motion']
+    return [told_by(solve, state) for state in given]
+
+
+RUN_IN = {
+    'Python': run_python,
+    'C': pytest.param(run_c, marks=needs['C99']),
+    'JavaScript': pytest.param(run_javascript, marks=needs['JavaScript']),
+}
 
 
 def carried(what: Subject, given: Sequence[State]) -> list[list[float]]:
@@ -250,3 +235,84 @@ def test_javascript_tells_of_limits(tmp_path):
     told = run_javascript(what, given, tmp_path)
     assert {one.status for one in told} == {'CLOSED', 'LIMITED', 'INDETERMINATE'}
     assert off(what, told, given) <= _ULPS
+
+
+@pytest.mark.parametrize(
+    ('make', 'reach'),
+    [(partial(closure_of, 'ankle_motors'), 0.6), (planar_group_of_two_inputs, 0.2)],
+)
+@pytest.mark.parametrize('run', RUN_IN.values(), ids=RUN_IN)
+def test_a_source_has_the_cells_of_several_inputs(run, make, reach, tmp_path):
+    closure, random = make(), Random(1)
+    pose = closure.linkage.pose.inputs
+    given = []
+    for index in range(300):
+        inputs = [value + random.uniform(-reach, reach) for value in pose]
+        inputs[0] = pose[0] + {298: 0.65, 299: 3.0}.get(index, inputs[0] - pose[0])
+        given.append((*inputs, *(random.uniform(-9.0, 9.0) for _ in range(4))))
+    told = run(subject(closure), given, tmp_path)
+    assert sum(one.status == 'CLOSED' for one in told) > 290
+    assert {one.status for one in told[-2:]} <= {'LIMITED', 'UNDECIDED'}
+    for state, one in zip(given, told, strict=True):
+        if one.status != 'UNDECIDED':
+            expected = plain(closure, state)
+            assert one.status == expected.status
+            if run is run_javascript:  # whose sines have other last digits
+                assert one.values == pytest.approx(expected.values, rel=1e-12, abs=1e-12)
+            else:
+                assert one == expected, state
+
+
+DRIVEN = {
+    'gripper': ('left_finger_joint', 'left_inner_knuckle_joint'),
+    'four_bar': ('rocker_joint', 'coupler_joint'),
+    'slider_crank': ('piston_slide', 'rod_joint'),
+    'drag_link': ('rocker_joint',),
+    'inverted_slider_crank': ('rod_joint', 'rod_slide'),
+    'klann_leg': ('knee_joint', 'lower_rocker_joint'),
+    'class_3': ('platform_joint',),
+}
+"""For each linkage the joints that drive it instead of its crank."""
+
+
+@pytest.mark.parametrize('run', [run_python, pytest.param(run_c, marks=needs['C99'])])
+@pytest.mark.parametrize(
+    ('name', 'joint'), [(name, joint) for name, joints in DRIVEN.items() for joint in joints]
+)
+def test_a_source_of_a_linkage_that_a_dependent_joint_drives(run, name, joint, tmp_path):
+    """The crank of each state is found by the branch itself, a route without compiled code."""
+    crank_driven = closure_of(name)
+    for branch in crank_driven._joint_inverse(joint).branches[:2]:
+        closure, random = crank_driven.driven_by(joint, branch=branch.number), Random(joint)
+        width = branch.high - branch.low
+        inputs = [branch.low + width * random.uniform(-0.1, 1.1) for _ in range(150)]
+        inputs += [branch.low, branch.high, branch.low + 1e-9 * width, 1e6, inf, nan]
+        given = [(y, random.uniform(-9.0, 9.0), random.uniform(-9.0, 9.0)) for y in inputs]
+        told = run(subject(closure), given, tmp_path)
+        undecided = 0
+        for state, one in zip(given, told, strict=True):
+            expected = plain(closure, state)
+            if one.status == 'UNDECIDED':
+                undecided += 1
+            elif state[0] in (branch.low, branch.high):
+                assert one.values == pytest.approx(expected.values, rel=1e-12, abs=1e-12)
+            else:
+                assert one == expected, state
+        assert undecided < 5
+        assert sum(one.status == 'CLOSED' for one in told) > 100
+
+
+def test_a_spatial_linkage_is_driven_by_any_of_its_joints():
+    """There and back: the joints of the motors of joints."""
+    motors, random = closure_of('ankle_motors'), Random(3)
+    joints = motors.driven_by('pitch', 'roll')
+    assert joints.input_names == ('pitch', 'roll')
+    assert joints.joint_names == ('m1', 'm2')
+    for _ in range(100):
+        given = [random.uniform(-0.3, 0.3) for _ in range(2)]
+        back = motors.position(*joints.position(*given).joints)
+        assert back.joints == pytest.approx(given, abs=1e-14)
+    with pytest.raises(lr.DefinitionError, match='1 for 2 inputs; name 2 different joints'):
+        motors.driven_by('pitch')
+    with pytest.raises(lr.DefinitionError, match="no joint 'rol'; did you mean"):
+        motors.driven_by('pitch', 'rol')

@@ -94,10 +94,10 @@ def _length(xp, x, y):
     zero = (x == 0.0) & (y == 0.0)
     return xp.where(zero, 0.0, xp.hypot(xp.where(zero, 1.0, x), y))
 ''',
-    '_stack': '''
+    '_stack': """
 def _stack(xp, numbers):
     return xp.stack(xp.broadcast_arrays(*numbers), axis=-1)
-''',
+""",
     '_take': '''
 def _take(xp, columns, row, like):
     """Return each column at the rows: an array (columns, ...)."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from linkage_ros.kinematics import Status
+from linkage_ros.kinematics import Grid, Status
 from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
@@ -31,8 +31,10 @@ _NOTES = (
     '-ffast-math, which removes the checks. It needs doubles of 64 bits and libm (-lm).',
 )
 
-_CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53',
-          '#error "double has fewer than 64 bits here"', '#endif')  # fmt: skip
+_CHECK = (
+    '#include <float.h>', '#include <math.h>', '#include <stddef.h>', '', '#if DBL_MANT_DIG < 53',
+    '#error "double has fewer than 64 bits here"', '#endif',
+)  # fmt: skip
 
 # Compilers replace a square by a product, whose last digits differ from linkage_ros, which calls
 # pow().
@@ -75,6 +77,8 @@ class C(Language):
     def write_call(self, operation: Operation, parts: list[str]) -> str:
         if operation.name == '**' and parts[1] == '2.0':
             return f'pow({parts[0]}, {_TWO})'
+        if operation.name == 'found':
+            return f'({parts[0]} != NULL)'
         return super().write_call(operation, parts)
 
     def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
@@ -100,6 +104,44 @@ class C(Language):
             '        }',
             '    }',
             '    return rows[low];',
+            '}',
+        ]
+
+    def write_grid(self, name: str, grid: Grid) -> list[str]:
+        cells = self.list_cells(grid)
+        inputs = range(len(grid.home))
+        return [
+            f'static const double *{name}({", ".join(f"double x{k}" for k in inputs)})',
+            '{',
+            f'    static const double widths[] = {{{self.write_list(grid.widths)}}};',
+            f'    static const double home[] = {{{self.write_list(grid.home)}}};',
+            f'    static const double keys[][{1 + len(inputs)}] = {{',
+            *(f'        {{{self.write_list(key)}}},' for key, _ in cells),
+            '    };',
+            f'    static const double cells[][{len(cells[0][1])}] = {{',
+            *(f'        {{{self.write_list(numbers)}}},' for _, numbers in cells),
+            '    };',
+            f'    const double x[] = {{{", ".join(f"x{k}" for k in inputs)}}};',
+            f'    for (int level = 0; level < {len(grid.widths)}; ++level) {{',
+            '        int low = 0;',
+            f'        int high = {len(cells)};',
+            '        while (low < high) {',
+            '            const int middle = (low + high) / 2;',
+            '            double way = keys[middle][0] - level;',
+            f'            for (int k = 0; way == 0.0 && k < {len(inputs)}; ++k) {{',
+            '                way = keys[middle][1 + k] - rint((x[k] - home[k]) / widths[level]);',
+            '            }',
+            '            if (way == 0.0) {',
+            '                return cells[middle];',
+            '            }',
+            '            if (way < 0.0) {',
+            '                low = middle + 1;',
+            '            } else {',
+            '                high = middle;',
+            '            }',
+            '        }',
+            '    }',
+            '    return NULL;',
             '}',
         ]
 

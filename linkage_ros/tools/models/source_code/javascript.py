@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from linkage_ros.kinematics.compiling import Kind
+from linkage_ros.kinematics import Grid
+from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
     GIVEN,
     Language,
@@ -67,6 +68,11 @@ class JavaScript(Language):
     nearest = 'Math.round'
     status = 'Status.{}'
 
+    def write_call(self, operation: Operation, parts: list[str]) -> str:
+        if operation.name == 'found':
+            return f'({parts[0]} !== null)'
+        return super().write_call(operation, parts)
+
     def assign(self, name: str, text: str, kind: Kind = 'real') -> str:
         return f'const {name} = {text};'
 
@@ -88,6 +94,27 @@ class JavaScript(Language):
             '        }',
             '    }',
             f'    return {name}Rows[low];',
+            '}',
+        ]
+
+    def write_grid(self, name: str, grid: Grid) -> list[str]:
+        return [
+            f'const {name}Cells = new Map([',
+            *(
+                f"    ['{','.join(map(str, key))}', [{self.write_list(numbers)}]],"
+                for key, numbers in self.list_cells(grid)
+            ),
+            ']);',
+            f'function {name}(...inputs) {{',
+            f'    const home = [{self.write_list(grid.home)}];',
+            f'    for (const [level, width] of [{self.write_list(grid.widths)}].entries()) {{',
+            '        const places = inputs.map((x, k) => Math.round((x - home[k]) / width));',
+            f"        const cell = {name}Cells.get([level, ...places].join(','));",
+            '        if (cell) {',
+            '            return cell;',
+            '        }',
+            '    }',
+            '    return null;',
             '}',
         ]
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Grid
 from linkage_ros.kinematics.compiling import Kind, Operation
 from linkage_ros.tools.models.source_code.source import (
@@ -115,20 +114,6 @@ class PythonModule(Language):
             '',
             '',
         ]
-
-    def list_cells(
-        self, grid: Grid
-    ) -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
-        """Return level and place of each cell with its numbers."""
-        cells = grid.fill()
-        if cells is None:
-            raise DefinitionError(
-                'input',
-                f'{len(grid.home)} inputs move links that close only together, and within their '
-                'limits are too many cells',
-                'give these inputs limits, or narrower ones',
-            )
-        return sorted(cells.items())
 
     def return_status(self, status: str) -> str:
         return f'return ({", ".join([status, *["()"] * self._groups])})'

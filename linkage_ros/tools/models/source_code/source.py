@@ -210,14 +210,21 @@ class Language(ABC):
         Each but the last of the rows ends at one of ``ends``, which belongs to it.
         """
 
+    @abstractmethod
     def write_grid(self, name: str, grid: Grid) -> list[str]:
         """Write a function that returns the numbers of the cell at several inputs, or nothing."""
-        raise DefinitionError(
-            'links',
-            f'some close only together, by {len(grid.home)} inputs; their cells are written in '
-            'Python only',
-            'name the output x.py',
-        )
+
+    def list_cells(self, grid: Grid) -> list[tuple[tuple[int, ...], tuple[float, ...]]]:
+        """Return level and place of each cell, in order, and its numbers."""
+        cells = grid.fill()
+        if cells is None:
+            raise DefinitionError(
+                'input',
+                f'{len(grid.home)} inputs move links that close only together, and within their '
+                'limits are too many cells',
+                'give these inputs limits, or narrower ones',
+            )
+        return sorted(cells.items())
 
     def write_list(self, numbers: Sequence[float]) -> str:
         """Write numbers, separated by commas."""
