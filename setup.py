@@ -143,6 +143,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed', '*.pyi'],
+        f'{NAME}.tools.models.ros2_control': ['CMakeLists.txt', '*.cpp', '*.xml'],
         f'{NAME}.tools.study': ['*.css', '*.js'],
         f'{NAME}.tools.view': ['*.css', '*.js'],
         f'{NAME}.tools.view.pages': ['*.css', '*.js'],

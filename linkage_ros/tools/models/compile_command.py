@@ -7,35 +7,64 @@
 # language governing permissions and limitations under the License.
 
 """
-Write a linkage as source that stands alone: C, a C header, JavaScript or Python.
+Write a linkage as source that stands alone: C, a C header, JavaScript, Python, or a ROS package.
 
 The source holds one function that solves the linkage as this package does: position for
 --derivatives 0, velocity for 1, motion for 2. It returns a status, and the joints where there are
-any; its head says what it takes and gives.
+any; its head says what it takes and gives. --ros2-control writes a package with a transmission,
+whose actuators are the inputs.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+import re
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli import add_file, add_output, add_robot, robot_of
+from linkage_ros.cli import add_file, add_output, add_robot, bounded_number, robot_of
 from linkage_ros.description import atomic_write, linkage_content, read_any_closure
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
+from linkage_ros.tools.models.ros2_control import commanded_joints, write_package
 from linkage_ros.tools.models.source_code import C_NAME, c_name, LANGUAGES, Subject, write_source
 
 EXAMPLE = 'linkage compile four_bar -o four_bar.c'
+
+_PACKAGE = re.compile('[a-z](_?[a-z0-9])+')
+"""The names of packages that REP 144 allows."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
     add_robot(parser)
-    add_output(parser, LANGUAGES)
+    add_output(parser, LANGUAGES, '--ros2-control writes a package')
+    parser.add_argument(
+        '--ros2-control',
+        type=Path,
+        metavar='FOLDER',
+        help='write a package with a transmission of ros2_control; the name of the folder is that '
+        'of the package',
+    )
+    parser.add_argument(
+        '--driven-by',
+        action='append',
+        default=[],
+        metavar='JOINT',
+        help='a published joint that is given instead of an input; in a transmission, that is '
+        'commanded; may be repeated: as many as inputs',
+    )
+    parser.add_argument(
+        '--branch',
+        type=bounded_number(1, 1000, int),
+        metavar='NUMBER',
+        help='with --driven-by and one input, the branch that the crank is on; `linkage solve '
+        'FILE --joint JOINT=VALUE` shows them',
+    )
     parser.add_argument(
         '--derivatives', type=int, choices=(0, 1, 2), default=2,
         help='0: positions; 1: rates too; 2: accelerations too (default)',
@@ -50,12 +79,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the source."""
-    output: Path = arguments.output
-    language = LANGUAGES[output.suffix.lower()]
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file, robot_of(arguments))
     closure: Any = read_any_closure(content)
+    try:
+        if arguments.ros2_control is not None:
+            return _write_transmission(arguments, closure, file)
+        return _write_source(arguments, closure, file)
+    except DefinitionError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+
+
+def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> int:
+    output: Path | None = arguments.output
+    if output is None:
+        raise LinkageError('-o', 'names no file', 'write -o NAME.h, or --ros2-control FOLDER')
+    language = LANGUAGES[output.suffix.lower()]
     in_c = output.suffix.lower() in ('.c', '.h')
+    if arguments.driven_by:
+        closure = _driven_closure(closure, arguments.driven_by, arguments.branch)
     subject = Subject(
         closure,
         _source_name(file, arguments.name) if in_c else file.stem,
@@ -63,13 +105,43 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         arguments.derivatives,
         _requested_joints(closure, arguments.joints),
     )
-    try:
-        text = write_source(subject, language(subject))
-    except DefinitionError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
-    atomic_write(output, text.encode())
+    atomic_write(output, write_source(subject, language(subject)).encode())
     print(output)
     return 0
+
+
+def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path) -> int:
+    folder: Path = arguments.ros2_control
+    if arguments.output is not None:
+        raise LinkageError('-o', 'is for one source', 'leave out -o or --ros2-control')
+    name = folder.resolve().name
+    if not _PACKAGE.fullmatch(name):
+        raise LinkageError(
+            folder, f'{quote(name)} is no name of a ROS package',
+            'use lower-case letters, digits and _, as in gripper_transmission',
+        )  # fmt: skip
+    if folder.exists() and not (arguments.force and folder.is_dir()):
+        raise LinkageError(
+            folder, 'exists already', 'name another, or add --force to write into it'
+        )
+    commanded = commanded_joints(closure, arguments.driven_by)
+    inverse = _driven_closure(closure, commanded, arguments.branch)
+    joints = _requested_joints(closure, arguments.joints)
+    joints = tuple(dict.fromkeys((*commanded, *joints)))
+    for path, text in write_package(closure, inverse, name, file.name, joints).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        atomic_write(folder / path, text.encode())
+    print(folder)
+    return 0
+
+
+def _driven_closure(closure: Any, joints: Sequence[str], branch: int | None) -> Any:
+    """Return the linkage with other joints as its inputs."""
+    if branch is None:
+        return closure.driven_by(*joints)
+    if len(closure.input_names) > 1 or not isinstance(closure, Closure):
+        raise LinkageError('--branch', 'is for planar linkages of one input', 'leave it out')
+    return closure.driven_by(*joints, branch=branch)
 
 
 def _source_name(file: Path, typed: str | None) -> str:

@@ -57,6 +57,8 @@ class C(Language):
         Prefix of the names of the source.
     header
         Whether the source is a header that is included, or a file that is compiled.
+    jacobian
+        Whether the function gives the joints and their derivatives by the inputs.
 
     """
 
@@ -66,13 +68,16 @@ class C(Language):
     nearest = 'rint'
     comment = '/* {} */'
 
-    def __init__(self, name: str, *, header: bool) -> None:
+    def __init__(self, name: str, *, header: bool, jacobian: bool = False) -> None:
         self._name = name
         self._header = header
+        self._jacobian = jacobian
+        self._returned = (RETURNED[0], 'jacobian') if jacobian else RETURNED
         self.status = f'{name.upper()}_{{}}'
 
     def function_name(self, derivatives: int) -> str:
-        return f'{self._name}_{super().function_name(derivatives)}'
+        name = 'jacobian' if self._jacobian else super().function_name(derivatives)
+        return f'{self._name}_{name}'
 
     def write_call(self, operation: Operation, parts: list[str]) -> str:
         if operation.name == '**' and parts[1] == '2.0':
@@ -151,7 +156,7 @@ class C(Language):
     def return_solution(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
         lines = [
             f'{array}[{index}] = {text};'
-            for array, group in zip(RETURNED, groups, strict=False)
+            for array, group in zip(self._returned, groups, strict=False)
             for index, text in enumerate(group)
         ]
         return [*lines, f'return {status};']
@@ -183,6 +188,8 @@ class C(Language):
             *(f'const double {array}[{driven}]' for array in GIVEN[: 1 + subject.derivatives]),
             *(f'double {array}[{joints}]' for array in RETURNED[: 1 + subject.derivatives]),
         ]
+        if self._jacobian:
+            parameters.append(f'double jacobian[{joints * driven}]')
         last = len(parameters) - 1
         signature = [
             f'{kind} {function}(',

@@ -106,6 +106,9 @@ class Subject(NamedTuple):
     frames
         Whether the frames of links and their rates are wanted too; for JavaScript of a page, with
         two derivatives.
+    jacobian
+        Whether the derivatives of the joints by the inputs are wanted, row by row; for C, with no
+        derivatives by time.
 
     """
 
@@ -115,6 +118,7 @@ class Subject(NamedTuple):
     derivatives: int
     joints: tuple[str, ...]
     frames: bool = False
+    jacobian: bool = False
 
 
 class Language(ABC):
@@ -275,6 +279,11 @@ def compile_subject(subject: Subject) -> Program:
         groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
         if subject.frames:
             groups += frame_values(closure, motion)
+        if subject.jacobian:
+            count = len(closure.input_names)
+            units = [[float(i == k) for i in range(count)] for k in range(count)]
+            columns = [closure.velocity(motion.position, *unit).joints for unit in units]
+            groups.append([column[i] for i in asked for column in columns])
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
     return compile_program(closure, subject.derivatives, wanted_numbers)
@@ -530,6 +539,8 @@ def head_lines(subject: Subject, function: str) -> Iterator[str]:
         unit = 'rad' if isinstance(linkage.joints[name], RevoluteJoint) else 'm'
         yield f'  {RETURNED[0]}[{index}]  {comment_text(name)} [{unit}]'
     yield from _derived_names(subject, RETURNED)
+    if subject.jacobian:
+        yield '  jacobian[]  for each joint its derivative by each input'
     yield ''
     yield 'Angles are not wrapped to one turn. The function returns a status:'
     for index, (name, text) in enumerate(STATUSES.items()):

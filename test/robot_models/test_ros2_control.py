@@ -1,0 +1,293 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+A linkage as a transmission of ros2_control, compiled against a stand-in of its headers.
+
+The real ones, with a ResourceManager and a joint_trajectory_controller, take minutes to build;
+docs/how_to/ros2_control.md says what was run with them.
+"""
+
+from pathlib import Path
+from random import Random
+import shutil
+import subprocess
+from typing import NamedTuple
+
+from linkage_ros.cli.main import main
+from linkage_ros.description import load
+from linkage_ros.tools.models.source_code import STATUSES
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.skipif(shutil.which('c++') is None, reason='needs c++')
+
+STAND_IN = Path(__file__).parent / 'ros2_control_stand_in'
+NUMBERS = {name: number for number, name in enumerate(STATUSES)}
+
+
+class Case(NamedTuple):
+    """A transmission: its linkage, commanded joints, and how far its inputs go from where."""
+
+    linkage: str
+    commanded: tuple[str, ...]
+    middle: tuple[float, ...]
+    reach: float
+    options: tuple[str, ...] = ()
+
+
+CASES = {
+    'finger': Case('gripper', ('left_finger_joint',), (0.35,), 0.3),
+    'rocker': Case('four_bar', ('rocker_joint',), (1.2,), 0.5, ('--branch', '1')),
+    'class III': Case('class_3', ('platform_joint',), (0.4,), 0.1, ('--branch', '1')),
+    'two cranks': Case('five_bar', (), (1.05, 1.05), 0.2),
+    'ankle': Case('ankle_motors', (), (0.0, 0.0), 0.4),
+    'delta': Case('delta', ('x', 'y', 'z'), (0.0, 0.0, 0.0), 0.2),
+    'RSSR': Case('rssr', ('rocker_joint',), (-1.2,), 0.8),
+}
+
+
+def write(folder, linkage, commanded=(), options=()):
+    """Write a package; return its folder."""
+    package = folder / f'{linkage}_transmission'
+    typed = [word for name in commanded for word in ('--driven-by', name)]
+    assert main(['compile', linkage, '--ros2-control', str(package), *typed, *options]) == 0
+    return package
+
+
+def build(package):
+    """Compile a package with the stand-in; return the program that drives it."""
+    program = package / 'driver'
+    sources = [STAND_IN / 'driver.cpp', package / 'src' / 'transmission.cpp']
+    subprocess.run(
+        ['c++', '-std=c++17', '-O2', '-Wall', '-Wextra', '-Wpedantic', '-Werror',
+         '-ffp-contract=off', f'-I{STAND_IN}', f'-I{package / "src"}', *map(str, sources),
+         '-o', str(program), '-pthread'],
+        check=True, timeout=120,
+    )  # fmt: skip
+    return program
+
+
+def run(program, lines):
+    """Return the answers of the driver, and what it wrote as errors."""
+    done = subprocess.run(
+        [str(program)], input='\n'.join(lines) + '\n', capture_output=True, text=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+    return [line.split() for line in done.stdout.splitlines()], done.stderr
+
+
+def say(what, values):
+    return ' '.join([what, *(float(value).hex() for value in np.ravel(values))])
+
+
+def numbers_of(answer):
+    """Return position, velocity and effort by rows, the status, and the count of allocations."""
+    *values, status, allocated = answer
+    table = np.array([float.fromhex(value) for value in values]).reshape(-1, 3)
+    return table, int(status), int(allocated)
+
+
+@pytest.fixture(scope='module')
+def programs(tmp_path_factory):
+    """Return a function that builds the program of a case once."""
+    built = {}
+
+    def program_of(name):
+        if name not in built:
+            case = CASES[name]
+            folder = tmp_path_factory.mktemp('transmissions')
+            built[name] = build(write(folder, case.linkage, case.commanded, case.options))
+        return built[name]
+
+    return program_of
+
+
+def described(closure, joints, commanded, reductions, offsets=None):
+    """Return the lines that describe a transmission."""
+    offsets = offsets or {}
+    lines = [
+        f'actuator {name}_motor {name} {reduction} 0'
+        for name, reduction in zip(closure.input_names, reductions, strict=True)
+    ]
+    lines += [
+        f'joint {name} {name} 1 {offsets.get(name, 0.0)}' + ' position' * (name in commanded)
+        for name in joints
+    ]
+    return [*lines, 'configure']
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_motors_move_joints_and_commands_move_motors(programs, name):
+    """Numbers are those of the closure; efforts are those of virtual work."""
+    case, closure, random = CASES[name], load(CASES[name].linkage), Random(name)
+    count = len(closure.input_names)
+    commanded = case.commanded or closure.joint_names
+    joints = list(dict.fromkeys((*commanded, *closure.joint_names)))
+    reductions = [2.0 + k for k in range(count)]
+    offsets = {commanded[0]: 0.25}
+    lines, given = described(closure, joints, commanded, reductions, offsets), []
+    for _ in range(60):
+        at = [value + random.uniform(-case.reach, case.reach) for value in case.middle]
+        rates, efforts = ([random.uniform(-2.0, 2.0) for _ in range(count)] for _ in range(2))
+        position = closure.position(*at)
+        assert position.status.name == 'CLOSED'
+        velocity = closure.velocity(position, *rates)
+        given.append((np.array([at, rates, efforts]), position, velocity))
+        lines.append(say('to_joints', np.array([at, rates, efforts]).T * motor_units(reductions)))
+        table = np.array([[position[j], velocity[j], 0.0] for j in joints])
+        table[0, 0] += 0.25
+        table[:count, 2] = [random.uniform(-2.0, 2.0) for _ in commanded]
+        lines.append(say('to_actuators', table))
+        given.append((table, at, rates))
+    answers, errors = run(programs(name), lines)
+    assert errors == ''
+    for (inputs, position, velocity), told in zip(given[::2], answers[::2], strict=True):
+        found, status, allocated = numbers_of(told)
+        assert (status, allocated) == (0, 0)
+        expected = [position[j] + offsets.get(j, 0.0) for j in joints]
+        assert found[:, 0] == pytest.approx(expected, rel=1e-14, abs=1e-14)
+        size = 1.0 + np.abs(found[:, 1]).max()
+        assert found[:, 1] == pytest.approx([velocity[j] for j in joints], abs=1e-12 * size)
+        power = found[:, 1] @ found[:, 2]
+        assert power == pytest.approx(inputs[1] @ inputs[2], abs=1e-11 * (1.0 + abs(power)))
+        assert not found[count:, 2].any()
+    for (table, at, rates), told in zip(given[1::2], answers[1::2], strict=True):
+        found, status, allocated = numbers_of(told)
+        assert (status, allocated) == (0, 0)
+        found = found / motor_units(reductions)
+        assert found[:, 0] == pytest.approx(at, abs=1e-12)
+        assert found[:, 1] == pytest.approx(rates, abs=1e-10)
+        power = table[:, 1] @ table[:, 2]
+        assert found[:, 1] @ found[:, 2] == pytest.approx(power, abs=1e-10 * (1.0 + abs(power)))
+
+
+def motor_units(reductions):
+    """Return the units of position, velocity and effort before gears, by actuators."""
+    return np.array([[n, n, 1.0 / n] for n in reductions])
+
+
+FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joint 1 0 position']
+
+
+@pytest.mark.parametrize(
+    ('typed', 'status'),
+    [
+        ('-0.9', 'OPEN'),  # beyond the limit of the motor, 42.4 degrees
+        ('0.1', 'OPEN'),
+        ('nan', 'INDETERMINATE'),
+        ('inf', 'INDETERMINATE'),
+        ('1e300', 'OPEN'),
+    ],
+)
+def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
+    programs, typed, status
+):
+    lines = [*FINGER, 'configure', 'to_actuators -0.3 0 0', f'to_actuators {typed} 1 1',
+             'sleep 1200', 'to_actuators -0.4 0 0']  # fmt: skip
+    answers, errors = run(programs('finger'), lines)
+    (good, before, _), (kept, told, allocated), (after, last, _) = map(numbers_of, answers)
+    assert (before, told, last, allocated) == (0, NUMBERS[status], 0, 0)
+    assert good[0] == pytest.approx([0.3, 0.0, 0.0], abs=1e-14)
+    assert kept.tolist() == good.tolist()
+    assert after[0, 0] == pytest.approx(0.4, abs=1e-14)
+    (line,) = errors.splitlines()
+    assert f': {status}; the last valid command stays' in line
+
+
+def test_states_beyond_limits_are_told_and_commands_are_not_taken(programs):
+    lines = [*FINGER, 'configure', 'to_joints 0.8 0 0', 'to_actuators -0.8 0 0']
+    answers, _ = run(programs('finger'), lines)
+    (joints, state, _), (actuators, command, _) = map(numbers_of, answers)
+    assert (state, command) == (NUMBERS['LIMITED'], NUMBERS['OPEN'])
+    assert joints[0, 0] == pytest.approx(-0.8, abs=1e-14)
+    assert actuators[0, 0] == 0.8
+
+
+def test_another_assembly_is_not_the_commanded_one(programs):
+    lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
+    answers, _ = run(programs('ankle'), [*lines, 'to_actuators 9 0 0 -0.5 0 0'])
+    found, status, _ = numbers_of(answers[0])
+    assert status == NUMBERS['OPEN']
+    assert not found.any()
+
+
+def test_velocities_and_efforts_alone_are_at_the_last_state(programs):
+    lines = [*FINGER, 'configure position velocity', 'to_joints 0.3 0 0', 'to_actuators -0.3 2 0']
+    answers, _ = run(programs('finger'), lines)
+    found, _, _ = numbers_of(answers[1])
+    assert found[0] == pytest.approx([0.3, -2.0, 0.0], abs=1e-14)
+
+
+WRONG = {
+    'no linkage has no actuator motor; write a role of left_knuckle_joint': [
+        'actuator m motor 1 0', FINGER[1]],
+    'no actuator has the role left_knuckle_joint; add it': [FINGER[1]],
+    'no joint has the role left_finger_joint; add it': [
+        FINGER[0], 'joint r right_finger_joint 1 0'],
+    'joint right: has command interfaces, but only left_finger_joint can be commanded; leave them '
+    'out, or compile with --driven-by right_finger_joint': [
+        *FINGER, 'joint right right_finger_joint 1 0 position'],
+    'joint finger: has a reduction; give it to an actuator': [
+        FINGER[0], 'joint finger left_finger_joint 2 0'],
+    'actuator motor: its reduction is 0, or it has an offset; give offsets to joints': [
+        'actuator motor left_knuckle_joint 0 0', FINGER[1]],
+    'joint with the role left_finger_joint is given twice; leave one out': [
+        *FINGER, 'joint again left_finger_joint 1 0'],
+}  # fmt: skip
+"""What the loader says of a wrong URDF."""
+
+
+@pytest.mark.parametrize('told', WRONG)
+def test_the_loader_says_what_is_wrong(programs, told):
+    answers, errors = run(programs('finger'), [*WRONG[told], 'configure'])
+    assert answers == []
+    assert told.removeprefix('no linkage has ') in errors
+    assert len(errors.splitlines()) == 1
+
+
+def test_an_actuator_without_a_position_is_refused(programs):
+    _, errors = run(programs('finger'), [*FINGER, 'configure effort'])
+    assert errors == 'ERROR arm: an actuator has no position; the linkage needs all of them\n'
+
+
+REFUSED = {
+    '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': [],
+    '2 for 1 inputs; name 1 different joint': [
+        '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
+    'left_fnger_joint: is neither a published joint': ['--driven-by', 'left_fnger_joint'],
+    '--branch: is for planar linkages of one input': ['ankle_motors', '--branch', '1'],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('told', REFUSED)
+def test_what_cannot_be_written_is_one_line(told, tmp_path, capsys):
+    words = REFUSED[told]
+    linkage = words[:1] if words and not words[0].startswith('-') else ['gripper']
+    options = words[len(linkage) if words[:1] == linkage else 0 :]
+    typed = ['compile', *linkage, '--ros2-control', str(tmp_path / 'arm'), *options]
+    assert main(typed) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line
+    assert not (tmp_path / 'arm').exists()
+
+
+@pytest.mark.parametrize('name', ['Arm', '9arm', 'my-arm', 'a__b', 'arm_'])
+def test_a_package_has_a_name_that_ros_allows(name, tmp_path, capsys):
+    assert main(['compile', 'ankle_motors', '--ros2-control', str(tmp_path / name)]) == 2
+    assert 'is no name of a ROS package; use lower-case letters' in capsys.readouterr().err
+
+
+def test_a_folder_that_exists_is_not_written_into_without_force(tmp_path, capsys):
+    folder = write(tmp_path, 'ankle_motors')
+    (folder / 'mine').write_text('mine')
+    typed = ['compile', 'ankle_motors', '--ros2-control', str(folder)]
+    assert main(typed) == 2
+    assert 'exists already; name another, or add --force' in capsys.readouterr().err
+    assert main([*typed, '--force']) == 0
+    assert (folder / 'mine').read_text() == 'mine'
