@@ -37,6 +37,7 @@ from bench.ticks import (
     TickPlan,
     with_parameters,
 )
+from bench.transmissions import measure_transmissions
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 
 SLOW, FAST = 1000.0, 10_000.0
@@ -108,6 +109,8 @@ def main() -> int:
                 tables += [measure_gallery(*amount), measure_chains(*amount, picture)]
                 amount = (1, 20_000) if arguments.quick else (11, 1_000_000)
                 tables.append(measure_arrays(folder, *amount))
+                amount = (1, 20_000) if arguments.quick else (11, 500_000)
+                tables.append(measure_transmissions(folder, *amount))
     except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1
