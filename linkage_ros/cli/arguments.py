@@ -18,7 +18,7 @@ import re
 from typing import Any, NamedTuple
 
 from linkage_ros.description import check_kind, check_new, check_output_name, TABLE_KINDS, Units
-from linkage_ros.errors import decimal_comma, LinkageError, list_names
+from linkage_ros.errors import decimal_comma, LinkageError, list_names, quote
 from linkage_ros.kinematics import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -175,23 +175,25 @@ def add_at(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument(
         '--at',
         action='append',
-        type=read_numbers,
+        nargs='+',
+        type=read_input,
         default=[],
         metavar='VALUE',
-        help=f'{text}; several inputs with commas: --at 40,20; --at=-40,20 where it begins with a '
-        'minus',
+        help=f'{text}; of several inputs, in their order: --at 10 -5',
     )
 
 
-def read_numbers(text: str) -> tuple[float, ...]:
-    """Read numbers separated by commas."""
+def read_input(text: str) -> float:
+    """Read the value of one input; the next word is that of the next."""
     try:
-        numbers = tuple(float(part) for part in text.split(','))
+        number = float(text)
     except ValueError:
-        numbers = ()
-    if not numbers or not all(map(isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number; write 40, or 40,20')
-    return numbers
+        number = nan
+    if not isfinite(number):
+        remedy = 'write 40, or 10 -5 for two inputs; FILE comes before the option'
+        more = decimal_comma(text)
+        raise argparse.ArgumentTypeError(f'{quote(text)} is not a number; {remedy}{more}')
+    return number
 
 
 def bounded_number(least: float, most: float, kind: type[float] = float) -> Callable[[str], Any]:
@@ -219,10 +221,9 @@ def read_inputs(
     given = linkage.inputs
     if len(typed) != len(given):
         raise LinkageError(
-            f'{option} {",".join(f"{value:g}" for value in typed)}',
+            f'{option} {" ".join(f"{value:g}" for value in typed)}',
             f'{len(typed)} value(s) for {len(given)} input(s)',
-            f'write {option} {",".join(driven.joint.upper() for driven in given)}'
-            + decimal_comma(','.join(f'{value:g}' for value in typed)),
+            f'write {option} {" ".join(driven.joint.upper() for driven in given)}',
         )
     return tuple(
         units.to_si(value, driven.unit) for value, driven in zip(typed, given, strict=True)

@@ -40,6 +40,7 @@ from linkage_ros.kinematics import (
     conditioning_curves,
     Driven,
     Dyad,
+    find_standing_state,
     find_worst_states,
     four_bars,
     Group,
@@ -54,6 +55,7 @@ from linkage_ros.kinematics import (
     StepwiseClosure,
     SweptCurve,
     transmission_angles,
+    turning_points,
     usual_inputs,
 )
 from linkage_ros.resources import named_file
@@ -125,7 +127,7 @@ def describe_linkage(
     account |= tables_json(tables[1:])
     # Most of the time goes by here.
     parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
-        *(_examine_reach, _examine_states, _other_assemblies),
+        *(_examine_reach, _examine_states, _examine_joints, _other_assemblies),
         *(_transmission_table, _conditioning_table),
     )
     for index, part in enumerate(parts):
@@ -252,6 +254,14 @@ def _examine_states(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict
     }
 
 
+def _examine_joints(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+    """Return where joints turn back, or of several inputs where they stand together."""
+    if len(closure.linkage.inputs) > 1:
+        return {'turning_points': None, 'joints_stand_at': find_standing_state(closure)}
+    turns = [{'joint': name, 'inputs': at} for name, at in turning_points(closure).items()]
+    return {'turning_points': turns, 'joints_stand_at': None}
+
+
 def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
     """Return for each iterated group the other assemblies that a pose could name."""
     pose = closure.linkage.pose
@@ -349,6 +359,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'limits': _limits_json(linkage),
         **_examine_reach(closure, sweep),
         **_examine_states(closure, sweep),
+        **_examine_joints(closure, sweep),
         'robot_open_by_m': linkage.open_by,
         'left_out': list(linkage.left_out),
         'groups': [group._asdict() for group in closure.groups],

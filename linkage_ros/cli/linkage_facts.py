@@ -96,6 +96,8 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     if (nearest := account['nearest_singularity']) and nearest['group']:
         where = f'of group {nearest["group"]}, at {place_text(nearest["inputs"])}'
         yield 'nearest singularity', f'conditioning {nearest["conditioning"]:.2g} {where}'
+    if stand := account['joints_stand_at']:
+        yield 'joints stand', f'in one direction, though inputs move, at {place_text(stand)}'
     residual = units.format_length(worst['residual_m'], '.1e')
     yield (
         'worst residual',
@@ -134,6 +136,10 @@ def _range_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
         ]
         if places or status is not Status.INDETERMINATE:
             yield name, ', '.join(places) or 'none'
+    for each in account['turning_points']:
+        at = sorted(_brought_within(one, account['ranges'], turning) for one in each['inputs'])
+        places = [units.value_text(value, turning) for value in at]
+        yield 'turns back', f'{each["joint"]} at {", ".join(places)}'
 
 
 def _brought_within(value: float, ranges: Sequence[Mapping[str, Any]], turning: bool) -> float:

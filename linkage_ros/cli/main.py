@@ -79,6 +79,9 @@ EXIT_CODES = {
 }
 """The exit codes of all commands."""
 
+# A word that is no option: argparse itself takes -1e-5 for one.
+_NEGATIVE = re.compile(r'-\.?\d')
+
 # What argparse says of a value that its type does not read.
 _INVALID = re.compile(r"invalid (?:float|int|number|(whole) number) value: ('(.*)')")
 
@@ -95,6 +98,10 @@ def _in_plain_words(found: re.Match[str]) -> str:
 
 class Parser(argparse.ArgumentParser):
     """A parser that answers a wrong word in one line, with the nearest right one."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._negative_number_matcher = _NEGATIVE
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse; refuse unknown options first, which argparse reports only after all others."""

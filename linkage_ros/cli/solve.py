@@ -30,9 +30,9 @@ from linkage_ros.cli.arguments import (
     add_robot,
     bounded_number,
     DisplayUnits,
+    read_input,
     read_inputs,
     read_joint_value,
-    read_numbers,
     robot_of,
     wrap_angle,
 )
@@ -105,12 +105,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_radians(parser, 'type angles, and show them in the table,')
     parser.add_argument(
         '--rate',
-        type=read_numbers,
+        nargs='+',
+        type=read_input,
         metavar='VALUE',
         help='rate of the input, per second: adds rates',
     )
     parser.add_argument(
-        '--acceleration', type=read_numbers, metavar='VALUE',
+        '--acceleration', nargs='+', type=read_input, metavar='VALUE',
         help='acceleration of the input, per second squared: adds rates and accelerations',
     )  # fmt: skip
     parser.add_argument(

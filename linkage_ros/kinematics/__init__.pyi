@@ -173,6 +173,10 @@ from linkage_ros.kinematics.space.vectors import (
     Vector as Vector,
     ZERO as ZERO,
 )
+from linkage_ros.kinematics.standing_joints import (
+    find_standing_state as find_standing_state,
+    turning_points as turning_points,
+)
 from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (

@@ -42,7 +42,7 @@ from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import golden_section, last_inside, sample_inputs
-from linkage_ros.kinematics.results import InputRange, PlanarClosure
+from linkage_ros.kinematics.results import InputRange, LoopClosure, PlanarClosure
 from linkage_ros.kinematics.start_table import StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
@@ -91,18 +91,23 @@ class Output(NamedTuple):
         return 'rad' if self.turning else 'm'
 
 
+def joint_output(closure: LoopClosure, name: str) -> Output:
+    """Return a published joint as an output."""
+    number = closure.joint_names.index(name)
+
+    def joint_values(motion: TracedMotion) -> Sequence[Sequence[float]]:
+        end = number + 1
+        return [part.joints[number:end] for part in motion if part is not None]
+
+    return Output(name, closure.turning[number], joint_values, closure.linkage.joints[name])
+
+
 def output_named(closure: PlanarClosure, name: str) -> Output:
     """Return the output of a name, such as ``rocker_joint`` or ``P.x``; refuse unknown names."""
     if name in closure.input_names:
         raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
     if name in closure.joint_names:
-        number = closure.joint_names.index(name)
-
-        def joint_values(motion: TracedMotion) -> Sequence[Sequence[float]]:
-            end = number + 1
-            return [part.joints[number:end] for part in motion if part is not None]
-
-        return Output(name, closure.turning[number], joint_values, closure.linkage.joints[name])
+        return joint_output(closure, name)
     point, _, axis = name.rpartition('.')
     traced = [f'{each}.{way}' for each in closure.linkage.traced for way in 'xy']
     if name not in traced:
@@ -419,7 +424,7 @@ class CrankBranch:
 class OutputFunction:
     """An output over the crank, with its slope, both NaN where the linkage does not close."""
 
-    def __init__(self, closure: PlanarClosure, output: Output) -> None:
+    def __init__(self, closure: LoopClosure, output: Output) -> None:
         compiled = Compiled(closure, 1, output.wanted, within_limits=False)
         self._compiled = compiled
         self.fast = compiled.fast
@@ -438,7 +443,7 @@ class OutputFunction:
 
 
 def crank_branches(
-    closure: PlanarClosure, output: Output, *, limited: bool = True
+    closure: LoopClosure, output: Output, *, limited: bool = True
 ) -> list[CrankBranch]:
     """
     Return the branches of an output over a single input, by the crank at which they begin.

@@ -297,7 +297,13 @@ def _pose_conditioning(closure: LoopClosure, position: Position) -> float:
 def grid_positions(
     closure: LoopClosure, count: int = _GRID
 ) -> Iterator[tuple[tuple[float, ...], Position]]:
-    """Yield positions on a grid over all inputs: one turn each, or the reach of a slide."""
+    """Yield positions on a grid over all inputs."""
+    for inputs in inputs_on_grid(closure, count):
+        yield inputs, closure.position(*inputs)
+
+
+def inputs_on_grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[float, ...]]:
+    """Yield a grid over all inputs: one turn each, or the reach of a slide."""
     ways, inputs_count = [], len(closure.linkage.inputs)
     most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
     most = most if inputs_count <= _FEW else _MOST_OF_MANY
@@ -315,8 +321,7 @@ def grid_positions(
             ways.append([low + (high - low) * i / count for i in range(count + 1)])
         else:
             ways.append([tau * i / count for i in range(count)])
-    for inputs in product(*ways):
-        yield inputs, closure.position(*inputs)
+    yield from product(*ways)
 
 
 def find_extremes(

@@ -111,8 +111,8 @@ def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
         assert now[f'{name} acceleration'] == pytest.approx(change, rel=1e-4, abs=1e-4)
 
 
-def test_several_inputs_come_with_commas(linkage: Run) -> None:
-    answer = linkage(*('solve', shipped('five_bar'), '--at', '120,60', '--points', '--json'))
+def test_several_inputs_are_separate_words(linkage: Run) -> None:
+    answer = linkage(*('solve', shipped('five_bar'), '--at', '120', '60', '--points', '--json'))
     (state,) = json.loads(answer.stdout)['states']
     assert (state['left_crank_joint'], state['right_crank_joint']) == (radians(120), radians(60))
     assert state['P.x'] == pytest.approx(0.06, abs=1e-15)  # in the middle, by symmetry
