@@ -6,180 +6,256 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 """
-The steps in space to 80 digits, by forms of their own: law of cosines, planes of two spheres.
+The steps in space in balls of 256 bits, by forms of their own: law of cosines, planes of spheres.
 
-Rates and accelerations are differences of these values along the motion of the points, and κ is by
-differences in each number that is given.
+Every number is a power series in time: rate and acceleration are coefficients, as in
+`campaigns.accuracy.motion`. A tape keeps what each was made of, δy(t) = Σ slope(t)·δx(t), with
+slopes that are power series as well. So one way back from a result has its derivatives by all that
+is given, and with them κ.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import pi
 from typing import Any
 
-from mpmath import mp, mpf
+from campaigns.accuracy.motion import ORDER
+from campaigns.accuracy.reference import FACTORIALS, PRECISIONS, UNIT_ROUNDOFF
+from flint import arb, arb_series, ctx
 
-DIGITS = 80
-_UNIT_ROUNDOFF = mpf(2) ** -53
-_STEP = mpf(10) ** -25
-
-Row = list[mpf]
-
-
-def moved(place: Sequence[Any], velocity: Sequence[Any], change: Sequence[Any], t: Any) -> Row:
-    """Return a point at a time."""
-    return [p + v * t + a * t * t / 2 for p, v, a in zip(place, velocity, change, strict=True)]
+_CORRECT = 2.0**-163
+"""Maximum width of a result, relative to κ: fifty digits."""
 
 
-def dot(one: Sequence[Any], other: Sequence[Any]) -> Any:
+class Tape:
+    """All series of a case, in the order in which they are made."""
+
+    def __init__(self) -> None:
+        ctx.prec, ctx.cap = PRECISIONS[0], ORDER
+        self.sources: list[tuple[tuple[int, Any], ...]] = []  # Of each: index and slope
+        self.widths: dict[int, Sequence[float]] = {}  # By which κ varies what is given
+
+    def number(self, *motion: Any) -> Series:
+        """Return a given number, or value, rate and acceleration of a given motion."""
+        orders = [arb(part) / factor for part, factor in zip(motion, FACTORIALS, strict=False)]
+        series = Series(self, arb_series(orders))
+        self.widths[series.index] = [abs(float(part)) for part in motion]
+        return series
+
+    def row(self, *motion: Sequence[Any]) -> Row:
+        """Return a given vector, or a moving point."""
+        return [self.number(*parts) for parts in zip(*motion, strict=True)]
+
+    def distance(self, one: Sequence[float], other: Sequence[float]) -> Series:
+        """Return the exact distance of two places, as a number of its own."""
+        squares = ((arb(a) - arb(b)) ** 2 for a, b in zip(one, other, strict=True))
+        return self.number(sum(squares, arb(0)).sqrt())
+
+
+class Series:
+    """A power series in time on a tape, made of others."""
+
+    __slots__ = ('index', 'tape', 'value')
+
+    def __init__(self, tape: Tape, value: Any, *sources: tuple[Series, Any]) -> None:
+        self.tape, self.value, self.index = tape, value, len(tape.sources)
+        tape.sources.append(tuple([(one.index, slope) for one, slope in sources]))
+
+    def __add__(self, other: Series) -> Series:
+        return Series(self.tape, self.value + other.value, (self, 1), (other, 1))
+
+    def __sub__(self, other: Series) -> Series:
+        return Series(self.tape, self.value - other.value, (self, 1), (other, -1))
+
+    def __mul__(self, other: Series) -> Series:
+        a, b = self.value, other.value
+        return Series(self.tape, a * b, (self, b), (other, a))
+
+    def __truediv__(self, other: Series) -> Series:
+        part = other.value.inv()
+        value = self.value * part
+        return Series(self.tape, value, (self, part), (other, -value * part))
+
+    def times(self, factor: float) -> Series:
+        """Return a multiple."""
+        return Series(self.tape, self.value * factor, (self, factor))
+
+    def sqrt(self) -> Series:
+        """Return the root."""
+        value = self.value.sqrt()
+        return Series(self.tape, value, (self, 0.5 * value.inv()))
+
+    def acos(self) -> Series:
+        """Return the angle of a cosine, in [0, π]."""
+        value = self.value
+        return Series(self.tape, value.acos(), (self, -((1 - value * value).rsqrt())))
+
+    def cos_sin(self) -> tuple[Series, Series]:
+        """Return cosine and sine."""
+        s, c = self.value.sin_cos()
+        return Series(self.tape, c, (self, -s)), Series(self.tape, s, (self, c))
+
+    def slopes(self) -> list[Any]:
+        """Return the derivative by each series of the tape up to this one; None if it is 0."""
+        found: list[Any] = [None] * (self.index + 1)
+        found[-1] = arb_series([1])
+        for index in range(self.index, -1, -1):
+            slope = found[index]
+            if slope is not None:
+                for source, factor in self.tape.sources[index]:
+                    more, before = slope * factor, found[source]
+                    found[source] = more if before is None else before + more
+        return found
+
+    def orders(self) -> list[Any]:
+        """Return value, rate and acceleration."""
+        return [self.value[k] * factor for k, factor in enumerate(FACTORIALS)]
+
+    def sizes(self, widths: Mapping[int, Sequence[float]]) -> list[float]:
+        """Return for each order its size and its changes, as each given one changes by a width."""
+        slopes, sums = self.slopes(), [abs(float(order)) for order in self.orders()]
+        for index, motion in widths.items():
+            slope = slopes[index] if index <= self.index else None
+            if slope is not None:
+                parts = [abs(float(slope[k])) for k in range(ORDER)]
+                for m, width in enumerate(motion):
+                    for k in range(m, ORDER) if width else ():
+                        sums[k] += FACTORIALS[k] / FACTORIALS[m] * parts[k - m] * width
+        return sums
+
+
+Row = list[Series]
+
+
+def errors_of(
+    result: Series,
+    found: Sequence[float],
+    floor: float | None = None,
+    passed: Sequence[Series] = (),
+) -> list[float]:
+    """
+    Return the errors of a value, its rate and its acceleration at the time 0, in u·κ.
+
+    With a ``floor`` the value is an angle modulo 2π, which counts as the floor at least.
+    ``passed`` are the coordinates of a point that a step passes to the next one. Its place,
+    velocity and acceleration are rounded, so each counts with its own κ.
+    """
+    given = result.tape.widths
+    kappa = result.sizes(given | {part.index: part.sizes(given) for part in passed})
+    off = [arb(one) - order for one, order in zip(found, result.orders(), strict=True)]
+    if floor is not None:
+        kappa[0] += max(floor - abs(float(result.value[0])), 0.0)
+        off[0] -= 2 * round(float(off[0]) / (2 * pi)) * arb.pi()
+    errors = []
+    for error, size in zip(off, kappa, strict=True):
+        assert float(error.rad()) <= _CORRECT * size, 'fewer than fifty digits are proven'
+        errors.append(abs(float(error)) / (UNIT_ROUNDOFF * size) if error != 0 else 0.0)
+    return errors
+
+
+def dot(one: Row, other: Row) -> Series:
     """Return the scalar product."""
-    return sum(a * b for a, b in zip(one, other, strict=True))
+    pairs = [*zip(one, other, strict=True)]
+    first, *more = (a.value * b.value for a, b in pairs)
+    sources = [part for a, b in pairs for part in ((a, b.value), (b, a.value))]
+    return Series(one[0].tape, sum(more, first), *sources)
 
 
-def cross(one: Sequence[Any], other: Sequence[Any]) -> Row:
+def cross(one: Row, other: Row) -> Row:
     """Return the cross product."""
     (a, b, c), (d, e, f) = one, other
     return [b * f - c * e, c * d - a * f, a * e - b * d]
 
 
-def less(one: Sequence[Any], other: Sequence[Any]) -> Row:
+def less(one: Row, other: Row) -> Row:
     """Return the difference."""
     return [a - b for a, b in zip(one, other, strict=True)]
 
 
-def hinge_angle(place: Row, to: Row, rod: mpf, sign: int) -> mpf:
+def unit(vector: Row) -> Row:
+    """Return the direction of a vector."""
+    size = dot(vector, vector).sqrt()
+    return [part / size for part in vector]
+
+
+def angle_of(x: Series, y: Series) -> Series:
+    """Return the angle of a vector in a plane, by integration of its rate."""
+    a, b = x.value, y.value
+    over = (a * a + b * b).inv()
+    turn = (a * b.derivative() - b * a.derivative()) * over
+    value = turn.integral() + arb.atan2(b[0], a[0])
+    return Series(x.tape, value, (x, -b * over), (y, a * over))
+
+
+def hinge_angle(place: Row, to: Row, rod: Series, sign: int) -> Series:
     """Return the angle about z that brings a place to a distance from a point."""
     (a, b, h), (x, y, z) = place, to
-    r, d = mp.hypot(a, b), mp.hypot(x, y)
-    cosine = (r * r + d * d + (h - z) ** 2 - rod * rod) / (2 * r * d)
-    return mp.atan2(y, x) - mp.atan2(b, a) + sign * mp.acos(cosine)
+    rest = h - z
+    r, d = dot([a, b], [a, b]), dot([x, y], [x, y])
+    cosine = (r + d + (rest * rest - rod * rod)) / (r * d).sqrt().times(2.0)
+    return angle_of(x, y) - angle_of(a, b) + cosine.acos().times(sign)
 
 
-def slide_length(place: Row, to: Row, rod: mpf, sign: int) -> mpf:
+def slide_length(place: Row, to: Row, rod: Series, sign: int) -> Series:
     """Return the slide along z that brings a place to a distance from a point."""
     x, y, z = less(to, place)
-    return z + sign * mp.sqrt(rod * rod - x * x - y * y)
+    return z + (rod * rod - dot([x, y], [x, y])).sqrt().times(sign)
 
 
-def three_spheres(ends: Sequence[Row], rods: Sequence[Any], sign: int) -> Row:
+def three_spheres(ends: Sequence[Row], rods: Row, sign: int) -> Row:
     """Return the point of three spheres: on the line of two planes, by a quadratic equation."""
     start, one, other = ends
     d, e = less(one, start), less(other, start)
     normal = cross(d, e)
     # (X − P0)·d = (l0² − l1² + |d|²)/2, likewise e.
+    first = rods[0] * rods[0]
     sides = [
-        (rods[0] ** 2 - rod**2 + dot(edge, edge)) / 2 for rod, edge in ((rods[1], d), (rods[2], e))
+        (first - rod * rod + dot(edge, edge)).times(0.5)
+        for rod, edge in ((rods[1], d), (rods[2], e))
     ]
     square = dot(normal, normal)
-    first, second = cross(e, normal), cross(normal, d)
-    foot = [(sides[0] * p + sides[1] * q) / square for p, q in zip(first, second, strict=True)]
-    height = mp.sqrt((rods[0] ** 2 - dot(foot, foot)) / square)
-    return [s + f + sign * height * n for s, f, n in zip(start, foot, normal, strict=True)]
+    ways = zip(cross(e, normal), cross(normal, d), strict=True)
+    foot = [dot(sides, [*pair]) / square for pair in ways]
+    height = ((first - dot(foot, foot)) / square).sqrt().times(sign)
+    return [s + f + height * n for s, f, n in zip(start, foot, normal, strict=True)]
 
 
-def errors_of(
-    function: Callable[[Sequence[Any], Any], Any],
-    given: Sequence[float],
-    found: Sequence[float],
-    floor: Any = None,
-    passed: Callable[[Sequence[Any], Any], Row] | None = None,
-) -> list[float]:
-    """
-    Return the errors of a value, its rate and its acceleration at the time 0, in u·κ.
-
-    ``function`` takes the given numbers and the time. With a ``floor`` the value is an angle
-    modulo 2π, which counts as the floor at least. ``passed`` takes both and gives the point that
-    a step passes to the next one; ``function`` then takes this point instead of the time. Place,
-    velocity and acceleration of the point are rounded, so each counts with its own κ.
-    """
-    with mp.workdps(DIGITS):
-        exact = [mpf(number) for number in given]
-        sizes = [abs(number) for number in exact]
-
-        def whole(numbers: Sequence[Any], t: Any) -> Any:
-            return function(numbers, passed(numbers, t) if passed else t)
-
-        values, kappa = _orders(whole, exact), _sums_of_changes(whole, exact, sizes)
-        if passed:
-            parts = [partial(_part, passed, axis) for axis in range(3)]
-            orders = [_orders(part, exact) for part in parts]
-            spreads = [_sums_of_changes(part, exact, sizes) for part in parts]
-            # The three places, then the velocities, then the accelerations.
-            point, spread = (
-                [one[k] for k in range(3) for one in each] for each in (orders, spreads)
-            )
-            widths = [abs(n) + w for n, w in zip(point, spread, strict=True)]
-
-            def after(numbers: Sequence[Any], t: Any) -> Any:
-                return function(exact, moved(numbers[:3], numbers[3:6], numbers[6:], t))
-
-            more = _sums_of_changes(after, point, widths)
-            kappa = [one + other for one, other in zip(kappa, more, strict=True)]
-        off = [mpf(one) - value for one, value in zip(found, values, strict=True)]
-        kappa = [abs(value) + one for value, one in zip(values, kappa, strict=True)]
-        if floor is not None:
-            kappa[0] += max(floor - abs(values[0]), 0)
-            off[0] -= 2 * mp.pi * mp.nint(off[0] / (2 * mp.pi))
-        return [
-            float(abs(error) / (_UNIT_ROUNDOFF * size)) if error else 0.0
-            for error, size in zip(off, kappa, strict=True)
-        ]
+def turned_about(point: Row, at: Row, axis: Row, angle: Series) -> Row:
+    """Return a point turned about an axis of any length that passes a place (Rodrigues)."""
+    arm, way = less(point, at), unit(axis)
+    c, s = angle.cos_sin()
+    along = dot(way, arm)
+    parts = zip(at, arm, cross(way, arm), way, strict=True)
+    weights = [c, s, along - c * along]
+    return [a + dot(weights, [*rest]) for a, *rest in parts]
 
 
-def _orders(function: Callable[[Sequence[Any], Any], Any], numbers: Sequence[Any]) -> Row:
-    """Return a value, its rate and its acceleration at the time 0."""
-    before, now, after = (function(numbers, k * _STEP) for k in (-1, 0, 1))
-    return [now, (after - before) / (2 * _STEP), (after - 2 * now + before) / _STEP**2]
-
-
-def _sums_of_changes(
-    function: Callable[[Sequence[Any], Any], Any], numbers: Sequence[Any], widths: Sequence[Any]
-) -> Row:
-    """Return for each order the sum of its changes, as each number changes by its width."""
-    values, sums = _orders(function, numbers), [mpf(0)] * 3
-    for k, width in enumerate(widths):
-        if width:
-            beside = list(numbers)
-            beside[k] += width * mpf(10) ** -15
-            changes = zip(sums, _orders(function, beside), values, strict=True)
-            sums = [total + abs(one - value) * mpf(10) ** 15 for total, one, value in changes]
-    return sums
-
-
-def _part(function: Callable[..., Row], axis: int, numbers: Sequence[Any], t: Any) -> Any:
-    return function(numbers, t)[axis]
-
-
-def turn(vector: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:
-    """Return a vector turned about an axis of any length (Rodrigues)."""
-    size = mp.sqrt(dot(axis, axis))
-    unit = [part / size for part in axis]
-    c, s = mp.cos(angle), mp.sin(angle)
-    along, across = dot(unit, vector), cross(unit, vector)
-    return [
-        c * v + s * w + (1 - c) * along * u for v, w, u in zip(vector, across, unit, strict=True)
-    ]
-
-
-def turned_about(point: Sequence[Any], at: Sequence[Any], axis: Sequence[Any], angle: Any) -> Row:
-    """Return a point turned about an axis that passes a point."""
-    return [a + v for a, v in zip(at, turn(less(point, at), axis, angle), strict=True)]
-
-
-def angle_to_meet(
-    point: Sequence[Any], at: Sequence[Any], axis: Sequence[Any], to: Row, rod: Any, sign: int
-) -> mpf:
+def angle_to_meet(point: Row, at: Row, axis: Row, to: Row, rod: Series, sign: int) -> Series:
     """Return the angle about an axis that brings a point to a distance from another one."""
-    z = [part / mp.sqrt(dot(axis, axis)) for part in axis]
-    arm = less(point, at)
-    x = [a - dot(arm, z) * part for a, part in zip(arm, z, strict=True)]
-    x = [part / mp.sqrt(dot(x, x)) for part in x]
+    z, arm = unit(axis), less(point, at)
+    along = dot(arm, z)
+    x = unit([a - along * part for a, part in zip(arm, z, strict=True)])
     frame = (x, cross(z, x), z)
     place, beside = ([dot(way, each) for way in frame] for each in (arm, less(to, at)))
     return hinge_angle(place, beside, rod, sign)
 
 
-def exact_distance(one: Sequence[float], other: Sequence[float]) -> mpf:
-    """Return a distance of two places."""
-    with mp.workdps(DIGITS):
-        between = less([mpf(part) for part in one], [mpf(part) for part in other])
-        return mp.sqrt(dot(between, between))
+def root_near(orders: Sequence[Sequence[float]], gaps: Callable[[Row], Iterable[Series]]) -> Row:
+    """Return two unknowns whose two gaps are 0, by Newton's method from found orders."""
+    values = [Tape().number(*each).value for each in orders]
+    while True:
+        tape = Tape()
+        unknowns = [Series(tape, value) for value in values]
+        left = [*gaps(unknowns)]
+        (a, b), (c, d) = ([gap.slopes()[one.index] for one in unknowns] for gap in left)
+        over = (b * c - a * d).inv()
+        rows = (d * over, -b * over), (-c * over, a * over)
+        steps = [p * left[0].value + q * left[1].value for p, q in rows]
+        values = [value + step for value, step in zip(values, steps, strict=True)]
+        # The next step would be about the square of this one.
+        if max(abs(float(step[k])) for step in steps for k in range(ORDER)) < 2.0**-90:
+            return [
+                Series(tape, value, *zip(left, row, strict=True))
+                for value, row in zip(values, rows, strict=True)
+            ]

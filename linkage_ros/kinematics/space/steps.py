@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt
+from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt, where
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair
 from linkage_ros.kinematics.space.vectors import (
     add,
@@ -36,6 +36,7 @@ from linkage_ros.kinematics.space.vectors import (
     hypotenuse,
     length,
     minus,
+    multiply,
     plus,
     scale,
     SpaceFrame,
@@ -80,15 +81,18 @@ class ClosedPose(NamedTuple):
     gap: float = 0.0
     lever: float = 0.0  # What the rate divides by; its sign is the assembly
     angle: float = 0.0  # From a toggle, in [rad]
+    rod: Vector = ZERO  # From the known point to the carried one, of a joint
+    bend: float = 1.0  # Half the second derivative of the rod's square by the joint
 
 
 class ClosedRates(NamedTuple):
     """What the accelerations of a closed joint need."""
 
     rate: float
+    still: Twist  # Motion of the child at a rate of 0
     arm: Vector  # From the origin of the child to its point
     slope: Vector  # Velocity of the point at a rate of 1
-    slip: Vector  # Velocity of the point relative to the other end of the rod
+    slip: Vector  # Velocity of the point relative to the other end of the rod, at a rate of 0
 
 
 def missing_length(rods: Sequence[Rod], solved: LinkState) -> float | None:
@@ -111,10 +115,20 @@ def root_between(long: float, short: float) -> Root:
 
 
 def meet_circle(radius: float, distance: float, height: float, rod: float) -> tuple[Root, Root]:
-    """Return both roots of a circle and a rod, as in the formula of the module."""
+    """
+    Return both roots of a circle and a rod, as in the formula of the module.
+
+    Their squares add up to 4·r·d. The greater root is what the smaller one leaves of it: so what
+    is rounded is the place on the circle, and no point beside the circle is found.
+    """
+    low = root_between(rod, hypotenuse(height, subtract(distance, radius)))
+    high = root_between(hypotenuse(height, add(distance, radius)), rod)
+    both, fold, stretch = 4.0 * (radius * distance), low.root, high.root
+    less = where(fold < stretch, fold, stretch)
+    more = sqrt(both - less * less)
     return (
-        root_between(rod, hypotenuse(height, subtract(distance, radius))),
-        root_between(hypotenuse(height, add(distance, radius)), rod),
+        low._replace(root=where(fold < stretch, fold, more)),
+        high._replace(root=where(fold < stretch, more, stretch)),
     )
 
 
@@ -236,30 +250,32 @@ class ClosedJoint:
         frame = solved.pins[self.child]
         still = self.joint.motion(solved, velocities, frame, 0.0)
         arm = frame.turn(self.place)
-        rod = self._rod_vector(solved, frame, arm)
         slip = minus(still.velocity(arm), velocities.pins[self.to])
-        rate = subtract(self.rod.power(solved, velocities), dot(rod, slip)) / pose.lever
+        rate = subtract(self.rod.power(solved, velocities), dot(pose.rod, slip)) / pose.lever
         slope = self.joint.slope(frame.z, arm)
         velocities.coordinates.append(rate)
         velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
-        return ClosedRates(rate, arm, slope, plus(slip, scale(rate, slope)))
+        return ClosedRates(rate, still, arm, slope, slip)
 
     def accelerations(
         self, pose: Any, rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
-        """Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇²."""
-        frame, motion = solved.pins[self.child], velocities.pins[self.child]
-        rate, arm, _, slip = rates
-        before = self.joint.change(solved, velocities, changes, frame, rate, 0.0)
-        pull = minus(motion.acceleration(before, arm), changes.pins[self.to])
-        bend = subtract(self.rod.bend(solved, velocities, changes), dot(slip, slip))
-        rod = self._rod_vector(solved, frame, arm)
-        change = subtract(bend, dot(rod, pull)) / pose.lever
+        """
+        Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇².
+
+        What the square of the rate contributes is one term. Of a hinge it is r·d·cos θ, without
+        the r² that both terms on the left have.
+        """
+        frame = solved.pins[self.child]
+        rate, still, arm, slope, slip = rates
+        before = self.joint.change(solved, velocities, changes, frame, 0.0, 0.0)
+        whirl = scale(2.0 * rate, cross(still.spin, slope))
+        pull = minus(plus(still.acceleration(before, arm), whirl), changes.pins[self.to])
+        own = rate * add(2.0 * dot(slip, slope), multiply(rate, pose.bend))
+        bend = subtract(self.rod.bend(solved, velocities, changes), add(dot(slip, slip), own))
+        change = subtract(bend, dot(pose.rod, pull)) / pose.lever
         changes.coordinates.append(change)
         changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
-
-    def _rod_vector(self, solved: LinkState, frame: SpaceFrame, arm: Vector) -> Vector:
-        return minus(plus(frame.origin, arm), solved.pins[self.to])
 
     def transmission_angle(self, pose: ClosedPose) -> float:
         """Return the angle from a toggle, in [0, π/2] rad."""
@@ -284,12 +300,8 @@ class ClosedHinge(ClosedJoint):
             return ClosedPose(Status.OPEN, missing)
         base = self.joint.base(solved)
         x, y, z = base.locate(solved.pins[self.to])
-        low, high = meet_circle(
-            self.radius,
-            hypotenuse(x, y),
-            subtract(z, self.place[2]),
-            self.rod.length(solved),
-        )
+        radius, distance, height = self.radius, hypotenuse(x, y), subtract(z, self.place[2])
+        low, high = meet_circle(radius, distance, height, self.rod.length(solved))
         status, gap = status_of_roots(low, high)
         if not status.has_pose:
             return ClosedPose(status, gap)
@@ -298,7 +310,19 @@ class ClosedHinge(ClosedJoint):
         turn = atan2(y + 0.0, x + 0.0) - self.direction
         self._append(solved, base, turn + 2.0 * self.sign * half)
         lever = 0.5 * self.sign * (low.root * high.root)
-        return ClosedPose(status, 0.0, lever, 2.0 * half)
+        # The rod in the triangle of the roots: next to a long arm, the difference of two places
+        # would have the error of the angle.
+        unit = 1.0 / distance
+        away = where(
+            low.root < high.root,
+            subtract(radius, distance) - 0.5 * unit * (low.root * low.root),
+            0.5 * unit * (high.root * high.root) - add(radius, distance),
+        )
+        out = scale(unit, (x, y, 0.0))
+        beside = scale(unit * lever, (subtract(0.0, out[1]), out[0], 0.0))
+        rod = plus(plus(scale(away, out), beside), (0.0, 0.0, subtract(0.0, height)))
+        bend = 0.25 * (high.root * high.root - low.root * low.root)
+        return ClosedPose(status, 0.0, lever, 2.0 * half, base.turn(rod), bend)
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +341,9 @@ class ClosedSlide(ClosedJoint):
         if status is Status.OPEN:
             return ClosedPose(status, gap)
         self._append(solved, base, z + self.sign * root)
-        return ClosedPose(status, 0.0, self.sign * root, atan2(root, distance))
+        lever = self.sign * root
+        rod = base.turn((subtract(0.0, x), subtract(0.0, y), lever))
+        return ClosedPose(status, 0.0, lever, atan2(root, distance), rod)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,13 @@ from math import acos, atan2, cos, dist, hypot, pi, radians, remainder, sin, sqr
 from pathlib import Path
 from random import Random
 
-from campaigns.space_reference import moved, turned_about
 import linkage_ros as lr
 from linkage_ros.kinematics import Status
 from linkage_ros.resources import named_file, spatial_linkage_names
 from mpmath import mp, mpf
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 FOLDER = Path(__file__).parent / 'linkages'
 NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.yaml'))]
@@ -46,6 +46,11 @@ def states_of(closure, count, reach=0.3):
             yield inputs, rates, changes
 
 
+def turned_about(point, at, axis, angle):
+    turn = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis))
+    return np.array(at) + turn.apply(np.array(point) - at)
+
+
 def joints_at(closure, inputs):
     return np.array(closure.position(*inputs).joints)
 
@@ -68,8 +73,10 @@ def test_the_pose_of_the_file_is_solved_at_its_inputs(name):
 def test_rates_and_accelerations_are_the_derivatives_of_joints_and_points(name):
     closure, step = closure_of(name), 1e-4
     for inputs, rates, changes in states_of(closure, 10, 0.2):
+        start, first, second = np.array(inputs), np.array(rates), np.array(changes)
         before, now, after = (
-            closure.position(*moved(inputs, rates, changes, t)) for t in (-step, 0.0, step)
+            closure.position(*(start + first * t + second * t * t / 2.0))
+            for t in (-step, 0.0, step)
         )
         velocity = closure.velocity(now, *rates)
         acceleration = closure.acceleration(now, velocity, *changes)
@@ -224,7 +231,7 @@ def test_a_spherical_four_bar_keeps_the_angles_between_its_axes(angle):
     position = closure.position(angle)
     axes = {name: np.array(hinge.axis) for name, hinge in closure.linkage.hinges.items()}
     units = {name: axis / np.linalg.norm(axis) for name, axis in axes.items()}
-    coupler = np.array([*turned_about([*units['coupler']], [0, 0, 0], [0, 0, 1], angle)], float)
+    coupler = turned_about(units['coupler'], [0, 0, 0], [0, 0, 1], angle)
     last, rocker = units['last'], units['rocker']
     along = (rocker @ last) * (rocker @ coupler)
     a, b = coupler @ last - along, coupler @ np.cross(rocker, last)
@@ -245,8 +252,8 @@ def test_a_delta_stands_where_three_spheres_meet():
         centers = []
         for number, angle in enumerate(inputs, 1):
             hinge = closure.linkage.hinges[f'a{number}']
-            elbow = turned_about([*points[f'b{number}']], [*hinge.at], [*hinge.axis], angle)
-            centers.append(np.array(elbow, float) - (points[f'c{number}'] - platform))
+            elbow = turned_about(points[f'b{number}'], hinge.at, hinge.axis, angle)
+            centers.append(elbow - (points[f'c{number}'] - platform))
         squares = [dist(points[f'b{n}'], points[f'c{n}']) ** 2 for n in (1, 2, 3)]
         rows = np.array([centers[0] - centers[1], centers[0] - centers[2]])
         sides = [
@@ -271,11 +278,13 @@ def test_a_wishbone_is_where_its_six_distances_are_met():
     ]
     for inputs, _, _ in states_of(closure, 6):
         found = closure.position(*inputs).points
+        pose = {name: np.array(place) for name, place in closure.linkage.points.items()}
+        axis = pose['f1'] - pose['f2']
+        lower = turned_about(pose['lower'], pose['f2'], axis, inputs[0])
         with mp.workdps(40):
-            axis = [a - b for a, b in zip(drawn['f1'], drawn['f2'], strict=True)]
             x, y, z = drawn['rack_end']
             known = drawn | {
-                'lower': turned_about(drawn['lower'], drawn['f2'], axis, mpf(inputs[0])),
+                'lower': [*map(mpf, lower)],
                 'rack_end': [x, y + inputs[1], z],
             }
 

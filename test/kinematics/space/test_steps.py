@@ -10,8 +10,9 @@
 from math import hypot
 from random import Random
 
-from campaigns.space import FAMILIES, LIMIT, ORDERS, SLOWER
-from campaigns.space_reference import errors_of
+from campaigns.accuracy.judge import QUANTITIES
+from campaigns.space import FAMILIES, LIMIT, SLOWER
+from campaigns.space_reference import errors_of, Tape
 from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
 from linkage_ros.kinematics.space.steps import (
@@ -30,21 +31,18 @@ from ...support.sampling import sample_count
 def test_what_is_closed_is_as_exact_as_its_numbers(family):
     random, draw = Random(family), FAMILIES[family]
     slower = SLOWER.get(family, 1)
-    for _ in range(sample_count(300 // slower, max(6 // slower, 1))):
+    for _ in range(sample_count(3000 // slower, 100 // slower)):
         case = draw(random)
-        for order, error in zip(ORDERS, case.errors, strict=True):
+        for order, error in zip(QUANTITIES, case.errors, strict=True):
             assert error <= LIMIT, (order, case.given)
 
 
 def test_an_error_would_be_seen():
     """An error of 1e-14 is above the limit, in each order."""
     numbers = [0.7, 0.3, 0.2]
-
-    def value(n, t):
-        return n[0] + n[1] * t + n[2] * t * t / 2
-
-    assert max(errors_of(value, numbers, numbers)) < LIMIT
-    assert min(errors_of(value, numbers, [n + 1e-14 for n in numbers])) > LIMIT
+    value = Tape().number(*numbers)
+    assert max(errors_of(value, numbers)) < LIMIT
+    assert min(errors_of(value, [n + 1e-14 for n in numbers])) > LIMIT
 
 
 @pytest.mark.parametrize('apart', [sign * 10.0**-k for k in range(3, 16) for sign in (-1, 1)])
