@@ -76,7 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME=VALUE',
         help='solve for every input at which a dependent joint, or a coordinate of a traced point '
         'such as P.x, has a value; --rate and --acceleration are then for the joint; may be '
-        'repeated; with several inputs, name as many joints, which become the inputs',
+        'repeated; with several inputs, or in space, name as many joints as inputs, which '
+        'become the inputs',
     )
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default without --at'
@@ -134,11 +135,10 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     arguments.angles = arguments.angles.of_file(content.units)
     if arguments.joint:
         _check_alone(arguments)
-        if not isinstance(closure, Closure):
-            remedy = 'name other joints as the input of its file'
-            raise LinkageError('--joint', 'is for planar linkages', remedy)
-        several = len(closure.input_names) > 1
-        columns, rows = (_exchanged_table if several else _inverse_table)(closure, arguments)
+        if isinstance(closure, Closure) and len(closure.input_names) == 1:
+            columns, rows = _inverse_table(closure, arguments)
+        else:
+            columns, rows = _exchanged_table(closure, arguments)
     else:
         columns, rows = _forward_table(closure, arguments)
     account = {
@@ -175,12 +175,12 @@ def _check_alone(arguments: argparse.Namespace) -> None:
 
 
 def _exchanged_table(
-    closure: Closure, arguments: argparse.Namespace
+    closure: Any, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     """Return the row of the state in which as many joints as inputs have the typed values."""
     names, typed = zip(*arguments.joint, strict=True)
     inverse = closure.driven_by(*names)
-    groups = assur_groups(inverse.linkage).groups
+    groups = assur_groups(inverse.linkage).groups if isinstance(inverse, Closure) else ()
     links = [link for group in groups if isinstance(group, Iterated) for link in group.links]
     if links:
         text = f'{list_names(links)} are solved by iteration, from the pose of the file'
