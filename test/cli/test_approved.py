@@ -37,10 +37,18 @@ PLACES = {
 }
 """Folders, by what stands for them in a session."""
 
+def _round_numbers(found: re.Match[str]) -> str:
+    return re.sub(r'-?\d+\.\d{7,}', lambda number: f'{float(number[0]):.6g}', found[0])
+
+
 MASKS = (
     (r'(?<=\"python\": ).*|(?<=\"machine\": ).*', 'VERSION'),
-    (r'-?\d(?:\.\d+)?e-1[4-9]', 'ROUNDING'),
+    (r'[-+]?\d(?:\.\d+)?e-1[4-9]|[-+]?0\.0+e\+00', 'ROUNDING'),
+    (r'(worst residual +)\S+ (\S+), (of \d+ positions, )?at .*', r'\1ROUNDING \2, \3at PLACE'),
+    (r'("residual_m": )[^,]+(,\s+"inputs": \[)[^\]]*', r'\1ROUNDING\2PLACE'),
     (r'(?<=made and replayed by ).*|(?<=made by ).*|(?<=replayed by ).*', 'VERSIONS'),
+    # Where a value is greatest, it is flat.
+    (r'(?<="conditioning": )[\d.]+,\s+"inputs": \[[^\]]*', _round_numbers),
     (r'-?\d+\.\d{13,}(?:e[-+]\d+)?', lambda found: f'{float(found[0]):.12g}'),
 )
 """What differs from machine to machine, and what is written in its place."""
