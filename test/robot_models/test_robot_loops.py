@@ -8,6 +8,7 @@
 
 """Robots whose URDF has loops: read in each dialect, solved, run, written, and refused."""
 
+from io import BytesIO
 from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
@@ -23,6 +24,7 @@ import pytest
 import yaml
 
 ROBOTS = Path(__file__).with_name('robots')
+OWN = Path(__file__).parents[1] / 'kinematics' / 'space' / 'linkages'
 RNG = np.random.default_rng(37)
 
 # An independent route: homogeneous matrices of the URDF, and Newton's method in small steps.
@@ -301,11 +303,42 @@ def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
     assert 1e-5 < max(map(abs, pose.values())) < 1e-2
 
 
-@pytest.mark.parametrize('name', sorted({*spatial_linkage_names()} - {'hexapod'}))
-def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
-    file = tmp_path / f'{name}.urdf'
-    file.write_bytes(model_of(name, urdf_model))
-    linkage, robot = load(name), load(file)
+STRUTS = {
+    'from its length': OWN / 'excavator.yaml',
+    'to its length, with hinges within': OWN / 'steered_rod.yaml',
+    'its start moves, its name is taken, a joint follows it': 'cylinder.yaml',
+}
+CYLINDER = """
+points: {P: [0.3, 0.03, 0.1], Q: [0.1, 0.02, -0.1], T: [1.5, 0, 0.4]}
+links: {ground: [Q], boom: [P]}
+hinges:
+  boom_joint: {parent: ground, child: boom, at: [0, 0, 0], axis: [0, -1, 0.1]}
+  cylinder_x: {parent: boom, child: cylinder_rod, at: [1.5, 0, 0.4], axis: [0, -1, 0]}
+struts: {cylinder: [P, Q]}
+ratios: {cylinder_x: {of: cylinder, ratio: 2, offset: -0.5660388679233962}}
+input: cylinder
+"""
+
+
+def model_and_robot(file, folder):
+    urdf = folder / 'robot.urdf'
+    urdf.write_bytes(model_of(file, urdf_model))
+    return urdf.read_text(), load(urdf)
+
+
+@pytest.fixture(scope='module')
+def hexapod(tmp_path_factory):
+    return model_and_robot('hexapod', tmp_path_factory.mktemp('hexapod'))
+
+
+@pytest.mark.parametrize('name', [*spatial_linkage_names(), *STRUTS])
+def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
+    file = STRUTS.get(name, name)
+    if file == 'cylinder.yaml':
+        file = tmp_path / file
+        file.write_text(CYLINDER)
+    own = request.getfixturevalue('hexapod') if name == 'hexapod' else None
+    linkage, (_, robot) = load(file), own or model_and_robot(file, tmp_path)
     assert robot.linkage.driven == linkage.linkage.driven
     assert {k: robot.linkage.limits[k] for k in linkage.linkage.limits} == linkage.linkage.limits
     count = 0
@@ -320,9 +353,29 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name):
     assert count > 5
 
 
-def test_a_length_that_is_a_joint_has_no_urdf():
-    with pytest.raises(LinkageError, match=r'struts\.leg1: is a length, for which a URDF has no'):
-        model_of('hexapod', urdf_model)
+def test_each_rod_ends_where_the_platform_carries_it(hexapod):
+    """By yourdfpy, at the joints of the model as they come back, beside the file's own points."""
+    yourdfpy = pytest.importorskip('yourdfpy')
+    text, robot = hexapod
+    model = yourdfpy.URDF.load(BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
+    linkage, loops = load('hexapod'), ET.fromstring(text).findall('loop_joint')
+    assert [loop.get('name') for loop in loops] == [f'q{n}' for n in range(1, 7)]
+    for inputs in near_pose(linkage, 0.05, 5):
+        points = linkage.points(linkage.position(*inputs))
+        joints = robot.position(*inputs).joints
+        model.update_cfg(dict(zip(robot.joint_names, joints, strict=True))
+                         | dict(zip(robot.input_names, inputs, strict=True)))  # fmt: skip
+        for loop in loops:
+            for end in loop:
+                at = model.get_transform(end.get('link'), 'ground') @ [*numbers(end, 'xyz'), 1.0]
+                assert at[:3] == pytest.approx(points[loop.get('name')], abs=1e-12)
+
+
+def test_pinocchio_reads_struts_too(hexapod):
+    pinocchio = pytest.importorskip('pinocchio')
+    model = pinocchio.buildModelFromXML(hexapod[0])
+    assert {'leg1_x', 'leg1_y', 'leg1', 'x', 'r_z'} < {*model.names}
+    assert model.nv == 6 + 6 * 3
 
 
 SCENE = 'linkage: {urdf: robots/ankle.urdf, input: [pitch, roll]}\nrate: 200\n'

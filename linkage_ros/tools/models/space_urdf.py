@@ -12,14 +12,15 @@ Each joint keeps its name, sign and zero. A joint that closes a loop moves a fra
 which a fixed loop joint welds to the link. A link that only balls hold hangs by one of them: on
 two hinges if it is a rod, which then cannot spin, else on three. The other balls are loop joints,
 in the form of Isaac Sim, which robot_state_publisher passes over and `linkage check` reads.
+A strut is a rod that slides in a tube, on two hinges at its first point, a ball at its second.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isfinite
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     cross,
     direction_of,
@@ -49,11 +50,34 @@ _FLAT = 1e-3
 
 
 def space_urdf(name: str, linkage: SpaceLinkage) -> bytes:
-    """Return a robot model of a spatial linkage; a DefinitionError says that there is none."""
-    for strut in linkage.struts:
-        reason, remedy = 'is a length, for which a URDF has no joint', 'write slides and balls'
-        raise DefinitionError(f'struts.{strut}', reason, remedy)
-    return _SpaceTree(name, linkage).write()
+    """Return a robot model of a spatial linkage."""
+    return _SpaceTree(name, _with_slides(linkage)).write()
+
+
+def _with_slides(linkage: SpaceLinkage) -> SpaceLinkage:
+    """Return the linkage with a tube and a rod for each strut, between which it is a slide."""
+    hinges, slides = dict(linkage.hinges), dict(linkage.slides)
+    links, names = dict(linkage.links), {*linkage.link_names}
+    for strut, (start, end) in linkage.struts.items():
+        at, on = linkage.points[start], next(link for link in links if start in links[link])
+        way = direction_of(minus(linkage.points[end], at))
+        across = _direction_across(way)
+        cross_link, tube, rod = (
+            free_name(f'{strut}_{part}', names) for part in ('cross', 'tube', 'rod')
+        )
+        names |= {cross_link, tube, rod}
+        taken = {*hinges, *slides, *linkage.struts}
+        for axis, letter, ends in (
+            (across, 'x', (on, cross_link)), (cross(way, across), 'y', (cross_link, tube)),
+        ):  # fmt: skip
+            hinges[free_name(f'{strut}_{letter}', taken)] = SpatialJoint(*ends, axis, at)
+        slides[strut] = SpatialJoint(tube, rod, way, value=linkage.pose_value(strut))
+        links[rod] = (end,)
+    return replace(linkage, hinges=hinges, slides=slides, links=links, struts={})
+
+
+def _direction_across(way: Vector) -> Vector:
+    return direction_of(max((cross(way, one) for one in GROUND_FRAME[:3]), key=length))
 
 
 class _SpaceTree:
@@ -111,7 +135,7 @@ class _SpaceTree:
             if not on:
                 continue
             way = direction_of(arms[0])
-            across = direction_of(max((cross(way, one) for one in GROUND_FRAME[:3]), key=length))
+            across = _direction_across(way)
             axes = [across, cross(way, across)]
             if any(length(cross(way, arm)) > _FLAT * length(arm) for arm in arms):
                 axes.append(way)
