@@ -37,6 +37,7 @@ PLACES = {
 }
 """Folders, by what stands for them in a session."""
 
+
 def _round_numbers(found: re.Match[str]) -> str:
     return re.sub(r'-?\d+\.\d{7,}', lambda number: f'{float(number[0]):.6g}', found[0])
 
