@@ -15,6 +15,7 @@
 # What `linkage_ros` exports, for type checkers: at run time a name is imported when it is used.
 
 from linkage_ros.bag.reader import Bag as Bag, BagMessage as BagMessage, read_bag as read_bag
+from linkage_ros.tools.models.array_functions import ArrayFunctions as ArrayFunctions
 from linkage_ros.tools.drawing.svg_picture import svg as svg
 from linkage_ros.errors import (
     BagError as BagError,

@@ -34,7 +34,8 @@ TOOLS = {
     'urdf': 'linkage_ros.tools.models.robot_model_command',
     'mjcf': 'linkage_ros.tools.models.robot_model_command',
     'import': 'linkage_ros.tools.models.import_command',
-    # What commands and scenes ask for.
+    # What commands, scenes and closures ask for.
+    'arrays': 'linkage_ros.tools.models.array_functions',
     'robot_description': 'linkage_ros.tools.models.scene_model',
     'spread': 'linkage_ros.tools.drawing.spread',
 }

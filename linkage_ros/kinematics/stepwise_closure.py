@@ -37,8 +37,10 @@ from linkage_ros.kinematics.results import (
 from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
+from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
+    from linkage_ros import ArrayFunctions
     from linkage_ros.kinematics.batch import Array, Batch
     from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
     from linkage_ros.kinematics.grid import Grid
@@ -379,6 +381,50 @@ class StepwiseClosure:
         from linkage_ros.kinematics.compiling import SolverOutline  # local import: numpy
 
         return SolverOutline(self, len(self.linkage.joints))
+
+    def as_torch(self) -> ArrayFunctions:
+        """
+        Return the linkage as functions of PyTorch's tensors.
+
+        They are differentiable, and ``torch.compile`` works on them. They take any tensor of
+        float64 or float32, on any device.
+
+        Raises
+        ------
+        DefinitionError
+            If the linkage cannot be compiled: its iterated links have no table and no cells.
+        LinkageError
+            If PyTorch is not installed.
+
+        """
+        return self._torch
+
+    def as_jax(self) -> ArrayFunctions:
+        """
+        Return the linkage as functions of JAX's arrays.
+
+        They are differentiable, and ``jax.jit``, ``jax.vmap`` and ``jax.grad`` work on them. JAX
+        computes in single precision unless ``jax_enable_x64`` is set.
+
+        Raises
+        ------
+        DefinitionError, LinkageError
+            As `as_torch`.
+
+        """
+        return self._jax
+
+    @BuiltProperty
+    def _torch(self) -> ArrayFunctions:
+        return self._make_functions('torch')
+
+    @BuiltProperty
+    def _jax(self) -> ArrayFunctions:
+        return self._make_functions('jax')
+
+    def _make_functions(self, package: str) -> ArrayFunctions:
+        made: ArrayFunctions = find_tool('arrays').make_array_functions(self, package)
+        return made
 
     def limit_exceeded(self, position: Position) -> str:
         """Return which joint of a pose is beyond its limits, as text; '' if none is."""

@@ -11,8 +11,9 @@ Write a linkage as source that stands alone: C, a C header, JavaScript, Python, 
 
 The source holds one function that solves the linkage as this package does: position for
 --derivatives 0, velocity for 1, motion for 2. It returns a status, and the joints where there are
-any; its head says what it takes and gives. --ros2-control writes a package with a transmission,
-whose actuators are the inputs.
+any; its head says what it takes and gives. With --arrays it is a Python module for arrays of
+NumPy, PyTorch, JAX and CuPy, with all of these functions and the Jacobian. --ros2-control writes a
+package with a transmission, whose actuators are the inputs.
 """
 
 from __future__ import annotations
@@ -30,7 +31,14 @@ from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quot
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.ros2_control import commanded_joints, write_package
-from linkage_ros.tools.models.source_code import C_NAME, c_name, LANGUAGES, Subject, write_source
+from linkage_ros.tools.models.source_code import (
+    C_NAME,
+    c_name,
+    LANGUAGES,
+    Subject,
+    write_arrays,
+    write_source,
+)
 
 EXAMPLE = 'linkage compile four_bar -o four_bar.c'
 
@@ -73,6 +81,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--joints', metavar='NAMES', help='only these joints, with commas between them'
     )
     parser.add_argument(
+        '--arrays',
+        action='store_true',
+        help='OUTPUT.py for arrays of NumPy, PyTorch, JAX or CuPy: many states at once, gradients',
+    )
+    parser.add_argument(
         '--name', help="prefix of the names in C (default: the linkage file's name)"
     )
 
@@ -94,6 +107,8 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
     output: Path | None = arguments.output
     if output is None:
         raise LinkageError('-o', 'names no file', 'write -o NAME.h, or --ros2-control FOLDER')
+    if arguments.arrays and output.suffix.lower() != '.py':
+        raise LinkageError('--arrays', f'{output.name} is not a Python module', 'name it x.py')
     language = LANGUAGES[output.suffix.lower()]
     in_c = output.suffix.lower() in ('.c', '.h')
     if arguments.driven_by:
@@ -105,7 +120,8 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
         arguments.derivatives,
         _requested_joints(closure, arguments.joints),
     )
-    atomic_write(output, write_source(subject, language(subject)).encode())
+    text = write_arrays(subject) if arguments.arrays else write_source(subject, language(subject))
+    atomic_write(output, text.encode())
     print(output)
     return 0
 

@@ -6,6 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+from linkage_ros.tools.models.source_code.array_module import write_arrays as write_arrays
 from linkage_ros.tools.models.source_code.c import C as C
 from linkage_ros.tools.models.source_code.javascript import JavaScript as JavaScript
 from linkage_ros.tools.models.source_code.languages import (

@@ -53,16 +53,16 @@ _MOST_PLACES = 1 << 16
 _COARSE = 64
 """Rounding errors of 1 within which Newton's method ends at any precision."""
 
-_SINGULAR = {'sqrt': ('_root', 0), 'atan2': ('_angle', 1), 'hypot': ('_length', 0)}
+_SINGULAR = {'sqrt': ('_root', 0), 'atan2': ('_angle', 1)}
 """Functions without a slope at 0: one that has it, and which argument must not be 0 elsewhere."""
 
 _ATOM = 9
 
 _NOTES = """
-Arguments and results are arrays with the numbers above along their last axis, all axes before
-it are those of the states: inputs (..., {inputs}), joints (..., {joints}), status (...). They are arrays of
-NumPy, PyTorch, JAX or CuPy, of float64 or float32. Without values all joints are NaN, and
-their gradients 0. Rates whose squares overflow give no finite values.
+Arguments and results are arrays with these numbers along their last axis; the axes before it
+are those of the states. So are inputs (..., {inputs}), joints (..., {joints}), the status (...).
+They are arrays of NumPy, PyTorch, JAX or CuPy, of float64 or float32. Where a state has no values
+all joints are NaN, and their gradients 0. Rates whose squares overflow give no finite numbers.
 """
 
 _JACOBIAN = '''
@@ -90,12 +90,27 @@ def _angle(xp, y, x):
 ''',
     '_length': '''
 def _length(xp, x, y):
-    """Return the length of (x, y), with the slope 0 at 0."""
-    zero = (x == 0.0) & (y == 0.0)
-    return xp.where(zero, 0.0, xp.hypot(xp.where(zero, 1.0, x), y))
+    """
+    Return the length of (x, y), right to the last digit; with the slope 0 at 0.
+
+    From C. F. Borges, Algorithm 1014, ACM Trans. Math. Softw. 47 (2021).
+    """
+    x, y = abs(x), abs(y)
+    none = (x == 0.0) & (y == 0.0)
+    more, less = xp.where(none, 1.0, xp.maximum(x, y)), xp.minimum(x, y)
+    tiny = float(xp.finfo(x.dtype).smallest_normal)
+    up = xp.where(more < tiny**0.5, xp.zeros_like(more) + 1.0 / tiny, 1.0)
+    more, less = more * up, less * up
+    root = xp.sqrt(more * more + less * less)
+    a, b = root - less, root - more
+    near = more * (2.0 * a - more) + (a - 2.0 * (more - less)) * a
+    far = 2.0 * b * (more - 2.0 * less) + (4.0 * b - less) * less + b * b
+    root = root - xp.where(root <= 2.0 * less, near, far) / (2.0 * root)
+    return xp.where(none, 0.0, root / up)
 ''',
     '_stack': """
 def _stack(xp, numbers):
+    """Return numbers of states along a last axis."""
     return xp.stack(xp.broadcast_arrays(*numbers), axis=-1)
 """,
     '_take': '''
@@ -262,6 +277,8 @@ class _MaskedWriter(TextWriter):
             text = f'xp.where({parts[0].text}, {texts[1]}, {parts[2].text})'
         elif name == 'copysign':
             text = f'xp.copysign({", ".join(texts)})'
+        elif name == 'hypot':
+            text = f'_length(xp, {", ".join(texts)})'
         elif name in _SINGULAR:
             helper, number = _SINGULAR[name]
             if self.of_condition:
