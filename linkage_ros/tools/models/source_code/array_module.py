@@ -61,8 +61,8 @@ _ATOM = 9
 _NOTES = """
 Arguments and results are arrays with these numbers along their last axis; the axes before it
 are those of the states. So are inputs (..., {inputs}), joints (..., {joints}), the status (...).
-They are arrays of NumPy, PyTorch, JAX or CuPy, of float64 or float32. Where a state has no values
-all joints are NaN, and their gradients 0. Rates whose squares overflow give no finite numbers.
+They are arrays of NumPy, PyTorch, JAX or CuPy, of float64 or float32. A state without values
+has NaN in all of them, and gradients 0. Rates whose squares overflow give no finite numbers.
 """
 
 _JACOBIAN = '''
@@ -256,6 +256,9 @@ class _MaskedWriter(TextWriter):
 
     def _format_expression(self, operation: Operation) -> WrittenText:
         name, arguments = operation.name, operation.arguments
+        if name == '+' and _is_zero_product(arguments[0]) and arguments[1] == 0.0:
+            # Some compilers take x + 0.0 for x, and −0.0 turns an angle once round.
+            return WrittenText('zero', _ATOM, 0)
         parts = [self.expression_text(argument) for argument in arguments]
         depth = 1 + max((part.depth for part in parts), default=0)
         constant = [not isinstance(argument, Operation) for argument in arguments]
@@ -299,6 +302,10 @@ class _MaskedWriter(TextWriter):
             self._guards[key] = name = f'g{len(self._guards)}'
             self.lines.append(f'{name} = xp.where({self.mask}, {text}, 1.0)')
         return self._guards[key]
+
+
+def _is_zero_product(number: Any) -> bool:
+    return isinstance(number, Operation) and number.name == '*' and 0.0 in number.arguments
 
 
 def _is_accuracy(bound: Any) -> bool:
