@@ -108,11 +108,11 @@ def _length(xp, x, y):
     root = root - xp.where(root <= 2.0 * less, near, far) / (2.0 * root)
     return xp.where(none, 0.0, root / up)
 ''',
-    '_stack': """
+    '_stack': '''
 def _stack(xp, numbers):
     """Return numbers of states along a last axis."""
     return xp.stack(xp.broadcast_arrays(*numbers), axis=-1)
-""",
+''',
     '_take': '''
 def _take(xp, columns, row, like):
     """Return each column at the rows: an array (columns, ...)."""
