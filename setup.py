@@ -68,6 +68,8 @@ DEMO = [*ROS, *VIEW, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
 FMU = ['pythonfmu3>=0.3.4,<0.4']
 # Completion of the command line in bash, zsh and fish.
 COMPLETION = ['argcomplete>=3.1,<4']
+# Linkages as functions of arrays; PyTorch's wheel for Linux on PyPI brings gigabytes of CUDA.
+ARRAYS = ['array-api-compat>=1.11,<2', 'jax>=0.4.36,<1', 'torch>=2.4,<3']
 # For studies on several machines.
 DASK = ['distributed>=2023.12,<2027']
 # The documentation site, in the theme Furo.
@@ -95,6 +97,8 @@ TEST = [
     # References: fifty digits, and a rigid-body engine.
     'mpmath>=1.2,<2',
     'mujoco>=3',
+    # `make arrays` adds PyTorch.
+    *ARRAYS[:2],
     *COMPLETION,
     *DASK,
     *EXPORT,
@@ -159,6 +163,7 @@ setup(
     # Bounded above too: another major version may behave differently.
     install_requires=['numpy>=1.26,<3', 'mcap>=1.2,<2', 'PyYAML>=6,<7'],
     extras_require={
+        'arrays': ARRAYS,
         'ros': ROS,
         'demo': DEMO,
         'report': REPORT,

@@ -18,6 +18,7 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
+from bench.arrays import measure_modules
 from bench.coming import ComersPlan, measure_comers
 from bench.compiled import measure_arrays, measure_chains, measure_gallery
 from bench.empty_scene import measure_empty_scene
@@ -58,7 +59,18 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
         '--only',
-        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'compiled', 'real_time', 'comers'),
+        choices=(
+            'a',
+            'b',
+            'c',
+            'many',
+            'empty',
+            'kinematics',
+            'compiled',
+            'arrays',
+            'real_time',
+            'comers',
+        ),
         help='only one of the comparisons',
     )
     parser.add_argument('--runs', type=Path, default=Path('runs'), help='folder of the tables')
@@ -68,7 +80,9 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.write and arguments.only not in PAGES:
         parser.error(f'--write needs --only {" or ".join(PAGES)}')
-    parts = dict.fromkeys(('kinematics', 'compiled', 'empty', 'many', 'real_time', 'comers'), '')
+    parts = dict.fromkeys(
+        ('kinematics', 'compiled', 'arrays', 'empty', 'many', 'real_time', 'comers'), ''
+    )
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
@@ -111,6 +125,10 @@ def main() -> int:
                 tables.append(measure_arrays(folder, *amount))
                 amount = (1, 20_000) if arguments.quick else (11, 500_000)
                 tables.append(measure_transmissions(folder, *amount))
+            if arguments.only in (None, 'arrays'):
+                say('linkages as modules for arrays')
+                amount = (1, 20_000) if arguments.quick else (5, 1_000_000)
+                tables.append(measure_modules(folder, *amount))
     except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1

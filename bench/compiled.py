@@ -227,8 +227,8 @@ def _measured(
     values = np.empty((3, len(closure.linkage.joints), states))
     rates, accelerations = [RATE] * len(inputs), [ACCELERATION] * len(inputs)
     out = closure.solve(*inputs, rates=rates, accelerations=accelerations)
-    in_c = _compiled(folder, closure, file)
-    if in_c(inputs, values) or out.status.any():
+    c_code = in_c(folder, closure, file)
+    if c_code(inputs, values) or out.status.any():
         raise MeasurementError(f'{file.stem}: not all states are closed')
     for one, other in zip(out[1:], values, strict=True):
         _agree(file.stem, one, other)
@@ -237,7 +237,7 @@ def _measured(
             'solve': lambda: closure.solve(
                 *inputs, rates=rates, accelerations=accelerations, out=out
             ),
-            'C': lambda: in_c(inputs, values),
+            'C': lambda: c_code(inputs, values),
         },
         rounds,
     )
@@ -257,7 +257,7 @@ def _closed(closure: Closure, count: int) -> Array:
     return np.ascontiguousarray(found[:, :count])
 
 
-def _compiled(folder: Path, closure: Closure, file: Path) -> _Solve:
+def in_c(folder: Path, closure: Closure, file: Path) -> _Solve:
     """Return the generated C code of a linkage, in a loop over states."""
     name, joints = file.stem, tuple(closure.linkage.joints)
     driven = len(closure.linkage.inputs)

@@ -76,7 +76,7 @@ def test_a_linkage_that_closes_nowhere_is_told_to_say_where(linkage: Run, tmp_pa
 
 @pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
 @pytest.mark.parametrize('odd', ODD)
-@pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py'])
+@pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py', 'py --arrays'])
 def test_names_of_links_stay_in_the_comments(
     linkage: Run, tmp_path: Path, ending: str, odd: str
 ) -> None:
@@ -84,7 +84,8 @@ def test_names_of_links_stay_in_the_comments(
     text = text.replace('child: crank', f'child: "{ODD[odd]}"')
     text = text.replace('parent: crank', f'parent: "{ODD[odd]}"')
     (tmp_path / 'odd.yaml').write_text(text, 'utf-8')
-    answer = linkage('compile', 'odd.yaml', '-o', f'a.{ending}')
+    answer = linkage('compile', 'odd.yaml', '-o', *f'a.{ending}'.split())
+    ending = ending.partition(' ')[0]
     assert answer.returncode == 0, answer.stderr
     source = (tmp_path / f'a.{ending}').read_text('utf-8')
     assert '#error' in source or '#error' not in ODD[odd]
@@ -101,3 +102,20 @@ def test_names_of_links_stay_in_the_comments(
             text=True, timeout=60, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
+
+
+def test_arrays_are_a_python_module(linkage: Run, tmp_path: Path) -> None:
+    said = '--arrays: a.c is not a Python module; name it x.py'
+    assert refused(linkage, FOUR_BAR, '-o', 'a.c', '--arrays') == said
+    assert linkage('compile', FOUR_BAR, '-o', 'a.py', '--arrays').stdout == 'a.py\n'
+    text = (tmp_path / 'a.py').read_text()
+    assert [name for name in ('motion', 'jacobian') if f'def {name}(' in text] == [
+        'motion',
+        'jacobian',
+    ]
+
+
+def test_what_has_too_many_cells_for_arrays_is_named(linkage: Run, tmp_path: Path) -> None:
+    said = refused(linkage, 'hexapod', '-o', 'a.py', '--arrays')
+    assert 'hexapod.yaml:35: input: 6 inputs move links that close only together, and' in said
+    assert not (tmp_path / 'a.py').exists()

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import csv
+from importlib.util import find_spec
 from pathlib import Path
 import re
 import shutil
@@ -19,6 +20,7 @@ import sys
 import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +44,7 @@ def printed(script: str, folder: Path, *arguments: str) -> list[str]:
 def test_the_readme_names_each_script_once() -> None:
     text = (FOLDER / 'README.md').read_text('utf-8')
     assert sorted(re.findall(r'^\| \[(.*?)\]', text, re.MULTILINE)) == SCRIPTS
-    assert len(SCRIPTS) == 8
+    assert len(SCRIPTS) == 9
 
 
 def test_each_is_short() -> None:
@@ -116,6 +118,23 @@ def test_compile_to_c(tmp_path: Path) -> None:
     status, in_c, in_python = printed('compile_to_c.py', tmp_path)
     assert status == 'status: 0'
     assert in_c.split()[2:] == in_python.split()[2:] != []
+
+
+@pytest.mark.skipif(find_spec('jax') is None, reason='needs jax')
+def test_rods_by_gradients(tmp_path: Path) -> None:
+    lines = printed('rods_by_gradients.py', tmp_path)
+    before, gradient, rods, after = ([float(x) for x in line.split()[-2:]] for line in lines)
+    assert max(map(abs, after)) < 1e-14
+    ankle = lr.load(FOLDER / 'ankle_rods.yaml')
+    motors = (0.10, -0.04)
+    assert ankle.position(0.0, 0.0, *rods).joints == pytest.approx(motors, abs=1e-13)
+    # What holds the motors where they are turns the foot by the rods.
+    start = ankle.linkage.pose.inputs[2:]
+    position = ankle.position(*before, *start)
+    assert position.joints == pytest.approx(motors, abs=1e-12)
+    by_foot, by_rods = np.split(ankle.jacobian(position), 2, axis=1)
+    turned = np.linalg.solve(by_foot, -by_rods)
+    assert gradient == pytest.approx(2.0 * np.array(before) @ turned, rel=1e-9)
 
 
 def test_read_bag(tmp_path: Path) -> None:

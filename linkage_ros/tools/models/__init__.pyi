@@ -6,6 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+from linkage_ros.tools.models.array_functions import make_array_functions as make_array_functions
 from linkage_ros.tools.models.from_urdf import (
     ImportedLinkage as ImportedLinkage,
     linkage_from_urdf as linkage_from_urdf,

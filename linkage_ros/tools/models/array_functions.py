@@ -19,7 +19,11 @@ from linkage_ros.kinematics import StepwiseClosure
 from linkage_ros.tools.models.source_code import FUNCTIONS, STATUSES, Subject, write_arrays
 import numpy as np
 
-_NAMESPACES = {'torch': 'array_api_compat.torch', 'jax': 'jax.numpy'}
+_NAMESPACES = {
+    'numpy': 'array_api_compat.numpy',
+    'torch': 'array_api_compat.torch',
+    'jax': 'jax.numpy',
+}
 """The module with the functions of the array API, by package."""
 
 
@@ -58,7 +62,7 @@ class ArrayFunctions(NamedTuple):
 
 def make_array_functions(closure: StepwiseClosure, package: str) -> ArrayFunctions:
     """
-    Return a linkage as functions of arrays of ``torch`` or ``jax``.
+    Return a linkage as functions of arrays of ``numpy``, ``torch`` or ``jax``.
 
     Raises
     ------
