@@ -71,5 +71,9 @@ def _build(folder: Path, name: str) -> tuple[str, str]:
         raise MeasurementError(f'{package}: {done.stderr}')
     closure = load(name)
     motors = (f'actuator {each} {each} 1 0\n' for each in closure.input_names)
-    joints = (f'joint {each} {each} 1 0\n' for each in closure.joint_names)
+    commanded, interfaces = typed[1::2], ' position velocity effort'
+    joints = (
+        f'joint {each} {each} 1 0{interfaces * (each in commanded)}\n'
+        for each in closure.joint_names
+    )
     return str(program), ''.join((*motors, *joints, 'configure\n'))

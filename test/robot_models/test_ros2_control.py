@@ -28,6 +28,7 @@ import pytest
 pytestmark = pytest.mark.skipif(shutil.which('c++') is None, reason='needs c++')
 
 STAND_IN = Path(__file__).parent / 'ros2_control_stand_in'
+ALL = ' position velocity effort'
 NUMBERS = {name: number for number, name in enumerate(STATUSES)}
 
 
@@ -116,7 +117,7 @@ def described(closure, joints, commanded, reductions, offsets=None):
         for name, reduction in zip(closure.input_names, reductions, strict=True)
     ]
     lines += [
-        f'joint {name} {name} 1 {offsets.get(name, 0.0)}' + ' position' * (name in commanded)
+        f'joint {name} {name} 1 {offsets.get(name, 0.0)}' + ALL * (name in commanded)
         for name in joints
     ]
     return [*lines, 'configure']
@@ -173,7 +174,7 @@ def motor_units(reductions):
     return np.array([[n, n, 1.0 / n] for n in reductions])
 
 
-FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joint 1 0 position']
+FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joint 1 0' + ALL]
 
 
 @pytest.mark.parametrize(
@@ -189,13 +190,13 @@ FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joi
 def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
     programs, typed, status
 ):
-    lines = [*FINGER, 'configure', 'to_actuators -0.3 0 0', f'to_actuators {typed} 1 1',
+    lines = [*FINGER, 'configure', 'to_actuators -0.3 0 2', f'to_actuators {typed} 1 1',
              'sleep 1200', 'to_actuators -0.4 0 0']  # fmt: skip
     answers, errors = run(programs('finger'), lines)
     (good, before, _), (kept, told, allocated), (after, last, _) = map(numbers_of, answers)
     assert (before, told, last, allocated) == (0, NUMBERS[status], 0, 0)
-    assert good[0] == pytest.approx([0.3, 0.0, 0.0], abs=1e-14)
-    assert kept.tolist() == good.tolist()
+    assert good[0] == pytest.approx([0.3, 0.0, -2.0], abs=1e-14)
+    assert kept.tolist() == [[good[0, 0], 0.0, good[0, 2]]]  # it stands
     assert after[0, 0] == pytest.approx(0.4, abs=1e-14)
     (line,) = errors.splitlines()
     assert f': {status}; the last valid command stays' in line
@@ -219,10 +220,48 @@ def test_another_assembly_is_not_the_commanded_one(programs):
 
 
 def test_velocities_and_efforts_alone_are_at_the_last_state(programs):
-    lines = [*FINGER, 'configure position velocity', 'to_joints 0.3 0 0', 'to_actuators -0.3 2 0']
+    finger = [FINGER[0], 'joint finger left_finger_joint 1 0 velocity effort']
+    lines = [*finger, 'configure', 'to_joints 0.3 0 0', 'to_actuators 7 2 1']
     answers, _ = run(programs('finger'), lines)
-    found, _, _ = numbers_of(answers[1])
-    assert found[0] == pytest.approx([0.3, -2.0, 0.0], abs=1e-14)
+    found, status, _ = numbers_of(answers[1])
+    assert status == 0
+    assert found[0] == pytest.approx([0.3, -2.0, -1.0], abs=1e-14)
+
+
+def test_values_that_are_no_commands_are_not_taken_for_them(programs):
+    finger = [FINGER[0], 'joint finger left_finger_joint 1 0 position']
+    answers, _ = run(programs('finger'), [*finger, 'configure', 'to_actuators -0.3 2 1'])
+    found, _, _ = numbers_of(answers[0])
+    assert found[0] == pytest.approx([0.3, 0.0, 0.0], abs=1e-14)
+
+
+# One transmission often serves commands and states, and with the same doubles: a value that is not
+# written may be one of the other way.
+
+
+def test_without_a_pose_a_state_is_the_last_and_never_a_command(programs):
+    lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
+    lines += ['to_actuators 0.1 0 0 -0.1 0 0', 'to_joints 2.5 0 0 -2.5 0 0',
+              'to_joints 0.1 0 0 0.2 0 0', 'to_actuators 0.1 0 0 -0.1 0 0',
+              'to_joints 2.5 0 0 -2.5 0 0']  # fmt: skip
+    answers, _ = run(programs('ankle'), lines)
+    first, known, last = (numbers_of(answers[k]) for k in (1, 2, 4))
+    assert np.isnan(first[0]).all()
+    assert [status for _, status, _ in (first, known, last)] == [6, 0, 6]
+    assert last[0].tolist() == known[0].tolist()
+
+
+def test_without_a_pose_a_command_is_the_last_and_never_a_state(programs):
+    lines = [
+        *FINGER,
+        'configure',
+        'to_actuators -0.6 0 0',
+        'to_joints 0.2 0 0',
+        'to_actuators 1 0 0',
+    ]
+    answers, _ = run(programs('finger'), lines)
+    commanded, _, held = (numbers_of(answer)[0] for answer in answers)
+    assert held.tolist() == commanded.tolist()
 
 
 WRONG = {

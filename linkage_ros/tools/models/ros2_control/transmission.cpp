@@ -52,6 +52,16 @@ bool are_finite(const Values & values)
   return true;
 }
 
+template<std::size_t N>
+std::array<std::array<double, N>, 3> filled()
+{
+  std::array<std::array<double, N>, 3> values{};
+  for (auto & each : values) {
+    each.fill(std::nan(""));
+  }
+  return values;
+}
+
 // The rows of the commanded joints in the derivatives of all joints by the inputs.
 struct Jacobian
 {
@@ -183,6 +193,7 @@ struct Names
   std::array<double, INPUTS> reductions;
   std::array<std::string, JOINTS> joints;  // Empty where the URDF leaves one out
   std::array<double, JOINTS> offsets{};
+  std::array<bool, 3> commands{};  // Whether position, velocity, effort of all are commanded
 };
 
 class Transmission : public transmission_interface::Transmission
@@ -211,7 +222,7 @@ public:
       for (const ActuatorHandle & handle : actuators_[which]) {
         has_actuators_[which] = has_actuators_[which] && handle;
       }
-      has_commands_[which] = true;
+      has_commands_[which] = names_.commands[which];
       for (const std::size_t joint : COMMANDED) {
         has_commands_[which] = has_commands_[which] && joints_[which][joint];
       }
@@ -227,6 +238,8 @@ public:
     }
   }
 
+  // A handle may hold a command, of another call: states and commands are always written, if only
+  // the last valid ones.
   void actuator_to_joint() override
   {
     Values inputs{};
@@ -238,36 +251,18 @@ public:
     const int status = to_joints(inputs.data(), joints.data(), jacobian.of_joints.data());
     log_.note(log_.state, status, inputs);
     tell_status();
-    if (status > LAST_WITH_VALUES) {
-      return;
-    }
-    state_ = jacobian;
-    has_state_ = true;
-    for (std::size_t i = 0; i < JOINTS; ++i) {
-      set(joints_[POSITION][i], joints[i] + names_.offsets[i]);
-    }
-    if (has_actuators_[VELOCITY]) {
+    if (status <= LAST_WITH_VALUES) {
+      has_state_ = true;
+      state_ = jacobian;
       for (std::size_t i = 0; i < JOINTS; ++i) {
-        double rate = 0.0;
-        for (std::size_t k = 0; k < INPUTS; ++k) {
-          rate += jacobian.of_joints[i * INPUTS + k] *
-            (actuators_[VELOCITY][k].get_value() / names_.reductions[k]);
-        }
-        set(joints_[VELOCITY][i], rate);
+        told_[POSITION][i] = joints[i] + names_.offsets[i];
       }
+      tell_rates();
+      tell_efforts();
     }
-    if (has_actuators_[EFFORT]) {
-      Values efforts{}, of_joints{};
-      for (std::size_t k = 0; k < INPUTS; ++k) {
-        efforts[k] = actuators_[EFFORT][k].get_value() * names_.reductions[k];
-      }
-      if (jacobian.solve(efforts, of_joints, true)) {
-        for (std::size_t i = 0; i < JOINTS; ++i) {
-          set(joints_[EFFORT][i], 0.0);
-        }
-        for (std::size_t k = 0; k < INPUTS; ++k) {
-          set(joints_[EFFORT][COMMANDED[k]], of_joints[k]);
-        }
+    for (std::size_t which = 0; which < INTERFACES.size(); ++which) {
+      for (std::size_t i = 0; has_actuators_[which] && i < JOINTS; ++i) {
+        set(joints_[which][i], told_[which][i]);
       }
     }
   }
@@ -275,7 +270,7 @@ public:
   void joint_to_actuator() override
   {
     Jacobian jacobian = state_;
-    bool has_jacobian = has_state_;
+    bool is_valid = has_state_;
     if (has_commands_[POSITION]) {
       Values commands = read_commands(POSITION), inputs{};
       for (std::size_t k = 0; k < INPUTS; ++k) {
@@ -290,31 +285,21 @@ public:
       }
       log_.note(log_.command, status, commands);
       tell_status();
-      if (status > LAST_VALID) {
-        return;
-      }
-      has_jacobian = true;
-      for (std::size_t k = 0; k < INPUTS; ++k) {
-        set(actuators_[POSITION][k], inputs[k] * names_.reductions[k]);
+      is_valid = status <= LAST_VALID;
+      for (std::size_t k = 0; is_valid && k < INPUTS; ++k) {
+        given_[POSITION][k] = inputs[k] * names_.reductions[k];
       }
     }
-    if (has_jacobian && has_commands_[VELOCITY]) {
-      const Values rates = read_commands(VELOCITY);
-      Values of_inputs{};
-      if (jacobian.solve(rates, of_inputs, false)) {
-        for (std::size_t k = 0; k < INPUTS; ++k) {
-          set(actuators_[VELOCITY][k], of_inputs[k] * names_.reductions[k]);
-        }
-      }
+    give_rates(jacobian, is_valid);
+    if (is_valid && has_commands_[EFFORT]) {
+      give_efforts(jacobian);
     }
-    if (has_jacobian && has_commands_[EFFORT]) {
-      const Values efforts = read_commands(EFFORT);
-      for (std::size_t k = 0; are_finite(efforts) && k < INPUTS; ++k) {
-        double effort = 0.0;
-        for (std::size_t i = 0; i < INPUTS; ++i) {
-          effort += jacobian.commanded(i, k) * efforts[i];
+    for (std::size_t which = 0; which < INTERFACES.size(); ++which) {
+      // Before the first valid command the actuators' values stay as they are.
+      for (std::size_t k = 0; has_commands_[which] && k < INPUTS; ++k) {
+        if (std::isfinite(given_[which][k])) {
+          set(actuators_[which][k], given_[which][k]);
         }
-        set(actuators_[EFFORT][k], effort / names_.reductions[k]);
       }
     }
   }
@@ -323,6 +308,61 @@ public:
   std::size_t num_joints() const override {return JOINTS;}
 
 private:
+  void tell_rates()
+  {
+    for (std::size_t i = 0; has_actuators_[VELOCITY] && i < JOINTS; ++i) {
+      double rate = 0.0;
+      for (std::size_t k = 0; k < INPUTS; ++k) {
+        rate += state_.of_joints[i * INPUTS + k] *
+          (actuators_[VELOCITY][k].get_value() / names_.reductions[k]);
+      }
+      told_[VELOCITY][i] = rate;
+    }
+  }
+
+  // The commanded joints carry all.
+  void tell_efforts()
+  {
+    if (!has_actuators_[EFFORT]) {
+      return;
+    }
+    Values efforts{}, of_joints{};
+    for (std::size_t k = 0; k < INPUTS; ++k) {
+      efforts[k] = actuators_[EFFORT][k].get_value() * names_.reductions[k];
+    }
+    if (state_.solve(efforts, of_joints, true)) {
+      told_[EFFORT].fill(0.0);
+      for (std::size_t k = 0; k < INPUTS; ++k) {
+        told_[EFFORT][COMMANDED[k]] = of_joints[k];
+      }
+    }
+  }
+
+  // Without a pose the actuators stop.
+  void give_rates(const Jacobian & jacobian, bool is_valid)
+  {
+    Values of_inputs{};
+    if (has_commands_[VELOCITY] &&
+      (!is_valid || jacobian.solve(read_commands(VELOCITY), of_inputs, false)))
+    {
+      for (std::size_t k = 0; k < INPUTS; ++k) {
+        given_[VELOCITY][k] = of_inputs[k] * names_.reductions[k];
+      }
+    }
+  }
+
+  void give_efforts(const Jacobian & jacobian)
+  {
+    const Values efforts = read_commands(EFFORT);
+    for (std::size_t k = 0; are_finite(efforts) && k < INPUTS; ++k) {
+      double effort = 0.0;
+      for (std::size_t i = 0; i < INPUTS; ++i) {
+        effort += jacobian.commanded(i, k) * efforts[i];
+      }
+      given_[EFFORT][k] = effort / names_.reductions[k];
+    }
+  }
+
   template<typename Handle>
   static Handle find(
     const std::vector<Handle> & handles, const std::string & name, const std::string & interface)
@@ -338,7 +378,7 @@ private:
   template<typename Handle>
   static void set(Handle & handle, double value)
   {
-    if (handle && std::isfinite(value)) {
+    if (handle) {
       static_cast<void>(handle.set_value(value));
     }
   }
@@ -382,6 +422,9 @@ private:
   std::array<bool, 3> has_actuators_{}, has_commands_{};
   Jacobian state_;
   bool has_state_ = false;
+  // The last valid states of the joints and commands of the actuators; NaN before the first
+  std::array<std::array<double, JOINTS>, 3> told_ = filled<JOINTS>();
+  std::array<Values, 3> given_ = filled<INPUTS>();
 };
 
 class Loader : public transmission_interface::TransmissionLoader
@@ -412,6 +455,7 @@ private:
       names.actuators[k] = actuator.name;
       names.reductions[k] = actuator.mechanical_reduction;
     }
+    names.commands.fill(true);
     for (const auto & joint : info.joints) {
       const std::size_t k = place(JOINT_NAMES, joint.role, "joint", names.joints);
       if (joint.mechanical_reduction != 1.0) {
@@ -424,6 +468,11 @@ private:
       }
       names.joints[k] = joint.name;
       names.offsets[k] = joint.offset;
+      for (std::size_t which = 0; is_commanded(k) && which < INTERFACES.size(); ++which) {
+        const auto & all = joint.command_interfaces;
+        const bool has = std::find(all.begin(), all.end(), INTERFACES[which]) != all.end();
+        names.commands[which] = names.commands[which] && has;
+      }
     }
     for (std::size_t k = 0; k < INPUTS; ++k) {
       require(names.actuators[k], INPUT_NAMES[k], "actuator");
