@@ -35,6 +35,7 @@ NOT_RUN = {
     'needs Gazebo': 1,
     'needs PlotJuggler': 1,
     'needs RViz': 1,
+    'needs a ROS installation with ros2_control': 1,
     'needs a ROS installation': 19,
     'needs a second machine': 1,
     'needs a demo that runs in another terminal': 1,

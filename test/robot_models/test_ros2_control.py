@@ -297,21 +297,19 @@ def test_an_actuator_without_a_position_is_refused(programs):
 
 
 REFUSED = {
-    '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': [],
+    '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': ['gripper'],
     '2 for 1 inputs; name 1 different joint': [
-        '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
-    'left_fnger_joint: is neither a published joint': ['--driven-by', 'left_fnger_joint'],
+        'gripper', '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
+    'left_fnger_joint: is neither a published joint': [
+        'gripper', '--driven-by', 'left_fnger_joint'],
     '--branch: is for planar linkages of one input': ['ankle_motors', '--branch', '1'],
 }  # fmt: skip
 
 
 @pytest.mark.parametrize('told', REFUSED)
 def test_what_cannot_be_written_is_one_line(told, tmp_path, capsys):
-    words = REFUSED[told]
-    linkage = words[:1] if words and not words[0].startswith('-') else ['gripper']
-    options = words[len(linkage) if words[:1] == linkage else 0 :]
-    typed = ['compile', *linkage, '--ros2-control', str(tmp_path / 'arm'), *options]
-    assert main(typed) == 2
+    linkage, *options = REFUSED[told]
+    assert main(['compile', linkage, '--ros2-control', str(tmp_path / 'arm'), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert told in line
     assert not (tmp_path / 'arm').exists()
