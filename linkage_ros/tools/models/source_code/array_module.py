@@ -273,7 +273,7 @@ class _MaskedWriter(TextWriter):
         if name == '/' and self.mask and not constant[1]:
             text = f'{parts[0].in_parentheses(5)} / {self._guard(operation, texts[1])}'
             return WrittenText(text, 5, depth)
-        if name in ('<=', '>') and _is_accuracy(arguments[1]):
+        if name in ('<', '<=', '>', '>=') and _is_accuracy(arguments[1]):
             most = f'max({parts[1].text}, {_COARSE}.0 * eps)'
             return WrittenText(f'{parts[0].in_parentheses(4)} {name} {most}', 2, depth)
         if name == 'where' and all(constant[1:]):
@@ -346,7 +346,10 @@ class _ArrayBody(SourceBody):
         lines.append(f'status = xp.where(m0, {UNDECIDED}, status + {Status.INDETERMINATE.name})')
         writer.lines += lines
         self._write_tree(self._program.tree)
-        groups = [f'_stack(xp, ({", ".join(each)},))' for each in self._result_names()]
+        results = self._result_names()
+        without = (name for each in results for name in each if name not in self._merged)
+        writer.lines += (f'{name} = zero + nan' for name in without)
+        groups = [f'_stack(xp, ({", ".join(each)},))' for each in results]
         if names[count:]:
             writer.lines.append(f'status = xp.where(moving, status, {Status.INDETERMINATE.name})')
         writer.lines.append(f'return (status, {", ".join(groups)})')
