@@ -239,7 +239,7 @@ def beside_toggles(closure: Closure) -> list[State]:
 def test_a_library_has_the_numbers_of_the_steps_and_their_gradients(library, name, tmp_path):
     closure = closure_of(name)
     what, count = subject(closure), len(closure.input_names)
-    given = [*given_to(closure, 150), *beside_toggles(closure)]
+    given = [*given_to(closure, 250), *beside_toggles(closure)]
     found = run_in(library, what, given, tmp_path)
     assert off(what, found.told, given) <= ULPS
     # A compiler may not tell a toggle from what is some floats beside it.
