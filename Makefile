@@ -41,7 +41,7 @@ help:
 	@echo 'make test_all  the same with all cases, as before a release (three times as long)'
 	@echo 'make bench     measure ticks, latency and kinematics against other implementations'
 	@echo 'make timing    measure ticks with changing subscribers and under load, into docs/timing (35 min)'
-	@echo 'make accuracy  test the kinematics on 11 million cases, then run topologies (35 min)'
+	@echo 'make accuracy  test the kinematics on 17 million cases, plane and space, and topologies (one hour)'
 	@echo 'make topologies  test random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make arrays    add PyTorch, and test linkages as functions of arrays in all libraries (10 min)'
 	@echo 'make compiled  compare 100,000 states in C, Python and JavaScript with the plain steps (8 min)'

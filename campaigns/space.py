@@ -58,7 +58,7 @@ PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',
     'How exact spatial linkages are',
     """
-Made by `python -m campaigns.space --write`, a part of `make accuracy`.
+Made by `python -m campaigns.space --write`, a part of `make accuracy`; `--cases` sets how many.
 
 Errors are given in units of u·κ, as in [campaign.md](campaign.md). For a step κ goes over all that
 it starts from: places, distances, velocities and accelerations. For a linkage it goes over all
@@ -148,10 +148,8 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     axis, tape = random.randrange(3), exact.Tape()
     given = [tape.row(*each) for each in zip(*motion, strict=True)]
     point = exact.three_spheres(given, tape.row(rods), sign)
-    errors = exact.errors_of(
-        point[axis], [state.pins[4][axis] for state in _states_after(step, *motion)]
-    )
-    return Case(errors, (step, axis, motion))
+    found = [state.pins[4][axis] for state in _states_after(step, *motion)]
+    return Case(exact.errors_of(point[axis], found), (step, axis, motion))
 
 
 def rssr_case(random: Random) -> Case:
@@ -183,11 +181,7 @@ def _axis_on(tape: exact.Tape, linkage: SpaceLinkage, hinge: str) -> tuple[exact
 
 
 def _held_errors(
-    tape: exact.Tape,
-    closure: Any,
-    names: tuple[str, str, str],
-    pin: exact.Row,
-    found: Sequence[float],
+    tape: exact.Tape, closure: Any, names: Sequence[str], pin: exact.Row, found: Sequence[float]
 ) -> list[float]:
     """Return the errors of a hinge, one of whose points a rod holds at a distance from a pin."""
     hinge, point, other = names
@@ -224,9 +218,8 @@ def _feet(
     """Return where the rods hold the foot."""
     first, second = (_axis_on(tape, linkage, name) for name in ('pitch', 'roll'))
     points = [tape.row(linkage.points[point]) for *_, point in _ANKLE]
-    return [
-        exact.turned_about(exact.turned_about(c, *second, roll), *first, pitch) for c in points
-    ]
+    rolled = (exact.turned_about(point, *second, roll) for point in points)
+    return [exact.turned_about(point, *first, pitch) for point in rolled]
 
 
 def ankle_case(random: Random) -> Case:
@@ -321,13 +314,9 @@ def main() -> int:
     named = {family: tally for (_, family), tally in tallies.items()}
     table = accuracy_table(named)
     rows = [(name, f'{counts[name]:,}', *cells) for name, *cells in table.rows]
-    above = worst_table(named, LIMIT)
-    tables = [
-        Table(table.title, ('family', 'cases', *table.head[1:]), [*rows]),
-        above,
-        machine_of(begin, arguments, 'cases', total),
-    ]
-    publish(tables, PAGE if arguments.write else None)
+    table = Table(table.title, ('family', 'cases', *table.head[1:]), [*rows])
+    above, machine = worst_table(named, LIMIT), machine_of(begin, arguments, 'cases', total)
+    publish([table, above, machine], PAGE if arguments.write else None)
     return int(bool(above.rows))
 
 

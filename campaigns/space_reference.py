@@ -86,11 +86,6 @@ class Series:
         value = self.value.sqrt()
         return Series(self.tape, value, (self, 0.5 * value.inv()))
 
-    def acos(self) -> Series:
-        """Return the angle of a cosine, in [0, π]."""
-        value = self.value
-        return Series(self.tape, value.acos(), (self, -((1 - value * value).rsqrt())))
-
     def cos_sin(self) -> tuple[Series, Series]:
         """Return cosine and sine."""
         s, c = self.value.sin_cos()
@@ -193,8 +188,9 @@ def hinge_angle(place: Row, to: Row, rod: Series, sign: int) -> Series:
     (a, b, h), (x, y, z) = place, to
     rest = h - z
     r, d = dot([a, b], [a, b]), dot([x, y], [x, y])
-    cosine = (r + d + (rest * rest - rod * rod)) / (r * d).sqrt().times(2.0)
-    return angle_of(x, y) - angle_of(a, b) + cosine.acos().times(sign)
+    even = r + d + (rest * rest - rod * rod)
+    turn = angle_of(even, ((r * d).times(4.0) - even * even).sqrt())
+    return angle_of(x, y) - angle_of(a, b) + turn.times(sign)
 
 
 def slide_length(place: Row, to: Row, rod: Series, sign: int) -> Series:

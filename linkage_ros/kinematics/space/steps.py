@@ -81,8 +81,9 @@ class ClosedPose(NamedTuple):
     gap: float = 0.0
     lever: float = 0.0  # What the rate divides by; its sign is the assembly
     angle: float = 0.0  # From a toggle, in [rad]
-    rod: Vector = ZERO  # From the known point to the carried one, of a joint
-    bend: float = 1.0  # Half the second derivative of the rod's square by the joint
+    arm: Vector = ZERO  # From the origin of the child to its point, of a joint
+    rod: Vector = ZERO  # From the known point to the carried one
+    bend: float = 1.0  # Second derivative of half the rod's square by the joint
 
 
 class ClosedRates(NamedTuple):
@@ -90,7 +91,6 @@ class ClosedRates(NamedTuple):
 
     rate: float
     still: Twist  # Motion of the child at a rate of 0
-    arm: Vector  # From the origin of the child to its point
     slope: Vector  # Velocity of the point at a rate of 1
     slip: Vector  # Velocity of the point relative to the other end of the rod, at a rate of 0
 
@@ -129,6 +129,16 @@ def meet_circle(radius: float, distance: float, height: float, rod: float) -> tu
     return (
         low._replace(root=where(fold < stretch, fold, more)),
         high._replace(root=where(fold < stretch, more, stretch)),
+    )
+
+
+def part_along(low: Root, high: Root, distance: float, fold: float, stretch: float) -> float:
+    """Return fold − low²/2d, or high²/2d − stretch, from the smaller root; both are the same."""
+    unit = 0.5 / distance
+    return where(
+        low.root < high.root,
+        fold - unit * (low.root * low.root),
+        unit * (high.root * high.root) - stretch,
     )
 
 
@@ -249,13 +259,12 @@ class ClosedJoint:
         """
         frame = solved.pins[self.child]
         still = self.joint.motion(solved, velocities, frame, 0.0)
-        arm = frame.turn(self.place)
-        slip = minus(still.velocity(arm), velocities.pins[self.to])
+        slip = minus(still.velocity(pose.arm), velocities.pins[self.to])
         rate = subtract(self.rod.power(solved, velocities), dot(pose.rod, slip)) / pose.lever
-        slope = self.joint.slope(frame.z, arm)
+        slope = self.joint.slope(frame.z, pose.arm)
         velocities.coordinates.append(rate)
         velocities.pins.append(self.joint.motion(solved, velocities, frame, rate))
-        return ClosedRates(rate, still, arm, slope, slip)
+        return ClosedRates(rate, still, slope, slip)
 
     def accelerations(
         self, pose: Any, rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
@@ -267,10 +276,10 @@ class ClosedJoint:
         the r² that both terms on the left have.
         """
         frame = solved.pins[self.child]
-        rate, still, arm, slope, slip = rates
+        rate, still, slope, slip = rates
         before = self.joint.change(solved, velocities, changes, frame, 0.0, 0.0)
         whirl = scale(2.0 * rate, cross(still.spin, slope))
-        pull = minus(plus(still.acceleration(before, arm), whirl), changes.pins[self.to])
+        pull = minus(plus(still.acceleration(before, pose.arm), whirl), changes.pins[self.to])
         own = rate * add(2.0 * dot(slip, slope), multiply(rate, pose.bend))
         bend = subtract(self.rod.bend(solved, velocities, changes), add(dot(slip, slip), own))
         change = subtract(bend, dot(pose.rod, pull)) / pose.lever
@@ -310,19 +319,18 @@ class ClosedHinge(ClosedJoint):
         turn = atan2(y + 0.0, x + 0.0) - self.direction
         self._append(solved, base, turn + 2.0 * self.sign * half)
         lever = 0.5 * self.sign * (low.root * high.root)
-        # The rod in the triangle of the roots: next to a long arm, the difference of two places
-        # would have the error of the angle.
+        # Arm and rod in the triangle of the roots. By the angle of the hinge they would have its
+        # error, and next to a long arm the rod would be the difference of two places.
         unit = 1.0 / distance
-        away = where(
-            low.root < high.root,
-            subtract(radius, distance) - 0.5 * unit * (low.root * low.root),
-            0.5 * unit * (high.root * high.root) - add(radius, distance),
-        )
         out = scale(unit, (x, y, 0.0))
         beside = scale(unit * lever, (subtract(0.0, out[1]), out[0], 0.0))
+        along = part_along(low, high, distance, radius, radius)
+        arm = plus(plus(scale(along, out), beside), (0.0, 0.0, self.place[2]))
+        away = part_along(low, high, distance, subtract(radius, distance), add(radius, distance))
         rod = plus(plus(scale(away, out), beside), (0.0, 0.0, subtract(0.0, height)))
-        bend = 0.25 * (high.root * high.root - low.root * low.root)
-        return ClosedPose(status, 0.0, lever, 2.0 * half, base.turn(rod), bend)
+        return ClosedPose(
+            status, 0.0, lever, 2.0 * half, base.turn(arm), base.turn(rod), distance * along
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,7 +351,7 @@ class ClosedSlide(ClosedJoint):
         self._append(solved, base, z + self.sign * root)
         lever = self.sign * root
         rod = base.turn((subtract(0.0, x), subtract(0.0, y), lever))
-        return ClosedPose(status, 0.0, lever, atan2(root, distance), rod)
+        return ClosedPose(status, 0.0, lever, atan2(root, distance), base.turn(self.place), rod)
 
 
 @dataclass(frozen=True, slots=True)
@@ -412,11 +420,9 @@ class ThreeDistances:
         start, end, third = (solved.pins[index] for index in self.to)
         one, other, rod = (each.length(solved) for each in self.rods)
         line, across = minus(end, start), minus(third, start)
-        size = length(line)
-        along = scale(1.0 / size, line)
-        up = cross(along, across)
-        distance = length(up)
-        normal = scale(1.0 / distance, up)
+        up = cross(line, across)
+        size, area = length(line), length(up)
+        distance = area / size
         # 16·area² of the triangle P0 P1 X, by factors (Kahan).
         reach = root_between(one + other, size)
         apart = root_between(size, one - other)
@@ -425,16 +431,15 @@ class ThreeDistances:
                 return ClosedPose(root.status, root.missing)
         radius = 0.5 * (reach.root * apart.root) / size
         foot = 0.5 * (size + (one - other) * (one + other) / size)
-        low, high = meet_circle(radius, distance, dot(across, along) - foot, rod)
+        low, high = meet_circle(radius, distance, dot(across, line) / size - foot, rod)
         status, gap = status_of_roots(low, high)
         if not status.has_pose:
             return ClosedPose(status, gap)
-        # Its coordinates in the circle, r·cos θ and r·sin θ: far² − near² is 4·r·d.
-        unit = 0.25 / distance
-        x = unit * (high.root * high.root - low.root * low.root)
-        y = 2.0 * unit * self.sign * (low.root * high.root)
-        beside = plus(scale(x, cross(normal, along)), scale(y, normal))
-        solved.pins.append(plus(start, plus(scale(foot, along), beside)))
+        # Its coordinates in the circle, r·cos θ and r·sin θ.
+        x = part_along(low, high, distance, radius, radius)
+        y = 0.5 * self.sign * (low.root * high.root) / distance
+        beside = plus(scale(x / (area * size), cross(up, line)), scale(y / area, up))
+        solved.pins.append(plus(start, plus(scale(foot / size, line), beside)))
         lever = 0.5 * self.sign * (low.root * high.root) * size
         return ClosedPose(status, 0.0, lever, 2.0 * atan2(low.root, high.root))
 
