@@ -10,7 +10,6 @@
 
 from math import acos, atan2, cos, pi, remainder, sin, tau
 
-from campaigns.space_reference import turned_about
 import linkage_ros as lr
 from linkage_ros.kinematics import (
     find_standing_state,
@@ -30,6 +29,18 @@ def four_bar_turns():
     return [
         acos((reach**2 + d**2 - c**2) / (2.0 * reach * d)) + (0.0 if reach > b else pi)
         for reach in (b + a, b - a)
+    ]
+
+
+def turned_about(point, at, axis, angle):
+    """Return a point turned about a line, by Rodrigues' formula."""
+    size = mp.sqrt(sum(a * a for a in axis))
+    (x, y, z), k = (p - q for p, q in zip(point, at, strict=True)), [a / size for a in axis]
+    across = [k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x]
+    along = (k[0] * x + k[1] * y + k[2] * z) * (1 - mp.cos(angle))
+    return [
+        q + p * mp.cos(angle) + c * mp.sin(angle) + a * along
+        for q, p, c, a in zip(at, (x, y, z), across, k, strict=True)
     ]
 
 

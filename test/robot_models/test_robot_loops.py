@@ -23,8 +23,6 @@ import numpy as np
 import pytest
 import yaml
 
-from ..support.sampling import TAKES_ALL
-
 ROBOTS = Path(__file__).with_name('robots')
 OWN = Path(__file__).parents[1] / 'kinematics' / 'space' / 'linkages'
 RNG = np.random.default_rng(37)
@@ -328,21 +326,12 @@ def model_and_robot(file, folder):
     return urdf.read_text(), load(urdf)
 
 
-LONG = pytest.mark.skipif(not TAKES_ALL, reason='18 equations take 20 s to be compiled')
-
-
 @pytest.fixture(scope='module')
 def hexapod(tmp_path_factory):
     return model_and_robot('hexapod', tmp_path_factory.mktemp('hexapod'))
 
 
-@pytest.mark.parametrize(
-    'name',
-    [
-        pytest.param(name, marks=LONG if name == 'hexapod' else ())
-        for name in (*spatial_linkage_names(), *STRUTS)
-    ],
-)
+@pytest.mark.parametrize('name', [*spatial_linkage_names(), *STRUTS])
 def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
     file = STRUTS.get(name, name)
     if file == 'cylinder.yaml':
@@ -364,7 +353,6 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
     assert count > 5
 
 
-@LONG
 def test_each_rod_ends_where_the_platform_carries_it(hexapod):
     """By yourdfpy, at the joints of the model as they come back, beside the file's own points."""
     yourdfpy = pytest.importorskip('yourdfpy')

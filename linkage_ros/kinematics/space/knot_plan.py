@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from heapq import heappop, heappush
-from itertools import combinations, count
+from itertools import combinations, count, product
 from math import dist
 from typing import NamedTuple
 
@@ -199,12 +199,20 @@ class KnotPlanner:
             if name in plan.coordinates:
                 one, other = (plan.same[point] for point in points)
                 yield from self._rod_between(one, other, Rod(0.0, plan.coordinates[name]), name)
+        for name, joint in self._linkage.slides.items():
+            if name in plan.coordinates:
+                for one, other in product(plan.carried[joint.parent], plan.carried[joint.child]):
+                    rod, sides = plan.slide_rod(name, one, other), (joint.parent, joint.child)
+                    yield from self._rod_between(one, other, rod, name, sides)
 
-    def _rod_between(self, one: str, other: str, rod: Rod, by: str) -> Iterator[PlannedRod]:
-        """Yield the rod between two points, if both are known or on the tree."""
+    def _rod_between(
+        self, one: str, other: str, rod: Rod, by: str, sides: tuple[str, ...] = ()
+    ) -> Iterator[PlannedRod]:
+        """Yield the rod between points that are known or on the tree, on links without sides."""
         ends = []
         for point in (one, other):
-            links = [link for link in self._plan.carriers[point] if link in self._tree]
+            carriers = self._plan.carriers[point]
+            links = [link for link in carriers if link in self._tree and link not in sides]
             if self._plan.is_known(point) or links:
                 link = '' if self._plan.is_known(point) else links[0]
                 ends.append(PlannedEnd(link, point, ZERO))

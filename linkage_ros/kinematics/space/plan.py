@@ -155,8 +155,19 @@ class SpacePlan:
                 self.places[point], self.carriers[point] = place, []
                 for link in (joint.parent, joint.child):
                     self._carry(point, link)
-
+        for name, joint in linkage.slides.items():
+            if joint.parent != GROUND and self.carried[joint.parent]:
+                self._add_beside(name, joint.parent)
         self._merge_points()
+
+    def _add_beside(self, slide: str, tube: str) -> None:
+        """Add points of a tube by which it is turned to where its slide ends."""
+        axis, start = self._axes[slide], self.places[self.carried[tube][0]]
+        x = _across(axis)
+        for number, way in enumerate((x, cross(axis, x))):
+            point = f'{slide}, point {number + 1} beside'
+            self.places[point], self.carriers[point] = plus(start, way), []
+            self._carry(point, tube)
 
     def _merge_points(self) -> None:
         """Make one point of those that share a link and a place, as in a universal joint."""
@@ -384,6 +395,20 @@ class SpacePlan:
                 other = ends[1 - ends.index(point)]
                 if self.is_known(other):
                     yield _Pair(point, other, Rod(0.0, self.coordinates[name]), name)
+        for name, joint in self.linkage.slides.items():
+            for link, beyond in ((joint.parent, joint.child), (joint.child, joint.parent)):
+                if name in self.coordinates and link in self.carriers[point]:
+                    for other in self.carried[beyond]:
+                        if other != point and self.is_known(other):
+                            way = (point, other) if link == joint.parent else (other, point)
+                            yield _Pair(point, other, self.slide_rod(name, *way), name)
+
+    def slide_rod(self, slide: str, start: str, end: str) -> Rod:
+        """Return the distance of a point of a slide's parent to one of its child."""
+        axis, way = self._axes[slide], minus(self.places[end], self.places[start])
+        along = dot(way, axis)
+        beside = length(drop_rounding(minus(way, scale(along, axis))))
+        return Rod(along - self.pose_value(slide), self.coordinates[slide], beside)
 
     def _close(self, name: str) -> bool:
         """Close a hinge or slide by a rod."""

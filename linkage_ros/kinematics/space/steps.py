@@ -51,27 +51,39 @@ from linkage_ros.kinematics.step import LinearStep, LinkState, PLACED, StepPose
 
 
 class Rod(NamedTuple):
-    """The distance of two points: a constant, or the coordinate of a strut (0 if it is none)."""
+    """
+    The distance of two points: a constant, a strut, or that of points which a slide joins.
+
+    ``moved_by`` is the coordinate of the strut or slide, 0 if there is none. The constant is added
+    to it, and ``beside`` is the distance across a slide.
+    """
 
     constant: float
-    strut: int = 0
+    moved_by: int = 0
+    beside: float | None = None
 
     def length(self, solved: LinkState) -> float:
-        """Return the distance."""
-        return self.constant if not self.strut else solved.coordinates[self.strut]
+        """Return the distance; that of a strut may be negative, and then is none."""
+        along = self._along(solved)
+        return along if self.beside is None else hypotenuse(along, self.beside)
+
+    def _along(self, solved: LinkState) -> float:
+        if not self.moved_by:
+            return self.constant
+        return add(solved.coordinates[self.moved_by], self.constant)
 
     def power(self, solved: LinkState, velocities: LinkState) -> float:
         """Return the derivative of half the square of the distance."""
-        if not self.strut:
+        if not self.moved_by:
             return 0.0
-        return self.length(solved) * velocities.coordinates[self.strut]
+        return self._along(solved) * velocities.coordinates[self.moved_by]
 
     def bend(self, solved: LinkState, velocities: LinkState, changes: LinkState) -> float:
         """Return its second derivative."""
-        if not self.strut:
+        if not self.moved_by:
             return 0.0
-        rate = velocities.coordinates[self.strut]
-        return rate * rate + self.length(solved) * changes.coordinates[self.strut]
+        rate = velocities.coordinates[self.moved_by]
+        return rate * rate + self._along(solved) * changes.coordinates[self.moved_by]
 
 
 class ClosedPose(NamedTuple):
@@ -98,7 +110,7 @@ class ClosedRates(NamedTuple):
 def missing_length(rods: Sequence[Rod], solved: LinkState) -> float | None:
     """Return by how much a strut is shorter than 0; None if none is."""
     for rod in rods:
-        if rod.strut and not (size := rod.length(solved)) > 0.0:
+        if rod.moved_by and not (size := rod.length(solved)) > 0.0:
             return -size
     return None
 
