@@ -54,7 +54,7 @@ def test_links_iterated_with_two_inputs_are_named_with_their_line(
 ) -> None:
     (tmp_path / 'two.yaml').write_text(iterated_with_two_inputs(), 'utf-8')
     said = refused(linkage, 'two.yaml', '-o', 'a.c')
-    assert said.startswith('two.yaml:10: links: some close only together, by 2 inputs')
+    assert said.startswith('two.yaml:18: input: 2 inputs move links that close only together')
     assert not (tmp_path / 'a.c').exists()
 
 

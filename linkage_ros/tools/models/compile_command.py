@@ -69,9 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--branch',
         type=bounded_number(1, 1000, int),
-        metavar='NUMBER',
-        help='with --driven-by and one input, the branch that the crank is on; `linkage solve '
-        'FILE --joint JOINT=VALUE` shows them',
+        metavar='N',
+        help='with --driven-by and one input, the branch of the crank, as in linkage check --branches',
     )
     parser.add_argument(
         '--derivatives', type=int, choices=(0, 1, 2), default=2,
