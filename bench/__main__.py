@@ -127,7 +127,7 @@ def main() -> int:
                 tables.append(measure_transmissions(folder, *amount))
             if arguments.only in (None, 'arrays'):
                 say('linkages as modules for arrays')
-                amount = (1, 20_000) if arguments.quick else (5, 1_000_000)
+                amount = (1, 20_000) if arguments.quick else (3, 1_000_000)
                 tables.append(measure_modules(folder, *amount))
     except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)

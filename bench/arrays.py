@@ -9,7 +9,8 @@
 Arrays of states: the module for arrays beside `solve`, C, and what users write themselves.
 
 That is Newton's method on the equations of the loops, batched by JAX, with derivatives by JAX. It
-starts 0.1 rad beside the solution and ends when no equation is off by more than 1e-12.
+starts 0.1 rad beside the solution and ends when no equation is off by more than 1e-12. JAX runs
+the module as a whole, and in blocks that stay in the caches, without fusion of operations.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ _LINKAGES = {'four_bar': '', 'space/ankle': '', 'space/ankle_motors': '≥ 20'}
 _REACH = 0.2
 _BESIDE = 0.1
 _ACCURATE = 1e-12
+_BLOCK = 1000
 _SLOW = 100
 """What `solve` solves state by state takes so many times as long: it gets fewer states."""
 
@@ -77,6 +79,9 @@ def _add_rows(table: Table, folder: Path, name: str, target: str, amount: tuple[
             arrays = tuple(map(torch.tensor, given))
         elif library == 'jax':
             arrays = tuple(map(jax.numpy.asarray, given))
+            blocks = tuple(each.reshape(-1, _BLOCK, each.shape[1]) for each in arrays)
+            contenders['jax in blocks'] = _call(_in_blocks(motion), *blocks)
+            contenders['jax in blocks, positions'] = _call(_in_blocks(position), blocks[0])
             motion, position = jax.jit(motion), jax.jit(position)
         contenders[library] = _call(motion, *arrays)
         contenders[f'{library}, positions'] = _call(position, arrays[0])
@@ -131,6 +136,16 @@ def _call(function: Callable[..., Any], *arrays: Any) -> Callable[[], Any]:
         return [getattr(each, 'block_until_ready', lambda each=each: each)() for each in results]
 
     return run
+
+
+def _in_blocks(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that takes blocks in turn, each operation by itself."""
+    import jax  # local import: an extra
+
+    return jax.jit(
+        lambda *blocks: jax.lax.map(lambda block: function(*block), blocks),
+        compiler_options={'xla_disable_hlo_passes': 'fusion'},
+    )
 
 
 def _newton(name: str, solution: Array, inputs: Any) -> Callable[[], Any]:
