@@ -135,12 +135,12 @@ def meet_circle(radius: float, distance: float, height: float, rod: float) -> tu
     """
     low = root_between(rod, hypotenuse(height, subtract(distance, radius)))
     high = root_between(hypotenuse(height, add(distance, radius)), rod)
-    both, fold, stretch = 4.0 * (radius * distance), low.root, high.root
-    less = where(fold < stretch, fold, stretch)
-    more = sqrt(both - less * less)
+    folds = low.root < high.root
+    less = where(folds, low.root, high.root)
+    more = sqrt(4.0 * (radius * distance) - less * less)
     return (
-        low._replace(root=where(fold < stretch, fold, more)),
-        high._replace(root=where(fold < stretch, more, stretch)),
+        low._replace(root=where(folds, less, more)),
+        high._replace(root=where(folds, more, less)),
     )
 
 
