@@ -51,8 +51,8 @@ from linkage_ros.kinematics.space.steps import (
     LinkState,
     Rod,
     STILL,
-    ThreeDistances,
 )
+from linkage_ros.kinematics.space.three_distances import ThreeDistances
 
 PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',

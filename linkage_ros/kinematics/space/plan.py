@@ -50,8 +50,8 @@ from linkage_ros.kinematics.space.steps import (
     MeasuredStrut,
     ResolvedSlides,
     Rod,
-    ThreeDistances,
 )
+from linkage_ros.kinematics.space.three_distances import ThreeDistances
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,

@@ -135,12 +135,12 @@ def meet_circle(radius: float, distance: float, height: float, rod: float) -> tu
     """
     low = root_between(rod, hypotenuse(height, subtract(distance, radius)))
     high = root_between(hypotenuse(height, add(distance, radius)), rod)
-    both, fold, stretch = 4.0 * (radius * distance), low.root, high.root
-    less = where(fold < stretch, fold, stretch)
-    more = sqrt(both - less * less)
+    folds = low.root < high.root
+    less = where(folds, low.root, high.root)
+    more = sqrt(4.0 * (radius * distance) - less * less)
     return (
-        low._replace(root=where(fold < stretch, fold, more)),
-        high._replace(root=where(fold < stretch, more, stretch)),
+        low._replace(root=where(folds, less, more)),
+        high._replace(root=where(folds, more, less)),
     )
 
 
@@ -408,93 +408,6 @@ class AimedHinge:
         change = dot(slope, pull) / dot(slope, slope)
         changes.coordinates.append(change)
         changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
-
-
-@dataclass(frozen=True, slots=True)
-class ThreeDistances:
-    """
-    A point at known distances from three known points P0, P1, P2.
-
-    It lies on a circle about the line P0 P1, which the third rod meets. The assembly is the sign
-    of ((P1 − P0) × (P2 − P0))·(X − P0).
-    """
-
-    to: tuple[int, ...]
-    rods: tuple[Rod, ...]
-    sign: float
-    point: int
-
-    def close(self, solved: LinkState) -> ClosedPose:
-        """Append the point."""
-        missing = missing_length(self.rods, solved)
-        if missing is not None:
-            return ClosedPose(Status.OPEN, missing)
-        start, end, third = (solved.pins[index] for index in self.to)
-        one, other, rod = (each.length(solved) for each in self.rods)
-        line, across = minus(end, start), minus(third, start)
-        up = cross(line, across)
-        size, area = length(line), length(up)
-        distance = area / size
-        # 16·area² of the triangle P0 P1 X, by factors (Kahan).
-        reach = root_between(one + other, size)
-        apart = root_between(size, one - other)
-        for root in (reach, apart):
-            if root.status is not Status.CLOSED:
-                return ClosedPose(root.status, root.missing)
-        radius = 0.5 * (reach.root * apart.root) / size
-        foot = 0.5 * (size + (one - other) * (one + other) / size)
-        low, high = meet_circle(radius, distance, dot(across, line) / size - foot, rod)
-        status, gap = status_of_roots(low, high)
-        if not status.has_pose:
-            return ClosedPose(status, gap)
-        # Its coordinates in the circle, r·cos θ and r·sin θ.
-        x = part_along(low, high, distance, radius, radius)
-        y = 0.5 * self.sign * (low.root * high.root) / distance
-        beside = plus(scale(x / (area * size), cross(up, line)), scale(y / area, up))
-        solved.pins.append(plus(start, plus(scale(foot / size, line), beside)))
-        lever = 0.5 * self.sign * (low.root * high.root) * size
-        return ClosedPose(status, 0.0, lever, 2.0 * atan2(low.root, high.root))
-
-    def rates(self, pose: ClosedPose, solved: LinkState, velocities: LinkState) -> None:
-        """Append the velocity: (X − Pᵢ)·(Ẋ − Ṗᵢ) = L·L̇ for each rod."""
-        rods = self._rod_vectors(solved)
-        sides = [
-            add(dot(vector, velocities.pins[index]), rod.power(solved, velocities))
-            for vector, index, rod in zip(rods, self.to, self.rods, strict=True)
-        ]
-        velocities.pins.append(_solve_three(rods, sides, pose.lever))
-
-    def accelerations(
-        self, pose: Any, _rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
-    ) -> None:
-        """Append the acceleration: (X − Pᵢ)·(Ẍ − P̈ᵢ) + |Ẋ − Ṗᵢ|² = L·L̈ + L̇² for each rod."""
-        rods = self._rod_vectors(solved)
-        sides = []
-        for vector, index, rod in zip(rods, self.to, self.rods, strict=True):
-            slip = minus(velocities.pins[self.point], velocities.pins[index])
-            bend = subtract(rod.bend(solved, velocities, changes), dot(slip, slip))
-            sides.append(add(dot(vector, changes.pins[index]), bend))
-        changes.pins.append(_solve_three(rods, sides, pose.lever))
-
-    def _rod_vectors(self, solved: LinkState) -> list[Vector]:
-        return [minus(solved.pins[self.point], solved.pins[index]) for index in self.to]
-
-    def transmission_angle(self, pose: ClosedPose) -> float:
-        """Return the angle from a toggle, in [0, π/2] rad."""
-        return acute_angle(pose.angle)
-
-    def side_of(self, pose: ClosedPose) -> float:
-        """Return a number whose sign is the assembly."""
-        return pose.lever
-
-
-def _solve_three(rows: list[Vector], sides: list[float], determinant: float) -> Vector:
-    """Return the vector whose scalar products with three rows are given (Cramer's rule)."""
-    total = ZERO
-    for number, side in enumerate(sides):
-        one, other = rows[number - 2], rows[number - 1]
-        total = plus(total, scale(side, cross(one, other)))
-    return scale(1.0 / determinant, total)
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,13 +28,13 @@ from ...support.sampling import sample_count
 
 ONCE_BEYOND = {
     'hinge and rod': (12369, 34034, 35903, 64326, 95656, 96073),
-    'three distances': (27092, 46659),
+    'three distances': (27092, 46659, 144108),
 }
 """
 Cases of the campaign's seed that once were above the limit, up to 13 u·κ.
 
 Rods of a tenth of the arm, whose vector was the difference of two places; points near an axis,
-where r²·ω² was in two terms; places on a circle whose sine and cosine were rounded apart.
+where r²·ω² was in two terms; circles whose sine and cosine, or cross products, were rounded apart.
 """
 
 
