@@ -70,7 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--branch',
         type=bounded_number(1, 1000, int),
         metavar='N',
-        help='with --driven-by and one input, the branch of the crank, as in linkage check --branches',
+        help='with --driven-by and one input, the branch of the crank, as in linkage check '
+        '--branches',
     )
     parser.add_argument(
         '--derivatives', type=int, choices=(0, 1, 2), default=2,
