@@ -9,8 +9,8 @@
 The order of solution of a spatial linkage: which step finds what, from the inputs outwards.
 
 There are no kinds of mechanisms and no patterns. Two points of one link keep their distance: so
-each pair of points on a link is a rod, whatever else joins the link. The axis of a hinge gives two
-points to both of its links. In the order of the file, again and again:
+each pair of points on a link is a rod, whatever else joins the link. In the order of the file,
+again and again:
 
 - a joint whose value is known places its link;
 - a hinge or slide whose link carries a known point is aimed at it;
@@ -35,6 +35,7 @@ from typing import Any, NamedTuple
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
+from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.steps import (
@@ -72,9 +73,6 @@ _SQUARE = 1e-6
 
 _BETTER = 1e-6
 """By how much the next pair must be better: among equal ones the first is taken."""
-
-_SAME = 1e-9
-"""Points of one link nearer to each other than this are one."""
 
 
 class SpaceGroup(NamedTuple):
@@ -117,7 +115,9 @@ class SpacePlan:
         self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
-        self._collect_points()
+        known = CarriedPoints(linkage, self.scale)
+        self.places, self.axes, self.same = known.places, known.axes, known.same
+        self.carriers, self.carried = known.carriers, known.carried
         self.state = LinkState([0.0, *map(self.pose_value, linkage.driven)], [])
         """The pose as the steps so far find it."""
         self.frames[GROUND] = 0
@@ -132,68 +132,6 @@ class SpacePlan:
         )
         """Rods whose ends are known: nothing holds their turn about themselves."""
         self._measure_published()
-
-    def _collect_points(self) -> None:
-        """Collect the places in the pose, and which links carry each point."""
-        linkage, unit = self.linkage, 1.0 / self.scale
-        self.places: dict[str, Vector] = {
-            name: scale(unit, place) for name, place in linkage.points.items()
-        }
-        self.carriers: dict[str, list[str]] = {name: [] for name in self.places}
-        self.carried: dict[str, list[str]] = {name: [] for name in linkage.link_names}
-        self._axes: dict[str, Vector] = {}
-        for link, points in linkage.links.items():
-            for point in points:
-                self._carry(point, link)
-        for name, joint in linkage.pair_joints.items():
-            self._axes[name] = _unit(joint.axis)
-            if name in linkage.slides:
-                continue
-            at = scale(unit, joint.at)
-            for number, place in enumerate((at, plus(at, self._axes[name]))):
-                point = f'{name}, point {number + 1} of the axis'
-                self.places[point], self.carriers[point] = place, []
-                for link in (joint.parent, joint.child):
-                    self._carry(point, link)
-        for name, joint in linkage.slides.items():
-            if joint.parent != GROUND and self.carried[joint.parent]:
-                self._add_beside(name, joint.parent)
-        self._merge_points()
-
-    def _add_beside(self, slide: str, tube: str) -> None:
-        """Add points of a tube by which it is turned to where its slide ends."""
-        axis, start = self._axes[slide], self.places[self.carried[tube][0]]
-        x = _across(axis)
-        for number, way in enumerate((x, cross(axis, x))):
-            point = f'{slide}, point {number + 1} beside'
-            self.places[point], self.carriers[point] = plus(start, way), []
-            self._carry(point, tube)
-
-    def _merge_points(self) -> None:
-        """Make one point of those that share a link and a place, as in a universal joint."""
-        self.same = {name: name for name in self.places}
-        """For each point the one that it is known by."""
-        found = True
-        while found:
-            found = False
-            for points in self.carried.values():
-                for one, other in combinations(points, 2):
-                    if dist(self.places[one], self.places[other]) < _SAME:
-                        self._make_same(one, other)
-                        found = True
-                        break
-
-    def _make_same(self, kept: str, gone: str) -> None:
-        self.same = {name: kept if of == gone else of for name, of in self.same.items()}
-        for link in self.carriers.pop(gone):
-            others = self.carried[link]
-            others[others.index(gone)] = kept
-            self.carried[link] = list(dict.fromkeys(others))
-            self.carriers[kept] = list(dict.fromkeys((*self.carriers[kept], link)))
-
-    def _carry(self, point: str, link: str) -> None:
-        self.carriers[point].append(link)
-        self.carried[link].append(point)
 
     def add_step(self, step: Any) -> None:
         if not step.close(self.state).status.has_pose:
@@ -278,7 +216,7 @@ class SpacePlan:
     def _axis_to(self, name: str, child: str) -> Vector:
         """Return the axis of a joint, reversed if the child is its parent in the file."""
         joint = self.linkage.pair_joints[name]
-        return self._axes[name] if joint.child == child else scale(-1.0, self._axes[name])
+        return self.axes[name] if joint.child == child else scale(-1.0, self.axes[name])
 
     def pose_value(self, name: str) -> float:
         """Return the value of a joint in the pose, in the unit of the steps."""
@@ -297,7 +235,7 @@ class SpacePlan:
             at = scale(1.0 / self.scale, self.linkage.hinges[name].at)
         else:
             at = self.places[self.carried[child][0]] if self.carried[child] else ZERO
-        x = _across(z)
+        x = unit_across(z)
         if toward is not None:
             # The x axis leads roughly there: the direction does not jump from π to −π nearby.
             y, arm = cross(z, x), minus(toward, at)
@@ -405,7 +343,7 @@ class SpacePlan:
 
     def slide_rod(self, slide: str, start: str, end: str) -> Rod:
         """Return the distance of a point of a slide's parent to one of its child."""
-        axis, way = self._axes[slide], minus(self.places[end], self.places[start])
+        axis, way = self.axes[slide], minus(self.places[end], self.places[start])
         along = dot(way, axis)
         beside = length(drop_rounding(minus(way, scale(along, axis))))
         return Rod(along - self.pose_value(slide), self.coordinates[slide], beside)
@@ -618,19 +556,6 @@ class SpacePlan:
             if of in self.linkage.driven and not (self._slides(of) or self._slides(name)):
                 turns = lcm(turns, count_turns(total))
         return turns
-
-
-def _unit(vector: Vector) -> Vector:
-    size = hypot(*vector)
-    x, y, z = (one / size for one in vector)
-    return drop_rounding((x, y, z))
-
-
-def _across(axis: Vector) -> Vector:
-    """Return a unit vector across an axis; one of the axes of the ground where it can be."""
-    ways = sorted(GROUND_FRAME[:3], key=lambda way: abs(dot(way, axis)))
-    first = ways[0]
-    return _unit(minus(first, scale(dot(first, axis), axis)))
 
 
 def _dual_basis(axes: list[Vector]) -> list[Vector]:
