@@ -90,7 +90,7 @@ class SpaceClosure(StepwiseClosure):
 
         self.freedom: Freedom = find_freedom(linkage, plan)
         check_freedom(linkage, plan, self.freedom)
-        self.groups = plan.groups
+        self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
         """Rods that may turn about themselves."""
         self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
@@ -287,18 +287,14 @@ class SpaceClosure(StepwiseClosure):
         joints, in [rad] or [m]: another assembly is another pose of the file.
         """
         found: dict[int, list[dict[str, float]]] = {}
-        for step, number in zip(self.steps, self.step_groups, strict=True):
-            solve = getattr(step, 'other_solutions', None)
-            if solve is None:
-                continue
-            names = step.unknown  # type: ignore[attr-defined]
-            units = [1.0 if name in self.linkage.hinges else self.scale for name in names]
+        for number, knot in self._knots.items():
+            units = [1.0 if name in self.linkage.hinges else self.scale for name in knot.unknown]
             found[number] = [
                 {
                     name: value * unit
-                    for name, value, unit in zip(names, values, units, strict=True)
+                    for name, value, unit in zip(knot.unknown, values, units, strict=True)
                 }
-                for values in solve(starts)
+                for values in knot.other_solutions(starts)
             ]
         return found
 

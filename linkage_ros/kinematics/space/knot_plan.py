@@ -107,7 +107,9 @@ def add_knot(plan: SpacePlan) -> bool:
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
     given = grid_inputs(plan.linkage.inputs, before.inputs, plan.scale)
-    plan.add_step(Knot(KnotEquations(movers, rods, first), before, start, given, found.unknown))
+    knot = Knot(KnotEquations(movers, rods, first), before, start, given, found.unknown)
+    plan.knots[len(plan.groups)] = knot
+    plan.add_step(knot)
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))
     what = f'{len(rods)} equations for {list_names(found.unknown)}'
     method = f"iterated: Newton's method, {what}: {by}"

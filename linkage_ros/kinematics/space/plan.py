@@ -30,7 +30,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
 from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.linkage import GROUND
@@ -67,6 +67,9 @@ from linkage_ros.kinematics.space.vectors import (
     ZERO,
 )
 from linkage_ros.kinematics.step import FollowerJoint, LinkState
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.space.knot import Knot
 
 _SQUARE = 1e-6
 """Least sine of the angle at which a rod may meet the motion of its point in the pose."""
@@ -107,6 +110,8 @@ class SpacePlan:
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
         self.groups: list[SpaceGroup] = []
+        self.knots: dict[int, Knot] = {}
+        """Links that only close together, by the number of their group."""
         self.coordinates: dict[str, int] = {
             name: 1 + number for number, name in enumerate(linkage.driven)
         }
