@@ -16,7 +16,7 @@ import pytest
 
 
 def test_a_tool_is_a_command_or_what_the_core_asks_for():
-    assert set(TOOLS) - set(COMMANDS) == {'robot_description', 'spread'}
+    assert set(TOOLS) - set(COMMANDS) == {'arrays', 'robot_description', 'spread'}
     assert find_tool('robot_description').scene_urdf
 
 
