@@ -107,6 +107,27 @@ def test_numpy_tells_of_limits():
     assert {one.status for one in told} == {'CLOSED', 'LIMITED', 'INDETERMINATE'}
 
 
+@pytest.mark.parametrize(
+    ('name', 'joint'), [('four_bar', 'rocker_joint'), ('slider_crank', 'piston_slide')]
+)
+def test_a_dependent_joint_may_be_the_input(name, joint):
+    closure = closure_of(name).driven_by(joint, branch=1)
+    (reached,) = closure.input_ranges
+    beyond = 0.1 * (reached.highest - reached.lowest)
+    inputs = np.linspace(reached.lowest - beyond, reached.highest + beyond, 500)[:, None]
+    module = module_of(subject(closure))
+    status, joints = module['position'](inputs)
+    slopes = module['jacobian'](inputs)
+    for index, value in enumerate(inputs[:, 0].tolist()):
+        position = closure.position(value)
+        assert NUMBERS[status[index]] == position.status.name
+        if position.status.has_rates:
+            assert joints[index] == pytest.approx(position.joints, abs=1e-13)
+            right = closure.jacobian(position)
+            assert slopes[index] == pytest.approx(right, rel=1e-9, abs=1e-9)
+    assert set(status.tolist()) == {NUMBERS.index('CLOSED'), NUMBERS.index('OPEN')}
+
+
 def test_states_lie_along_any_axes():
     closure = closure_of('ankle')
     module = module_of(subject(closure))
