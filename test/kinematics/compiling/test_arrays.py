@@ -253,7 +253,7 @@ def beside_toggles(closure: Closure) -> list[State]:
     return [(value, 1.0, 0.0) for value in values if closure.position(value).status.has_rates]
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', ALL)
 @pytest.mark.parametrize('library', LIBRARIES)
