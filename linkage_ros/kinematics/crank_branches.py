@@ -232,22 +232,35 @@ class CrankBranch:
         self._least_steps = self._count_steps()
 
     def _count_steps(self) -> int:
-        """Return how many steps of Newton's method suffice in all cells, but those at toggles."""
+        """Return how many steps of Newton's method suffice in all cells."""
         most = 1
         for i in range(self._cells):
-            if i in self._steep_cells:
-                continue
             for t in (0.25, 0.75):
                 y, _ = self._output_at((i + t) / self._cells)
                 crank = self._start_at(self._cubics[i], t)
                 for count in range(1, _STEPS):
                     value, slope = self._evaluate(crank)
-                    step = self._without_turns(value - y) / slope if slope else nan
+                    step = self._step_from(value, slope, y, i + t) if slope else nan
                     crank -= step
                     most = max(most, count)
                     if not abs(step) >= self._greatest_last:
                         break
         return most
+
+    def _step_from(self, value: Any, slope: Any, y: Any, place: Any) -> Any:
+        """
+        Return a step of Newton's method from an output, for numbers and symbols.
+
+        Next to a toggle at y₀ it is that for the squares of y − y₀, which the crank goes as.
+        """
+        step = self._without_turns(value - y) / slope
+        for i, ((_, end), _, moved) in self._steep_cells.items():
+            inside = place > float(i) if i else place < 1.0
+            way, found = self._without_turns(y - end), self._without_turns(value - end)
+            if not abs(found) > 0.25 * moved:
+                raise UndecidedError
+            step = where(inside, step * (way + found) / (2.0 * found), step)
+        return step
 
     @staticmethod
     def _start_at(cubic: Sequence[Any], t: Any) -> Any:
@@ -377,7 +390,7 @@ class CrankBranch:
             found, slope = evaluate(crank)
             if not abs(slope) > self.flat:
                 raise UndecidedError
-            step = self._without_turns(found - y) / slope
+            step = self._step_from(found, slope, y, place)
             crank = crank - step
         if not abs(step) < self._greatest_last:
             raise UndecidedError

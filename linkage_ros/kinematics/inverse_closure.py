@@ -65,6 +65,7 @@ class CrankPose(NamedTuple):
     """The result of a `CrankStep`."""
 
     status: Status
+    crank: Any  # None without a pose
     gap: float = 0.0
 
 
@@ -81,7 +82,7 @@ class CrankStep:
         if crank is not None:
             begin = closure.closed.initial_state(crank)
             solved.coordinates[:], solved.pins[:] = begin.coordinates, begin.pins
-        return CrankPose(status)
+        return CrankPose(status, crank)
 
     def _output_at(self, crank: Any) -> tuple[Any, Any]:
         closed = self._closure.closed
@@ -170,11 +171,9 @@ class InverseClosure(Closure):
 
     def _trace_position(self, y: Any) -> Position:
         """Return the position at a symbol."""
-        state = self.initial_state(y)
-        status = self.program_steps[0].close(state).status
+        status, crank, _ = CrankStep(self).close(self.initial_state(y))
         if not status.has_rates:
             return Position(status, 0.0, (), _given_state(y, [0.0], []), [], self)
-        crank = self.closed.inputs_of(state)[0]
         found = self.closed.close_unlimited(crank)
         joints = self._joints_with(crank, found.joints)
         given = _given_state(y, *found.state)

@@ -269,6 +269,7 @@ DRIVEN = {
     'slider_crank': ('piston_slide', 'rod_joint'),
     'drag_link': ('rocker_joint',),
     'inverted_slider_crank': ('rod_joint', 'rod_slide'),
+    'excavator_bucket': ('bucket_joint',),
     'klann_leg': ('knee_joint', 'lower_rocker_joint'),
     'class_3': ('platform_joint',),
 }
@@ -294,8 +295,10 @@ def test_a_source_of_a_linkage_that_a_dependent_joint_drives(run, name, joint, t
             expected = plain(closure, state)
             if one.status == 'UNDECIDED':
                 undecided += 1
-            elif state[0] in (branch.low, branch.high):
-                assert one.values == pytest.approx(expected.values, rel=1e-12, abs=1e-12)
+            elif any(branch.steep) or state[0] in (branch.low, branch.high):
+                # The branch finds the crank of an end, and next to a toggle, without a table.
+                assert one.status == expected.status, state
+                assert one.values == pytest.approx(expected.values, rel=1e-10, abs=1e-10), state
             else:
                 assert one == expected, state
         assert undecided < 5
