@@ -302,7 +302,11 @@ REFUSED = {
         'gripper', '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
     'left_fnger_joint: is neither a published joint': [
         'gripper', '--driven-by', 'left_fnger_joint'],
-    '--branch: is for planar linkages of one input': ['ankle_motors', '--branch', '1'],
+    '--branch: is for planar linkages of one input': [
+        'ankle_motors', '--branch', '1', '--driven-by', 'pitch', '--driven-by', 'roll'],
+    '--branch: is for --driven-by; name the joint': ['ankle_motors', '--branch', '1'],
+    '-o: is for one source; leave out -o or --ros2-control': ['ankle_motors', '-o', 'x.h'],
+    '--arrays: is for one source': ['ankle_motors', '--arrays'],
 }  # fmt: skip
 
 

@@ -95,6 +95,8 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file, robot_of(arguments))
     closure: Any = read_any_closure(content)
+    if arguments.branch is not None and not arguments.driven_by:
+        raise LinkageError('--branch', 'is for --driven-by', 'name the joint, or leave it out')
     try:
         if arguments.ros2_control is not None:
             return _write_transmission(arguments, closure, file)
@@ -128,8 +130,9 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
 
 def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path) -> int:
     folder: Path = arguments.ros2_control
-    if arguments.output is not None:
-        raise LinkageError('-o', 'is for one source', 'leave out -o or --ros2-control')
+    for option, given in (('-o', arguments.output), ('--arrays', arguments.arrays)):
+        if given:
+            raise LinkageError(option, 'is for one source', f'leave out {option} or --ros2-control')
     name = folder.resolve().name
     if not _PACKAGE.fullmatch(name):
         raise LinkageError(
