@@ -132,7 +132,8 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
     folder: Path = arguments.ros2_control
     for option, given in (('-o', arguments.output), ('--arrays', arguments.arrays)):
         if given:
-            raise LinkageError(option, 'is for one source', f'leave out {option} or --ros2-control')
+            remedy = f'leave out {option} or --ros2-control'
+            raise LinkageError(option, 'is for one source', remedy)
     name = folder.resolve().name
     if not _PACKAGE.fullmatch(name):
         raise LinkageError(
