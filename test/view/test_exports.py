@@ -90,4 +90,4 @@ def test_a_linkage_that_c_cannot_have_has_no_source_and_the_error_says_so() -> N
     text = iterated_with_two_inputs()
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
     answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))
-    assert 'written in Python only' in answer['error']['text']
+    assert 'within their limits are too many cells' in answer['error']['text']
