@@ -126,7 +126,21 @@ def root_between(long: float, short: float) -> Root:
     return Root(0.0, -total, Status.OPEN)
 
 
-def meet_circle(radius: float, distance: float, height: float, rod: float) -> tuple[Root, Root]:
+class CircleMeeting(NamedTuple):
+    """Where a rod meets a circle of radius r, at a distance d from its axis."""
+
+    low: Root
+    high: Root
+    folds: bool  # Whether the low root is the smaller one
+    square: float  # Of the smaller root
+
+    def part_along(self, half: float, fold: float, stretch: float) -> float:
+        """Return fold − low²/2d, or high²/2d − stretch, both the same; ``half`` is 1/2d."""
+        part = half * self.square
+        return where(self.folds, fold - part, part - stretch)
+
+
+def meet_circle(radius: float, distance: float, height: float, rod: float) -> CircleMeeting:
     """
     Return both roots of a circle and a rod, as in the formula of the module.
 
@@ -137,20 +151,13 @@ def meet_circle(radius: float, distance: float, height: float, rod: float) -> tu
     high = root_between(hypotenuse(height, add(distance, radius)), rod)
     folds = low.root < high.root
     less = where(folds, low.root, high.root)
-    more = sqrt(4.0 * (radius * distance) - less * less)
-    return (
+    square = less * less
+    more = sqrt(4.0 * (radius * distance) - square)
+    return CircleMeeting(
         low._replace(root=where(folds, less, more)),
         high._replace(root=where(folds, more, less)),
-    )
-
-
-def part_along(low: Root, high: Root, distance: float, fold: float, stretch: float) -> float:
-    """Return fold − low²/2d, or high²/2d − stretch, from the smaller root; both are the same."""
-    unit = 0.5 / distance
-    return where(
-        low.root < high.root,
-        fold - unit * (low.root * low.root),
-        unit * (high.root * high.root) - stretch,
+        folds,
+        square,
     )
 
 
@@ -322,7 +329,8 @@ class ClosedHinge(ClosedJoint):
         base = self.joint.base(solved)
         x, y, z = base.locate(solved.pins[self.to])
         radius, distance, height = self.radius, hypotenuse(x, y), subtract(z, self.place[2])
-        low, high = meet_circle(radius, distance, height, self.rod.length(solved))
+        met = meet_circle(radius, distance, height, self.rod.length(solved))
+        low, high = met.low, met.high
         status, gap = status_of_roots(low, high)
         if not status.has_pose:
             return ClosedPose(status, gap)
@@ -336,9 +344,9 @@ class ClosedHinge(ClosedJoint):
         unit = 1.0 / distance
         out = scale(unit, (x, y, 0.0))
         beside = scale(unit * lever, (subtract(0.0, out[1]), out[0], 0.0))
-        along = part_along(low, high, distance, radius, radius)
+        along = met.part_along(0.5 * unit, radius, radius)
         arm = plus(plus(scale(along, out), beside), (0.0, 0.0, self.place[2]))
-        away = part_along(low, high, distance, subtract(radius, distance), add(radius, distance))
+        away = met.part_along(0.5 * unit, subtract(radius, distance), add(radius, distance))
         rod = plus(plus(scale(away, out), beside), (0.0, 0.0, subtract(0.0, height)))
         return ClosedPose(
             status, 0.0, lever, 2.0 * half, base.turn(arm), base.turn(rod), distance * along

@@ -17,7 +17,6 @@ from linkage_ros.kinematics.arithmetic import acute_angle, atan2
 from linkage_ros.kinematics.space.steps import (
     meet_circle,
     missing_length,
-    part_along,
     Rod,
     root_between,
     status_of_roots,
@@ -102,13 +101,15 @@ class ThreeDistances:
                 return MetPose(root.status, root.missing)
         radius = 0.5 * (reach.root * apart.root) / size
         foot = 0.5 * (size + (one - other) * (one + other) / size)
-        low, high = meet_circle(radius, distance, dot(across, line) / size - foot, rod)
+        met = meet_circle(radius, distance, dot(across, line) / size - foot, rod)
+        low, high = met.low, met.high
         status, gap = status_of_roots(low, high)
         if not status.has_pose:
             return MetPose(status, gap)
         # Its coordinates in the circle, r·cos θ and r·sin θ.
-        x = part_along(low, high, distance, radius, radius)
-        y = 0.5 * self.sign * (low.root * high.root) / distance
+        half = 0.5 / distance
+        x = met.part_along(half, radius, radius)
+        y = half * self.sign * (low.root * high.root)
         along, normal = scale(1.0 / size, line), scale(1.0 / area, up)
         beside = scale(1.0 / (area * size), cross(up, line))
         round_line = plus(scale(x, beside), scale(y, normal))
