@@ -107,6 +107,8 @@ def hinge_case(random: Random, near: bool = False) -> Case:
     apart = _distance(random, near)
     if near:
         low, high = hypot(height, d - r), hypot(height, d + r)
+        # A point near the axis has two toggles next to each other.
+        apart = min(apart, 0.5 * (high - low) / high)
         rod = random.choice((low * (1.0 + apart), high * (1.0 - apart)))
     else:
         rod = sqrt(d * d + r * r - 2.0 * r * d * cos(apart) + height * height)
