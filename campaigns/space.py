@@ -52,7 +52,7 @@ from linkage_ros.kinematics.space.steps import (
     Rod,
     STILL,
 )
-from linkage_ros.kinematics.space.three_distances import ThreeDistances
+from linkage_ros.kinematics.space.three_distances import nearest_first, ThreeDistances
 
 PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',
@@ -146,7 +146,9 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     up = sign * (sqrt(2.0 * apart) if near else sin(apart)) / hypot(*n)
     place = [p + a * u + b * v + up * w for p, u, v, w in zip(ends[0], x, y, n, strict=True)]
     rods = [dist(place, end) for end in ends]
-    step = ThreeDistances((1, 2, 3), tuple(map(Rod, rods)), float(sign), 4)
+    order = nearest_first((0, 1, 2), rods)
+    lengths = tuple(Rod(rods[end]) for end in order)
+    step = ThreeDistances(tuple(end + 1 for end in order), lengths, float(sign), 4)
     axis, tape = random.randrange(3), exact.Tape()
     given = [tape.row(*each) for each in zip(*motion, strict=True)]
     point = exact.three_spheres(given, tape.row(rods), sign)

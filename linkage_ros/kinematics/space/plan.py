@@ -52,7 +52,7 @@ from linkage_ros.kinematics.space.steps import (
     ResolvedSlides,
     Rod,
 )
-from linkage_ros.kinematics.space.three_distances import ThreeDistances
+from linkage_ros.kinematics.space.three_distances import nearest_first, ThreeDistances
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
@@ -441,8 +441,9 @@ class SpacePlan:
                     to[-1] = self.next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
             self.points[point] = self.next_pin
-            lengths = tuple(pair.rod for pair in three)
-            self.add_step(ThreeDistances(tuple(to), lengths, sign, self.next_pin))
+            ends = zip(to, (pair.rod for pair in three), strict=True)
+            points, lengths = zip(*nearest_first([*ends], [*map(length, rods)]), strict=True)
+            self.add_step(ThreeDistances(points, lengths, sign, self.next_pin))
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'

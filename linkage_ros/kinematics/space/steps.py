@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.arithmetic import acute_angle, atan2, Root, ROUNDING, sqrt, where
+from linkage_ros.kinematics.arithmetic import acute_angle, atan2, ROUNDING, sqrt, where
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair
 from linkage_ros.kinematics.space.vectors import (
     add,
@@ -95,7 +95,7 @@ class ClosedPose(NamedTuple):
     angle: float = 0.0  # From a toggle, in [rad]
     arm: Vector = ZERO  # From the origin of the child to its point, of a joint
     rod: Vector = ZERO  # From the known point to the carried one
-    bend: float = 1.0  # Second derivative of half the rod's square by the joint
+    bend: float = 0.0  # Of a hinge: second derivative of half the rod's square by the joint
 
 
 class ClosedRates(NamedTuple):
@@ -115,57 +115,64 @@ def missing_length(rods: Sequence[Rod], solved: LinkState) -> float | None:
     return None
 
 
-def root_between(long: float, short: float) -> Root:
-    """Return √(long² − short²); within the rounding of the two lengths it is a toggle."""
+class Reach(NamedTuple):
+    """What two lengths leave to a toggle, where they are the same."""
+
+    square: float  # Of the longer one, less that of the shorter one
+    missing: float = 0.0  # By how much the longer one is too short
+    status: Status = Status.CLOSED
+
+
+def reach_between(long: float, short: float) -> Reach:
+    """Return long² − short²; within the rounding of the two lengths it is a toggle."""
     total, size = long - short, long + short
     rounding = ROUNDING * size
     if total > rounding:
-        return Root(sqrt(total * size))
+        return Reach(total * size)
     if total >= -rounding:
-        return Root(0.0, 0.0, Status.TOGGLE)
-    return Root(0.0, -total, Status.OPEN)
+        return Reach(0.0, 0.0, Status.TOGGLE)
+    return Reach(0.0, -total, Status.OPEN)
 
 
 class CircleMeeting(NamedTuple):
     """Where a rod meets a circle of radius r, at a distance d from its axis."""
 
-    low: Root
-    high: Root
-    folds: bool  # Whether the low root is the smaller one
-    square: float  # Of the smaller root
+    status: Status
+    gap: float
+    radius: float = 0.0
+    turn: float = 0.0  # By how much r·cos θ is less than r, or more than −r
+    sense: float = 1.0  # 1 if it is less than r, −1 if it is more than −r
+    lever: float = 0.0  # r·d·sin θ
 
-    def part_along(self, half: float, fold: float, stretch: float) -> float:
-        """Return fold − low²/2d, or high²/2d − stretch, both the same; ``half`` is 1/2d."""
-        part = half * self.square
-        return where(self.folds, fold - part, part - stretch)
+    def part_along(self, start: float = 0.0) -> float:
+        """Return r·cos θ − d, if ``start`` is d times the sense."""
+        return self.sense * (subtract(self.radius, start) - self.turn)
 
 
 def meet_circle(radius: float, distance: float, height: float, rod: float) -> CircleMeeting:
     """
-    Return both roots of a circle and a rod, as in the formula of the module.
+    Return how a circle and a rod meet, by the roots in the formula of the module.
 
-    Their squares add up to 4·r·d. The greater root is what the smaller one leaves of it: so what
-    is rounded is the place on the circle, and no point beside the circle is found.
+    Their squares add up to 4·r·d. The greater one is what the smaller one leaves of it: so what is
+    rounded is the place on the circle, and no point beside the circle is found.
     """
-    low = root_between(rod, hypotenuse(height, subtract(distance, radius)))
-    high = root_between(hypotenuse(height, add(distance, radius)), rod)
-    folds = low.root < high.root
-    less = where(folds, low.root, high.root)
-    square = less * less
-    more = sqrt(4.0 * (radius * distance) - square)
-    return CircleMeeting(
-        low._replace(root=where(folds, less, more)),
-        high._replace(root=where(folds, more, less)),
-        folds,
-        square,
-    )
+    low = reach_between(rod, hypotenuse(height, subtract(distance, radius)))
+    high = reach_between(hypotenuse(height, add(distance, radius)), rod)
+    status, gap = status_between(low, high)
+    if not status.has_pose:
+        return CircleMeeting(status, gap)
+    folds = low.square < high.square
+    square = where(folds, low.square, high.square)
+    lever = 0.5 * sqrt(square * (4.0 * (radius * distance) - square))
+    sense = where(folds, 1.0, -1.0)
+    return CircleMeeting(status, gap, radius, 0.5 * square / distance, sense, lever)
 
 
-def status_of_roots(low: Root, high: Root) -> tuple[Status, float]:
-    """Return the status of two roots, and the gap; two toggles leave the pose undefined."""
-    for root in (low, high):
-        if root.status is Status.OPEN:
-            return Status.OPEN, root.missing
+def status_between(low: Reach, high: Reach) -> tuple[Status, float]:
+    """Return the status of two reaches, and the gap; two toggles leave the pose undefined."""
+    for reach in (low, high):
+        if reach.status is Status.OPEN:
+            return Status.OPEN, reach.missing
     if low.status is Status.TOGGLE and high.status is Status.TOGGLE:
         return Status.INDETERMINATE, 0.0
     return (Status.TOGGLE if Status.TOGGLE in (low.status, high.status) else Status.CLOSED), 0.0
@@ -288,22 +295,20 @@ class ClosedJoint:
     def accelerations(
         self, pose: Any, rates: Any, solved: LinkState, velocities: LinkState, changes: LinkState
     ) -> None:
-        """
-        Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇².
-
-        What the square of the rate contributes is one term. Of a hinge it is r·d·cos θ, without
-        the r² that both terms on the left have.
-        """
+        """Append the accelerations: (X − B)·(Ẍ − B̈) + |Ẋ − Ḃ|² = L·L̈ + L̇²."""
         frame = solved.pins[self.child]
-        rate, still, slope, slip = rates
+        rate, still, slope, _ = rates
         before = self.joint.change(solved, velocities, changes, frame, 0.0, 0.0)
         whirl = scale(2.0 * rate, cross(still.spin, slope))
         pull = minus(plus(still.acceleration(before, pose.arm), whirl), changes.pins[self.to])
-        own = rate * add(2.0 * dot(slip, slope), multiply(rate, pose.bend))
-        bend = subtract(self.rod.bend(solved, velocities, changes), add(dot(slip, slip), own))
+        bend = subtract(self.rod.bend(solved, velocities, changes), self._square_of(pose, rates))
         change = subtract(bend, dot(pose.rod, pull)) / pose.lever
         changes.coordinates.append(change)
         changes.pins.append(self.joint.change(solved, velocities, changes, frame, rate, change))
+
+    def _square_of(self, pose: ClosedPose, rates: ClosedRates) -> float:
+        """Return |Ẋ − Ḃ|², and what the square of the rate adds to (X − B)·Ẍ."""
+        raise NotImplementedError
 
     def transmission_angle(self, pose: ClosedPose) -> float:
         """Return the angle from a toggle, in [0, π/2] rad."""
@@ -330,27 +335,30 @@ class ClosedHinge(ClosedJoint):
         x, y, z = base.locate(solved.pins[self.to])
         radius, distance, height = self.radius, hypotenuse(x, y), subtract(z, self.place[2])
         met = meet_circle(radius, distance, height, self.rod.length(solved))
-        low, high = met.low, met.high
-        status, gap = status_of_roots(low, high)
-        if not status.has_pose:
-            return ClosedPose(status, gap)
-        half = atan2(low.root, high.root)
-        # Adding 0.0 makes 0.0 of −0.0: otherwise the direction could be −π instead of π.
-        turn = atan2(y + 0.0, x + 0.0) - self.direction
-        self._append(solved, base, turn + 2.0 * self.sign * half)
-        lever = 0.5 * self.sign * (low.root * high.root)
+        if not met.status.has_pose:
+            return ClosedPose(met.status, met.gap)
         # Arm and rod in the triangle of the roots. By the angle of the hinge they would have its
         # error, and next to a long arm the rod would be the difference of two places.
+        lever = self.sign * met.lever
+        along = met.part_along()
+        bend = distance * along
+        angle = atan2(lever, bend)
+        # Adding 0.0 makes 0.0 of −0.0: otherwise the direction could be −π instead of π.
+        turn = atan2(y + 0.0, x + 0.0) - self.direction
+        self._append(solved, base, turn + angle)
         unit = 1.0 / distance
         out = scale(unit, (x, y, 0.0))
         beside = scale(unit * lever, (subtract(0.0, out[1]), out[0], 0.0))
-        along = met.part_along(0.5 * unit, radius, radius)
         arm = plus(plus(scale(along, out), beside), (0.0, 0.0, self.place[2]))
-        away = met.part_along(0.5 * unit, subtract(radius, distance), add(radius, distance))
+        away = met.part_along(met.sense * distance)
         rod = plus(plus(scale(away, out), beside), (0.0, 0.0, subtract(0.0, height)))
-        return ClosedPose(
-            status, 0.0, lever, 2.0 * half, base.turn(arm), base.turn(rod), distance * along
-        )
+        return ClosedPose(met.status, 0.0, lever, angle, base.turn(arm), base.turn(rod), bend)
+
+    def _square_of(self, pose: ClosedPose, rates: ClosedRates) -> float:
+        # The square of the rate has one factor, r·d·cos θ: both its terms have r², which cancels.
+        rate, _, slope, slip = rates
+        own = rate * add(2.0 * dot(slip, slope), multiply(rate, pose.bend))
+        return add(dot(slip, slip), own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,13 +373,20 @@ class ClosedSlide(ClosedJoint):
         base = self.joint.base(solved)
         x, y, z = minus(base.locate(solved.pins[self.to]), self.place)
         distance = hypotenuse(x, y)
-        root, gap, status = root_between(self.rod.length(solved), distance)
+        square, gap, status = reach_between(self.rod.length(solved), distance)
         if status is Status.OPEN:
             return ClosedPose(status, gap)
-        self._append(solved, base, z + self.sign * root)
+        root = sqrt(square)
         lever = self.sign * root
+        self._append(solved, base, z + lever)
         rod = base.turn((subtract(0.0, x), subtract(0.0, y), lever))
         return ClosedPose(status, 0.0, lever, atan2(root, distance), base.turn(self.place), rod)
+
+    def _square_of(self, _pose: ClosedPose, rates: ClosedRates) -> float:
+        # Whole: where the slide follows the point, its terms would cancel.
+        rate, _, slope, slip = rates
+        whole = plus(slip, scale(rate, slope))
+        return dot(whole, whole)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,23 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from linkage_ros.kinematics.arithmetic import acute_angle, atan2
+from linkage_ros.kinematics.arithmetic import acute_angle, atan2, sqrt, where
 from linkage_ros.kinematics.space.steps import (
     meet_circle,
     missing_length,
+    reach_between,
     Rod,
-    root_between,
-    status_of_roots,
 )
 from linkage_ros.kinematics.space.vectors import (
     add,
     cross,
     dot,
-    length,
     minus,
-    multiply,
     plus,
     scale,
     subtract,
@@ -37,12 +34,24 @@ from linkage_ros.kinematics.space.vectors import (
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 
+End = TypeVar('End')
+
+
+def nearest_first(ends: Sequence[End], distances: Sequence[float]) -> tuple[End, ...]:
+    """
+    Return what a point is measured from, the nearest first, in the same sense of rotation.
+
+    A step starts from the first one: an arm that is short has little to cancel.
+    """
+    first = distances.index(min(distances))
+    return *ends[first:], *ends[:first]
+
 
 class MetPose(NamedTuple):
     """
     The pose of a point at three distances.
 
-    In the frame of the ways along P0 P1, beside it in the plane of the three points, and up.
+    The ways are P0 P1, upwards × P0 P1, and upwards, which is P0 P1 × P0 P2.
     """
 
     status: Status
@@ -50,22 +59,21 @@ class MetPose(NamedTuple):
     lever: float = 0.0  # Its sign is the assembly
     angle: float = 0.0  # From a toggle, in [rad]
     ways: tuple[Vector, ...] = ()
-    place: Vector = ZERO  # Of the point, from P0
-    third: tuple[float, float] = (0.0, 0.0)  # Place of P2, from P0
+    squares: tuple[float, ...] = ()  # Of P0 P1, and of the way upwards
+    along: float = 0.0  # P0 P1 · P0 P2
+    place: Vector = ZERO  # Of the point, from P0: multiples of the ways
     rods: tuple[Vector, ...] = ()  # To the point from P1 and P2
-    line: float = 0.0  # |P0 P1|
 
     def solve(self, sides: Sequence[float]) -> Vector:
         """Return the vector whose scalar products with P0 P1, P0 P2 and P0 X are given."""
+        square, area_square = self.squares
         x, y, z = self.place
-        along = sides[0] / self.line
-        beside = subtract(sides[1], multiply(self.third[0], along)) / self.third[1]
-        up = subtract(sides[2], add(x * along, y * beside)) / z
-        parts = (
-            scale(part, way) for part, way in zip((along, beside, up), self.ways, strict=True)
-        )
-        one, other, last = parts
-        return plus(plus(one, other), last)
+        along = sides[0] / square
+        beside = subtract(sides[1], along * self.along)
+        up = subtract(sides[2], add(x * sides[0], y * square * beside)) / z
+        one, other, last = self.ways
+        across = plus(scale(beside / area_square, other), scale(up / area_square, last))
+        return plus(scale(along, one), across)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,42 +97,55 @@ class ThreeDistances:
             return MetPose(Status.OPEN, missing)
         start, end, third = (solved.pins[index] for index in self.to)
         one, other, rod = (each.length(solved) for each in self.rods)
-        line, across = minus(end, start), minus(third, start)
-        up = cross(line, across)
-        size, area = length(line), length(up)
+        line, across, beyond = minus(end, start), minus(third, start), minus(third, end)
+        square, twice = dot(line, line), dot(plus(across, beyond), line)
+        size = sqrt(square)
+        for reach in (reach_between(one + other, size), reach_between(size, one - other)):
+            if reach.status is not Status.CLOSED:
+                return MetPose(reach.status, reach.missing)
+        # The cross product of the shorter edge: of both it is the same.
+        nearer = twice < 0.0
+        edge = [where(nearer, a, b) for a, b in zip(across, beyond, strict=True)]
+        up = cross(line, (edge[0], edge[1], edge[2]))
+        area_square = dot(up, up)
+        area = sqrt(area_square)
         distance = area / size
-        # 16·area² of the triangle P0 P1 X, by factors (Kahan).
-        reach = root_between(one + other, size)
-        apart = root_between(size, one - other)
-        for root in (reach, apart):
-            if root.status is not Status.CLOSED:
-                return MetPose(root.status, root.missing)
-        radius = 0.5 * (reach.root * apart.root) / size
-        foot = 0.5 * (size + (one - other) * (one + other) / size)
-        met = meet_circle(radius, distance, dot(across, line) / size - foot, rod)
-        low, high = met.low, met.high
-        status, gap = status_of_roots(low, high)
-        if not status.has_pose:
-            return MetPose(status, gap)
+        # Along P0 P1 from its middle: what P1 and a P2 next to it have in common would cancel.
+        off = 0.5 * ((one - other) * (one + other)) / size
+        height = subtract(0.5 * twice / size, off)
+        foot, rest = 0.5 * size + off, off - 0.5 * size
+        # By the shorter rod: so what is rounded is the place on its sphere.
+        short = one < other
+        reach = reach_between(where(short, one, other), abs(where(short, foot, rest)))
+        if reach.status is not Status.CLOSED:
+            return MetPose(reach.status, reach.missing)
+        radius = sqrt(reach.square)
+        met = meet_circle(radius, distance, height, rod)
+        if not met.status.has_pose:
+            return MetPose(met.status, met.gap)
         # Its coordinates in the circle, r·cos θ and r·sin θ.
-        half = 0.5 / distance
-        x = met.part_along(half, radius, radius)
-        y = half * self.sign * (low.root * high.root)
-        along, normal = scale(1.0 / size, line), scale(1.0 / area, up)
-        beside = scale(1.0 / (area * size), cross(up, line))
-        round_line = plus(scale(x, beside), scale(y, normal))
-        arm = plus(scale(foot, along), round_line)
+        x = met.part_along()
+        lever = self.sign * met.lever
+        y = lever / distance
+        beside, over = cross(up, line), 1.0 / (area * size)
+        place = (foot / size, x * over, y / area)
+        risen = scale(place[2], up)
+        round_line = plus(scale(place[1], beside), risen)
+        arm = plus(scale(place[0], line), round_line)
+        # As in `ClosedHinge`: next to P2 it would be the difference of two places.
+        away = met.part_along(met.sense * distance)
+        last = minus(plus(scale(away * over, beside), risen), scale(height / size, line))
         solved.pins.append(plus(start, arm))
         return MetPose(
-            status,
+            met.status,
             0.0,
-            0.5 * self.sign * (low.root * high.root) * size,
-            2.0 * atan2(low.root, high.root),
-            (along, beside, normal),
-            (foot, x, y),
-            (dot(across, along), distance),
-            (plus(scale(foot - size, along), round_line), minus(arm, across)),
-            size,
+            lever * size,
+            atan2(lever, distance * x),
+            (line, beside, up),
+            (square, area_square),
+            dot(across, line),
+            place,
+            (plus(scale(rest / size, line), round_line), last),
         )
 
     def rates(

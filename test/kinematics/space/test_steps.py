@@ -28,13 +28,17 @@ from ...support.sampling import sample_count
 
 ONCE_BEYOND = {
     'hinge and rod': (12369, 34034, 35903, 64326, 95656, 96073),
+    'slide and rod': (361824,),
     'three distances': (27092, 46659, 144108),
+    'three distances, near': (238370, 419027),
 }
 """
 Cases of the campaign's seed that once were above the limit, up to 13 u·κ.
 
 Rods of a tenth of the arm, whose vector was the difference of two places; points near an axis,
-where r²·ω² was in two terms; circles whose sine and cosine, or cross products, were rounded apart.
+where r²·ω² was in two terms; a slide that follows its point, where the terms of its square cancel;
+circles whose sine and cosine, or cross products, were rounded apart; points next to one of three,
+and three points near a line.
 """
 
 
