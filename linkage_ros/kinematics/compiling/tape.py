@@ -158,6 +158,11 @@ class Tape:
             name, given = '-', (given[0], back)
         elif name == '+' and (back := _negated_operand(given[0])) is not None:
             name, given = '-', (given[1], back)
+        elif name == '-' and (back := _negated_operand(given[1])) is not None:
+            name, given = '+', (given[0], back)
+        elif name in ('*', '/') and (rest := _without_negation(name, given)) is not None:
+            # Out of the product: a sum takes it in.
+            return -self.write(name, *rest)
         return Symbol(self, self._new_operation(name, given, _result_kind(name, given), None))
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Symbol:
@@ -170,6 +175,9 @@ class Tape:
     ) -> Operation:
         key = (name, *(_argument_key(argument) for argument in arguments))
         operation = self._known.get(key)
+        if operation is None and name in ('+', '*') and kind == 'real':
+            # The same number, whichever comes first.
+            operation = self._known.get((name, *key[:0:-1]))
         if operation is None:
             if value is None:
                 value = _operation_value(name, arguments)
@@ -329,6 +337,20 @@ def _negated_operand(given: Any) -> Any:
     if isinstance(given, Operation) and given.name == 'negative' and given.kind == 'real':
         return given.arguments[0]
     return None
+
+
+def _without_negation(name: str, given: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """Return what a real product or quotient is the negation of, or None."""
+    one, other = given
+    if any(isinstance(a, complex) or getattr(a, 'kind', 'real') != 'real' for a in given):
+        return None
+    if (back := _negated_operand(one)) is not None:
+        return back, other
+    if (back := _negated_operand(other)) is not None:
+        return one, back
+    if name == '*' and _is_exactly(one, -1.0):
+        return 1.0, other
+    return (one, 1.0) if _is_exactly(other, -1.0) else None
 
 
 def _result_kind(name: str, given: tuple[Any, ...]) -> Kind:

@@ -239,6 +239,8 @@ def test_simplified_operations_keep_their_bits():
             x + 0.0, 0.0 + x, x - 0.0, 0.0 - x, x * 1.0, 1.0 * x, x / 1.0, -1.0 * x, 0.0 - (-x),
             (0.0 + x) + 0.0, 0.0 + (0.0 + x), abs(x) + 0.0, (-x) + y, x + (-y), x - (-y),
             (x + y) + 0.0, 0.0 + (x - y), 0.0 + (0.5 + x), abs(abs(x)), x - y, x * y,
+            -x * y, x * -y, -x * -y, -1.0 * (-x), y + -x * y, y - x * (-y), 2.0 * -x, x - 2.0 * -y,
+            -x / 7.0, 7.0 / -(x * x + 1.0), y - -x / 7.0,
         ]  # fmt: skip
 
     line = compile_line(done, (1.0, 2.0))
@@ -247,6 +249,17 @@ def test_simplified_operations_keep_their_bits():
         for y in values:
             expected = done(x, y)
             assert repr(line(x, y)) == repr((tuple(expected),))
+
+
+def test_a_sum_takes_in_the_negation_of_a_product():
+    tape = Tape()
+    x, y = tape.add_input('x', 0.3), tape.add_input('y', 0.7)
+    for one, other in (
+        (x + -x * -y, x + x * y),
+        (x - y * (-1.0 * x), x + x * y),
+        (x + y / -x, x - y / x),
+    ):
+        assert one.operation is other.operation
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1', 'excavator_bucket'])
