@@ -27,6 +27,7 @@ from itertools import chain, islice, product
 from math import copysign, inf, isfinite, ldexp, prod, tau
 from typing import Any, NamedTuple, Protocol
 
+from linkage_ros.generated_code import define_function
 from linkage_ros.kinematics.arithmetic import call, has_result
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.compiling import compile_line
@@ -66,6 +67,7 @@ _HOPELESS = 2.0**-12
 """The same, as a part of what is left: a way that needs shorter ones ends before the inputs."""
 
 Key = tuple[int, ...]
+"""A cell: the number of its width, and its place along each input, in widths from the pose."""
 
 
 class GridInput(NamedTuple):
@@ -151,7 +153,8 @@ class Grid:
         self.home = tuple(given.home for given in inputs)
         """The inputs of the pose, at the centre of the first cell."""
         self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
-        self._kept: dict[tuple[int, Key], _Found] = {}
+        self._kept: dict[Key, _Found] = {}
+        self._look_up = self._write_look_up()
         self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
         if count > _MOST_CORNERED:
@@ -168,13 +171,34 @@ class Grid:
 
         This is what `find_start` calls in compiled code.
         """
-        home, kept = self.home, self._kept
-        for level, width in enumerate(self.widths):
-            key = tuple([round((x - at) / width) for x, at in zip(inputs, home, strict=True)])
-            found = kept.get((level, key))
+        return self._look_up(*inputs)
+
+    def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:
+        """Return a call as a function, written for these inputs: most lie in a widest cell."""
+        names = [f'q{k}' for k in range(len(self.home))]
+        places = [
+            f'round(({name} - {home!r}) / {_WIDTH!r})'
+            for name, home in zip(names, self.home, strict=True)
+        ]
+        given = ', '.join(names)
+        lines = (
+            f'def look_up({given}):',
+            f'    found = get((0, {", ".join(places)}))',
+            '    if found is None or found.numbers is None:',
+            f'        return search({given})',
+            '    return found.numbers',
+        )
+        bound = {'get': self._kept.get, 'search': self._search}
+        look_up: Callable[..., Any] = define_function('\n'.join(lines), 'look_up', bound)
+        return look_up
+
+    def _search(self, *inputs: float) -> tuple[float, ...] | None:
+        for level in range(_LEVELS):
+            key = self._key_of(level, inputs)
+            found = self._kept.get(key)
             if found is None:
                 with BUILD_LOCK:
-                    found = self._follow(level, key)
+                    found = self._follow(key)
             if found.numbers is not None:
                 return found.numbers
         return None
@@ -182,23 +206,24 @@ class Grid:
     def look_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
         """Make the cell that inputs at these rates enter next, from one that is made."""
         turned, _ = self.turn_back(inputs)
-        for level, width in enumerate(self.widths):
-            key = self._key_of(turned, width)
-            found = self._kept.get((level, key))
+        keys = (self._key_of(level, turned) for level in range(_LEVELS))
+        for key in keys:
+            found = self._kept.get(key)
             if found is not None and found.numbers is not None:
                 break
         else:
             return
-        soonest = inf
-        for x, rate, centre in zip(turned, rates, self._centre(level, key), strict=True):
+        soonest, beyond = inf, _BEYOND * self.widths[key[0]]
+        for x, rate, centre in zip(turned, rates, self._centre(key), strict=True):
             if rate:
-                edge = centre + copysign(_BEYOND * width, rate)
+                edge = centre + copysign(beyond, rate)
                 soonest = min(soonest, (edge - x) / rate)
         if soonest < inf:
             self(*(x + rate * soonest for x, rate in zip(turned, rates, strict=True)))
 
-    def _key_of(self, inputs: Sequence[float], width: float) -> Key:
-        return tuple([round((x - at) / width) for x, at in zip(inputs, self.home, strict=True)])
+    def _key_of(self, level: int, inputs: Sequence[float]) -> Key:
+        width, ways = self.widths[level], zip(inputs, self.home, strict=True)
+        return (level, *[round((x - at) / width) for x, at in ways])
 
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""
@@ -254,18 +279,18 @@ class Grid:
             level, keys = waiting.pop()
             if len(cells) + prod(map(len, keys)) > _KEPT:
                 return None
-            for key in product(*keys):
-                if (level, *key) in cells:
+            for key in product((level,), *keys):
+                if key in cells:
                     continue
                 with BUILD_LOCK:
-                    numbers = self._follow(level, key).numbers
+                    numbers = self._follow(key).numbers
                 if numbers is not None:
-                    cells[(level, *key)] = numbers
+                    cells[key] = numbers
                 elif level + 1 < _LEVELS:
                     half = 0.5 * self.widths[level]
                     within = [
                         (max(low, x - half), min(high, x + half))
-                        for x, (low, high) in zip(self._centre(level, key), limits, strict=True)
+                        for x, (low, high) in zip(self._centre(key), limits, strict=True)
                     ]
                     waiting.append((level + 1, self._keys_between(level + 1, within)))
         return cells
@@ -278,9 +303,10 @@ class Grid:
             for at, ends in zip(self.home, limits, strict=True)
         ]
 
-    def _centre(self, level: int, key: Key) -> list[float]:
+    def _centre(self, key: Key) -> list[float]:
+        level, *places = key
         width = self.widths[level]
-        return [at + k * width for at, k in zip(self.home, key, strict=True)]
+        return [at + k * width for at, k in zip(self.home, places, strict=True)]
 
     def predict(self, cell: GridCell, inputs: Sequence[float]) -> Sequence[float]:
         """Return the unknowns at inputs near a cell."""
@@ -303,10 +329,10 @@ class Grid:
 
     def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
         """Yield the corners of the cell about the pose, with the unknowns predicted there."""
-        home = tuple(0 for _ in self.home)
+        home = (0,) * len(self.home)
         for level, width in enumerate(self.widths):
             with BUILD_LOCK:
-                cell = self._follow(level, home).cell
+                cell = self._follow((level, *home)).cell
             if cell is not None:
                 for corner in self._corners:
                     at = [c + part * width for c, part in zip(cell.inputs, corner, strict=True)]
@@ -320,10 +346,9 @@ class Grid:
         Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
         them.
         """
-        width = self.widths[-1]
-        key = self._key_of(inputs, width)
+        key = self._key_of(_LEVELS - 1, inputs)
         with BUILD_LOCK:
-            begin = cell = self._follow(_LEVELS - 1, key).last
+            begin = cell = self._follow(key).last
             done, step = 0.0, 1.0
             while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
                 part = min(1.0, done + step)
@@ -334,43 +359,44 @@ class Grid:
                     cell, done, step = found, part, 2.0 * step
         return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
 
-    def _follow(self, level: int, key: Key) -> _Found:
+    def _follow(self, key: Key) -> _Found:
         """Return a cell, made from its neighbour on the straight line to the pose."""
         way: list[Key] = []
-        while (found := self._kept.get((level, key))) is None:
+        while (found := self._kept.get(key)) is None:
             way.append(key)
-            count = max(map(abs, key), default=0)
+            level, *places = key
+            count = max(map(abs, places), default=0)
             if count > _FARTHEST << level:
                 return _Found(None, self._start, None)
             if not count:
                 found = _Found(self._start, self._start, None)
                 break
-            key = tuple(round(k * (count - 1) / count) for k in key)
+            key = (level, *[round(k * (count - 1) / count) for k in places])
         for key in reversed(way):
             if found.cell is None:
                 break
             # Wider cells lead to where they are no longer proven.
-            wider = None if key is way[0] else self._wider_cell(level, key)
-            cell = wider or self._make_cell(level, key, found.cell)
+            wider = None if key is way[0] else self._wider_cell(key)
+            cell = wider or self._make_cell(key, found.cell)
             found = _Found(cell, cell or found.last, cell.numbers if cell else None)
             if wider is None:
                 if len(self._kept) >= _KEPT:
                     del self._kept[next(iter(self._kept))]
-                self._kept[level, key] = found
+                self._kept[key] = found
         return found
 
-    def _wider_cell(self, level: int, key: Key) -> GridCell | None:
+    def _wider_cell(self, key: Key) -> GridCell | None:
         """Return the widest proven cell, of wider ones, at the centre of a cell."""
+        level, *places = key
         for wider in range(level):
-            at = tuple(round(k / (1 << level - wider)) for k in key)
-            cell = self._follow(wider, at).cell
+            cell = self._follow((wider, *[round(k / (1 << level - wider)) for k in places])).cell
             if cell is not None:
                 return cell
         return None
 
-    def _make_cell(self, level: int, key: Key, known: GridCell) -> GridCell | None:
+    def _make_cell(self, key: Key, known: GridCell) -> GridCell | None:
         """Return a cell, if it is proven from a known one."""
-        width, centre = self.widths[level], self._centre(level, key)
+        width, centre = self.widths[key[0]], self._centre(key)
         found = self._step_to(known, centre)
         if found is None:
             return None

@@ -55,6 +55,9 @@ _HALFWAY, _MOST_STEPS = 2.0**-21, 6
 class Equations(Protocol):
     """As many equations as unknowns, for numbers and symbols; ``known`` has the steps before."""
 
+    def errors(self, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
+        """Return how far each equation is from being met."""
+
     def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
         """
         Return the errors, and a function that solves with the matrix of their derivatives.
@@ -207,8 +210,7 @@ class GridGroup:
             errors, solve = self._equations.linearize(known, values)
             step = solve(errors)
             values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
-        errors, _ = self._equations.linearize(known, values)
-        step = solve(errors)
+        step = solve(self._equations.errors(known, values))
         if not sum(map(abs, step[1:]), abs(step[0])) <= _LAST_STEP:
             raise UndecidedError
         return [subtract(value, change) for value, change in zip(values, step, strict=True)]

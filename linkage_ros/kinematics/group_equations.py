@@ -87,6 +87,12 @@ class GroupEquations:
 
     # The equations that close loops, as functions of the free unknowns; see `GridGroup`
 
+    def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return how far the equations are from being met."""
+        unknowns = self.place_bodies(values, known)
+        errors, _ = evaluate_constraints(self._constraints, unknowns, known)
+        return [errors[row] for row in self._closing]
+
     def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
         """Return the errors, and a function that solves with the matrix of their derivatives."""
         unknowns = self.place_bodies(values, known)

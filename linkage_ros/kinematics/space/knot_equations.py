@@ -186,6 +186,10 @@ class KnotEquations:
         state = self.place_links(known, unknowns)
         return [end.locate(state) for rod in self.rods for end in (rod.start, rod.end)]
 
+    def errors(self, known: LinkState, unknowns: Sequence[float]) -> list[float]:
+        """Return the residuals."""
+        return self.evaluate(known, unknowns)[0]
+
     def linearize(self, known: LinkState, unknowns: Sequence[float]) -> tuple[list[float], Solve]:
         """Return the residuals, and a function that solves with their derivatives."""
         errors, rows = self.evaluate(known, unknowns)
