@@ -145,8 +145,9 @@ class CircleMeeting(NamedTuple):
     lever: float = 0.0  # r·d·sin θ
 
     def part_along(self, start: float = 0.0) -> float:
-        """Return r·cos θ − d, if ``start`` is d times the sense."""
-        return self.sense * (subtract(self.radius, start) - self.turn)
+        """Return r·cos θ, less a start."""
+        part = subtract(self.radius, multiply(self.sense, start))
+        return self.sense * (part - self.turn)
 
 
 def meet_circle(radius: float, distance: float, height: float, rod: float) -> CircleMeeting:
@@ -350,7 +351,7 @@ class ClosedHinge(ClosedJoint):
         out = scale(unit, (x, y, 0.0))
         beside = scale(unit * lever, (subtract(0.0, out[1]), out[0], 0.0))
         arm = plus(plus(scale(along, out), beside), (0.0, 0.0, self.place[2]))
-        away = met.part_along(met.sense * distance)
+        away = met.part_along(distance)
         rod = plus(plus(scale(away, out), beside), (0.0, 0.0, subtract(0.0, height)))
         return ClosedPose(met.status, 0.0, lever, angle, base.turn(arm), base.turn(rod), bend)
 

@@ -133,7 +133,7 @@ class ThreeDistances:
         round_line = plus(scale(place[1], beside), risen)
         arm = plus(scale(place[0], line), round_line)
         # As in `ClosedHinge`: next to P2 it would be the difference of two places.
-        away = met.part_along(met.sense * distance)
+        away = met.part_along(distance)
         last = minus(plus(scale(away * over, beside), risen), scale(height / size, line))
         solved.pins.append(plus(start, arm))
         return MetPose(
