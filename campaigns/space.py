@@ -52,7 +52,7 @@ from linkage_ros.kinematics.space.steps import (
     Rod,
     STILL,
 )
-from linkage_ros.kinematics.space.three_distances import nearest_first, ThreeDistances
+from linkage_ros.kinematics.space.three_distances import order_ends, ThreeDistances
 
 PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',
@@ -146,9 +146,10 @@ def three_distances_case(random: Random, near: bool = False) -> Case:
     up = sign * (sqrt(2.0 * apart) if near else sin(apart)) / hypot(*n)
     place = [p + a * u + b * v + up * w for p, u, v, w in zip(ends[0], x, y, n, strict=True)]
     rods = [dist(place, end) for end in ends]
-    order = nearest_first((0, 1, 2), rods)
+    order = order_ends(tuple(place), ends)
+    side = sign if order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]) else -sign
     lengths = tuple(Rod(rods[end]) for end in order)
-    step = ThreeDistances(tuple(end + 1 for end in order), lengths, float(sign), 4)
+    step = ThreeDistances(tuple(end + 1 for end in order), lengths, float(side), 4)
     axis, tape = random.randrange(3), exact.Tape()
     given = [tape.row(*each) for each in zip(*motion, strict=True)]
     point = exact.three_spheres(given, tape.row(rods), sign)

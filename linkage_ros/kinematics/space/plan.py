@@ -52,7 +52,7 @@ from linkage_ros.kinematics.space.steps import (
     ResolvedSlides,
     Rod,
 )
-from linkage_ros.kinematics.space.three_distances import nearest_first, ThreeDistances
+from linkage_ros.kinematics.space.three_distances import order_ends, ThreeDistances
 from linkage_ros.kinematics.space.vectors import (
     cross,
     dot,
@@ -418,14 +418,16 @@ class SpacePlan:
         self, point: str, pairs: list[_Pair], shifts: dict[_Pair, tuple[str, Vector]]
     ) -> bool:
         """Place a point by the first three pairs that tell it; some are shifted beside a point."""
-        for three in combinations(pairs, 3):
-            if len({pair.known for pair in three}) < 3 and not shifts:
+        at = self.places[point]
+        ends = {
+            pair: plus(self.places[pair.known], shifts[pair][1] if shifts else ZERO)
+            for pair in pairs
+        }
+        for named in combinations(pairs, 3):
+            if len({pair.known for pair in named}) < 3 and not shifts:
                 continue
-            at = self.places[point]
-            places = [
-                plus(self.places[pair.known], shifts[pair][1] if shifts else ZERO)
-                for pair in three
-            ]
+            three = [named[k] for k in order_ends(at, [ends[pair] for pair in named])]
+            places = [ends[pair] for pair in three]
             rods = [minus(at, place) for place in places]
             size = length(rods[0]) * length(rods[1]) * length(rods[2])
             across = cross(minus(places[1], places[0]), minus(places[2], places[0]))
@@ -441,9 +443,8 @@ class SpacePlan:
                     to[-1] = self.next_pin - 1
             sign = 1.0 if volume > 0.0 else -1.0
             self.points[point] = self.next_pin
-            ends = zip(to, (pair.rod for pair in three), strict=True)
-            points, lengths = zip(*nearest_first([*ends], [*map(length, rods)]), strict=True)
-            self.add_step(ThreeDistances(points, lengths, sign, self.next_pin))
+            lengths = tuple(pair.rod for pair in three)
+            self.add_step(ThreeDistances(tuple(to), lengths, sign, self.next_pin))
             by = list_names(f'{pair.by} from {pair.known}' for pair in three)
             side = '+' if sign > 0.0 else '-'
             method = f'point {point}, by {by}'

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from math import dist
+from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.arithmetic import acute_angle, atan2, sqrt, where
 from linkage_ros.kinematics.space.steps import (
@@ -34,17 +35,16 @@ from linkage_ros.kinematics.space.vectors import (
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 
-End = TypeVar('End')
 
-
-def nearest_first(ends: Sequence[End], distances: Sequence[float]) -> tuple[End, ...]:
+def order_ends(place: Vector, ends: Sequence[Vector]) -> list[int]:
     """
-    Return what a point is measured from, the nearest first, in the same sense of rotation.
+    Return three ends of rods in the order in which the fewest digits cancel, by their numbers.
 
-    A step starts from the first one: an arm that is short has little to cancel.
+    The one that is nearest to the point is the first, and the one farther from that the second.
     """
-    first = distances.index(min(distances))
-    return *ends[first:], *ends[:first]
+    first = min(range(3), key=lambda k: dist(place, ends[k]))
+    rest = (k for k in range(3) if k != first)
+    return [first, *sorted(rest, key=lambda k: -dist(ends[k], ends[first]))]
 
 
 class MetPose(NamedTuple):
@@ -110,17 +110,17 @@ class ThreeDistances:
         area_square = dot(up, up)
         area = sqrt(area_square)
         distance = area / size
-        # Along P0 P1 from its middle: what P1 and a P2 next to it have in common would cancel.
-        off = 0.5 * ((one - other) * (one + other)) / size
-        height = subtract(0.5 * twice / size, off)
-        foot, rest = 0.5 * size + off, off - 0.5 * size
+        # In units of P0 P1, along it from its middle: of P1 and a P2 next to it nothing cancels.
+        off = 0.5 * ((one - other) * (one + other)) / square
+        height = subtract(0.5 * twice / square, off)
+        foot, rest = 0.5 + off, off - 0.5
         # By the shorter rod: so what is rounded is the place on its sphere.
         short = one < other
-        reach = reach_between(where(short, one, other), abs(where(short, foot, rest)))
+        reach = reach_between(where(short, one, other), size * abs(where(short, foot, rest)))
         if reach.status is not Status.CLOSED:
             return MetPose(reach.status, reach.missing)
         radius = sqrt(reach.square)
-        met = meet_circle(radius, distance, height, rod)
+        met = meet_circle(radius, distance, size * height, rod)
         if not met.status.has_pose:
             return MetPose(met.status, met.gap)
         # Its coordinates in the circle, r·cos θ and r·sin θ.
@@ -128,13 +128,9 @@ class ThreeDistances:
         lever = self.sign * met.lever
         y = lever / distance
         beside, over = cross(up, line), 1.0 / (area * size)
-        place = (foot / size, x * over, y / area)
-        risen = scale(place[2], up)
-        round_line = plus(scale(place[1], beside), risen)
-        arm = plus(scale(place[0], line), round_line)
-        # As in `ClosedHinge`: next to P2 it would be the difference of two places.
-        away = met.part_along(distance)
-        last = minus(plus(scale(away * over, beside), risen), scale(height / size, line))
+        place = (foot, x * over, y / area)
+        round_line = plus(scale(place[1], beside), scale(place[2], up))
+        arm = plus(scale(foot, line), round_line)
         solved.pins.append(plus(start, arm))
         return MetPose(
             met.status,
@@ -145,7 +141,7 @@ class ThreeDistances:
             (square, area_square),
             dot(across, line),
             place,
-            (plus(scale(rest / size, line), round_line), last),
+            (minus(arm, line), minus(arm, across)),
         )
 
     def rates(
