@@ -17,7 +17,7 @@ same matrix. Where the method starts is on a `Grid`: so a state depends on its i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import islice
+from itertools import chain, islice
 from math import dist, pi, remainder, tau
 from random import Random
 from typing import Any, NamedTuple
@@ -29,6 +29,7 @@ from linkage_ros.kinematics.space.steps import missing_length
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.steps_before import StepsBefore
+from linkage_ros.kinematics.straight_line import StraightLine
 
 _APART, _DIGITS = 1e-6, 12
 """Smallest distance of the ends of rods in two solutions, in lengths; and their digits."""
@@ -64,6 +65,7 @@ class Knot:
         self._equations, self._start = equations, tuple(start)
         self.unknown = unknown
         self._group = GridGroup(equations, before, start, given_inputs)
+        self._system_line = StraightLine(self._list_system, lambda: None)
 
     @property
     def equation_count(self) -> int:
@@ -162,8 +164,9 @@ class Knot:
         sizes = np.array([rod.rod.length(solved) for rod in self._equations.rods])
 
         def system(unknowns: Any) -> Any:
-            errors, rows = self._equations.evaluate(solved, unknowns.tolist())
-            return np.array(errors) / sizes, np.array(rows) / sizes[:, None]
+            found = self._system_line(solved, LinkState(unknowns.tolist(), []))
+            errors, *columns = np.array(found).reshape(-1, len(sizes)) / sizes
+            return errors, np.transpose(columns)
 
         begin = np.array(found)
         first = float(np.abs(system(begin)[0]).max())
@@ -171,6 +174,11 @@ class Knot:
         if status is Status.TOGGLE:
             return self._append(status, solved, unknowns.tolist())
         return KnotPose(status, gap if gap > _MOVED * first else first, found, solved)
+
+    def _list_system(self, known: LinkState, pose: LinkState) -> list[float]:
+        """Return the errors, and the matrix of their derivatives by columns."""
+        errors, rows = self._equations.evaluate(known, pose.coordinates)
+        return [*errors, *chain(*zip(*rows, strict=True))]
 
     def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
         from linkage_ros.kinematics.descent import (
