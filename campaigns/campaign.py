@@ -20,6 +20,7 @@ import time
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from bench.report import machine_table, say, show, Table, write_page
+from linkage_ros.cli.terminal import give_up_output
 from linkage_ros.tools.study import percentile
 
 Work = TypeVar('Work')
@@ -69,12 +70,16 @@ def parse_families(
 
 
 def exit_code(main: Callable[[], int]) -> int:
-    """Run the main function of a campaign, and end in one line at Ctrl-C."""
+    """Run the main function of a campaign; at Ctrl-C, or without a reader, without a traceback."""
     try:
         return main()
     except KeyboardInterrupt:
         say('stopped')
         return 130
+    except BrokenPipeError:
+        # The reader of the output has gone: there is nobody to report to.
+        give_up_output()
+        return 1
 
 
 def machine_of(
