@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from functools import cache, partial
-from math import atan2, cos, dist, hypot, pi, sin, sqrt
+from math import atan2, cos, dist, hypot, pi, remainder, sin, sqrt, tau
 from random import Random
 import sys
 from typing import Any, NamedTuple
@@ -191,12 +191,14 @@ def _held_errors(
     """Return the errors of a hinge, one of whose points a rod holds at a distance from a pin."""
     hinge, point, other = names
     places = closure.linkage.points
-    (group,) = (one for one in closure.groups if one.method.startswith(f'{hinge},'))
-    sign = 1 if group.assembly.startswith('+') else -1
     # The length of the rod is a number of its own, which is rounded wherever it comes from. If κ
     # took it for a function of the ends, it would be 0 at the pose even next to a toggle.
     rod, axis = tape.distance(places[point], places[other]), _axis_on(tape, closure.linkage, hinge)
-    angle = exact.angle_to_meet(tape.row(places[point]), *axis, pin, rod, sign)
+    place, drawn = tape.row(places[point]), tape.row(places[other])
+    # In the pose the hinge is 0: this tells the assembly.
+    sides = {sign: exact.angle_to_meet(place, *axis, drawn, rod, sign) for sign in (1, -1)}
+    sign = min(sides, key=lambda sign: abs(remainder(float(sides[sign].value[0]), tau)))
+    angle = exact.angle_to_meet(place, *axis, pin, rod, sign)
     return exact.errors_of(angle, found, pi, pin)
 
 
