@@ -224,7 +224,9 @@ def test_a_scene_takes_the_messages_of_a_broadcaster_without_velocities(
 
 samples = st.builds(
     CrankSample,
-    st.integers(0, 2 * NOW) | st.sampled_from([0, NOW, NOW + 100 * MS]),
+    st.integers(0, 2 * NOW)
+    | st.integers(NOW - 200 * MS, NOW + 100 * MS)
+    | st.sampled_from([0, NOW - 200 * MS - 1, NOW - 200 * MS, NOW, NOW + 100 * MS]),
     st.tuples(st.floats() | st.floats(-10, 10)),
     st.tuples(st.floats(allow_nan=False) | st.floats(-10, 10)),
 )
@@ -239,7 +241,7 @@ def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
             assert good is None or each.stamp >= good.stamp
             good = each
     state = drive.state(NOW)
-    if good is None or NOW - good.stamp > HELD.max_age:
+    if good is None or NOW - good.stamp > HELD.max_age * SECOND:
         assert state is None
     else:
         assert state == CrankState(good.angles, good.rates, (0.0,), NOW - good.stamp)
