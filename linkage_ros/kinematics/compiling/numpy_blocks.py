@@ -234,9 +234,8 @@ class ArrayForm:
         if all(abs(end) < inf for end in ends):
             bounds = BlockBounds(min(ends), max(ends))
         if one is other:
-            bounds = bounds._replace(low=0.0)
-            if bounds.high < inf and self._bounds_of(one).low > 0.0:
-                bounds = bounds._replace(low=self._bounds_of(one).low ** 2)
+            low, high = self._bounds_of(one)
+            bounds = bounds._replace(low=max(low, -high, 0.0) ** 2)
         return self._new_operation('*', *_order_pair(one, other), bounds=bounds)
 
     def _divide(self, one: Number, other: Number) -> Number:

@@ -60,6 +60,9 @@ def test_a_condition_that_bounds_settle_is_not_asked():
     sine = sin(tape.add_input('q0', 0.3))
     assert written(sine.operation, (sine * sine + 0.5 > 0.4).operation).masks == 0
     assert written(sine.operation, (sine * sine + 0.5 > 0.6).operation).masks > 0
+    for part in (sine + 2.0, sine - 2.0):
+        assert written(sine.operation, (part * part > 0.9).operation).masks == 0
+        assert written(sine.operation, (part * part > 1.1).operation).masks > 0
 
 
 def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0():
