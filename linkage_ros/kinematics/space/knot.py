@@ -65,7 +65,7 @@ class Knot:
         self._equations, self._start = equations, tuple(start)
         self.unknown = unknown
         self._group = GridGroup(equations, before, start, given_inputs)
-        self._system_line = StraightLine(self._list_system, lambda: None)
+        self._matrix_line = StraightLine(self._list_matrix, lambda: None)
 
     @property
     def equation_count(self) -> int:
@@ -164,7 +164,7 @@ class Knot:
         sizes = np.array([rod.rod.length(solved) for rod in self._equations.rods])
 
         def system(unknowns: Any) -> Any:
-            found = self._system_line(solved, LinkState(unknowns.tolist(), []))
+            found = self._matrix_line(solved, LinkState(unknowns.tolist(), []))
             errors, *columns = np.array(found).reshape(-1, len(sizes)) / sizes
             return errors, np.transpose(columns)
 
@@ -175,7 +175,7 @@ class Knot:
             return self._append(status, solved, unknowns.tolist())
         return KnotPose(status, gap if gap > _MOVED * first else first, found, solved)
 
-    def _list_system(self, known: LinkState, pose: LinkState) -> list[float]:
+    def _list_matrix(self, known: LinkState, pose: LinkState) -> list[float]:
         """Return the errors, and the matrix of their derivatives by columns."""
         errors, rows = self._equations.evaluate(known, pose.coordinates)
         return [*errors, *chain(*zip(*rows, strict=True))]
