@@ -81,7 +81,8 @@ def test_the_arms_of_a_delta_are_where_they_were_published(tmp_path, platform, a
 
 # P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures, in
 # Advances in Robot Kinematics 1998; the postures to 15 digits from PHCpack's demonstration
-# stewgou40: the platform's first point n and axes a1, a2, and the condition of the equations.
+# stewgou40: the platform's first point n and axes a1, a2; rco is the inverse of the condition of
+# the equations.
 BASE = np.array([
     [0.0, 0.0, 0.0], [1.107915, 0.0, 0.0], [0.549094, 0.756063, 0.0],
     [0.735077, -0.223935, 0.525991], [0.514188, -0.526063, -0.368418],
@@ -95,7 +96,7 @@ PLATFORM = np.array([
 LEGS = (1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071)
 
 with (Path(__file__).parent / 'forty_postures.csv').open(newline='') as _file:
-    POSTURES = [[*map(float, row)] for row in [*csv.reader(_file)][1:]]
+    POSTURES = [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(_file)]
 
 
 def hexapod(folder, place, turn):
@@ -106,30 +107,32 @@ def hexapod(folder, place, turn):
     return load_points(
         folder,
         points,
-        links={f'{link}': [f'{way}{k}' for k in numbers]
-               for link, way in (('ground', 'p'), ('platform', 'q'))},
+        links={'ground': [f'p{k}' for k in numbers], 'platform': [f'q{k}' for k in numbers]},
         slides=SLIDES | {'z': SLIDES['z'] | {'child': 'zs'}},
         balls={'r': {'parent': 'zs', 'child': 'platform', 'at': points['q1'].tolist()}},
         struts={f'leg{k}': [f'p{k}', f'q{k}'] for k in numbers},
         input=names,
         joints=['x', 'y', 'z', 'r_x', 'r_y', 'r_z'],
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('number', range(1, len(POSTURES) + 1))
 def test_all_forty_postures_of_a_hexapod_are_met(tmp_path, number):
     """Each is reached from a pose that is drawn beside it: two digits of it, or four."""
-    *numbers, condition = POSTURES[number - 1]
-    place, first, second = np.reshape(numbers, (3, 3))
+    posture = POSTURES[number - 1]
+    place, first, second = (
+        np.array([posture[f'{vector}{axis}'] for axis in (1, 2, 3)])
+        for vector in ('n', 'a1', 'a2')
+    )
     axes = np.column_stack([first, second, np.cross(first, second)])
     expected = place + PLATFORM @ axes.T
     legs = np.linalg.norm(expected - BASE, axis=1)
     # The equations of the source have ten digits.
     assert legs == pytest.approx(LEGS, abs=1e-9)
-    digits = 4 if condition < 1e-4 else 2
+    digits = 4 if posture['rco'] < 1e-4 else 2
     drawn = Rotation.from_rotvec(np.round(Rotation.from_matrix(axes).as_rotvec(), digits))
     closure = hexapod(tmp_path, np.round(place, digits), drawn)
     position = closure.position(*legs)
     found = [position.points[f'q{k}'] for k in range(1, 7)]
-    assert np.array(found) == pytest.approx(expected, abs=2e-15 / condition)
+    assert np.array(found) == pytest.approx(expected, abs=2e-15 / posture['rco'])
