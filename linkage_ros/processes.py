@@ -72,9 +72,12 @@ def _lock_domain(domain: int) -> Iterator[bool]:
     """Lock the file of a domain; return whether it could be locked."""
     with ExitStack() as opened:
         try:
-            file = opened.enter_context(
-                Path(gettempdir(), f'linkage_ros_domain_{domain}').open('w')
+            # The folder is open to all users: the name may be a link, or a file with content.
+            file = os.open(
+                Path(gettempdir(), f'linkage_ros_domain_{domain}'),
+                os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK,
             )
+            opened.callback(os.close, file)
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:  # held by another process, or another user's
             yield False

@@ -56,6 +56,18 @@ def test_no_two_processes_have_the_same_domain_and_one_that_is_killed_gives_it_b
         assert held(domain)
 
 
+def test_a_link_of_the_name_of_a_lock_is_not_followed(tmp_path, monkeypatch):
+    """Any user may make one in the folder of temporary files."""
+    monkeypatch.setattr(processes, 'gettempdir', lambda: str(tmp_path))
+    precious = tmp_path / 'precious'
+    precious.write_text('content')
+    (tmp_path / 'linkage_ros_domain_7').symlink_to(precious)
+    (tmp_path / 'linkage_ros_domain_8').write_text('content')
+    assert not held(7)
+    assert held(8)
+    assert precious.read_text() == (tmp_path / 'linkage_ros_domain_8').read_text() == 'content'
+
+
 def test_where_all_are_held_the_error_is_one_line(monkeypatch):
     # Domains that no graph uses: the real ones are needed by tests beside this one.
     monkeypatch.setattr(processes, '_DOMAINS', range(1001, 1003))

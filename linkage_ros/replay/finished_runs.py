@@ -18,8 +18,10 @@ from __future__ import annotations
 from base64 import b64decode, b64encode
 from hashlib import sha256
 import json
+import os
+from os.path import lexists
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 from linkage_ros import __version__
 from linkage_ros.errors import LinkageError
@@ -41,14 +43,14 @@ class FinishedRuns:
         decides = (__version__, sorted(study.files.items()), study.seconds, study.instants, runs)
         self._head = f'{sha256(repr(decides).encode()).hexdigest()}\n'.encode()
         try:
-            if self.file.exists():
+            if lexists(self.file):
                 self._read_runs(len(runs))
         except OSError as error:
             raise self._unusable_error(error) from None
 
     def _read_runs(self, count: int) -> None:
         """Read the runs; of a line that was cut, and behind it, nothing is kept."""
-        with self.file.open('r+b') as stream:
+        with self._open('r+b') as stream:
             head = stream.readline(len(self._head))
             if head != self._head:
                 raise LinkageError(
@@ -68,12 +70,20 @@ class FinishedRuns:
                 whole += len(line)
             stream.truncate(whole)
 
+    def _open(self, mode: str) -> BinaryIO:
+        """Open the file, but not where its name is a link, which may be another user's."""
+
+        def open_no_link(path: str, flags: int) -> int:
+            return os.open(path, flags | os.O_NOFOLLOW, 0o666)
+
+        return cast(BinaryIO, open(self.file, mode, opener=open_no_link))
+
     def add_run(self, number: int, outcome: Outcome) -> None:
         """Keep the outcome of a run."""
         self.outcomes[number] = outcome
         try:
             if self._stream is None:
-                self._stream = self.file.open('ab')
+                self._stream = self._open('ab')
                 if not self._stream.tell():
                     self._stream.write(self._head)
             self._stream.write(_line_of(number, outcome))

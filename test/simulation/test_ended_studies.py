@@ -182,3 +182,13 @@ def test_a_study_that_fails_at_once_ends_its_processes_in_order():
         _, said = study.communicate(timeout=PATIENCE)
         assert study.returncode == 1
         assert said.count('\n') == 3, said
+
+
+def test_the_runs_are_not_kept_where_a_link_leads(capsys):
+    precious = Path('precious')
+    precious.write_text('content')
+    Path('worn.csv.part').symlink_to(precious)
+    assert main(command('worn.csv', '--workers', '1')) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('linkage simulate: worn.csv.part: cannot be read and written (')
+    assert precious.read_text() == 'content'
