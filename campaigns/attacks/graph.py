@@ -54,7 +54,16 @@ SHUTDOWNS = {5, 6, 7}
 
 _TRIGGERS = ('reset', 'start_recording', 'stop_recording', 'snapshot')
 _PARAMETERS = (
-    *('scene', 'autostart', 'runs_directory', 'diagnostics_period', 'warning_period'),
+    *(
+        'scene',
+        'set',
+        'scene_directory',
+        'trust_effects',
+        'autostart',
+        'runs_directory',
+        'diagnostics_period',
+        'warning_period',
+    ),
     *('warn.transmission_angle', 'warn.conditioning', 'use_sim_time', 'no_such', ''),
 )
 _NUMBERS = (nan, inf, -inf, -1.0, 0.0, 0.1, 1.0, 3600.0, 1e308)

@@ -6,6 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+from linkage_ros.description.confinement import Confinement as Confinement
 from linkage_ros.description.file_access import (
     atomic_write as atomic_write,
     check_new as check_new,

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING
 from zlib import crc32
 
+from linkage_ros.description.confinement import Confinement
 from linkage_ros.description.linkage_file import (
     looks_like_linkage,
     read_any_closure,
@@ -65,10 +66,15 @@ class _SceneSource:
     open_linkage: Open
     seed: int | None = None  # Seed if the scene names none; None to derive it from the name
     trust_effects: bool = True  # Whether user-defined effects are imported
+    confinement: Confinement | None = None  # What the scene may name; None for anything
     closed: Closure | None = None  # Closure of its only linkage, if there is one already
 
 
-def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene:
+def load_scene(
+    file: str | PathLike[str],
+    settings: Sequence[str] = (),
+    confinement: Confinement | None = None,
+) -> Scene:
     """
     Read a scene and the linkages that it names; for a linkage file, a default scene.
 
@@ -80,6 +86,8 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
     settings
         Keys to set beside the file, as ``drive.sine.amplitude=0.3``; they are part of
         `Scene.files`.
+    confinement
+        What the scene may name, where another process asks for it; None for anything.
 
     Raises
     ------
@@ -90,17 +98,22 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
 
     """
     file = named_file(file, 'scenes', 'linkages')
+    if confinement is not None:
+        confinement.refuse_file(file, None, '')
     content, data = read_yaml(file)
-    name, folder = file.stem, str(file.parent)
-    if kind_of(content) == 'linkage':
-        return _stand_in(name, content, data, folder, settings)
+
+    def check_file(where: Section, key: str, named: Path) -> Path:
+        if confinement is not None:
+            confinement.refuse_file(named, where, key)
+        return named
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
         if isinstance(where.mapping.get('linkage'), dict):
             robot = where.section('linkage')
-            robot_content(robot, file.parent / robot.text('urdf'))
+            robot_content(robot, check_file(robot, 'urdf', file.parent / robot.text('urdf')))
             return robot, robot.named_data
-        linkage = linkage_of_scene(where.text('linkage'), file.parent)
+        named = linkage_of_scene(where.text('linkage'), file.parent)
+        linkage = check_file(where, 'linkage', named)
         if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
             raise where.error(
                 'linkage',
@@ -113,7 +126,16 @@ def load_scene(file: str | PathLike[str], settings: Sequence[str] = ()) -> Scene
             )
         return read_yaml(linkage)
 
-    return _build_scene(content, data, _SceneSource(name, folder, open_linkage), settings)
+    source = _SceneSource(
+        file.stem,
+        str(file.parent),
+        open_linkage,
+        trust_effects=confinement is None or confinement.trusts_effects,
+        confinement=confinement,
+    )
+    if kind_of(content) == 'linkage':
+        return _stand_in(content, data, source, settings)
+    return _build_scene(content, data, source, settings)
 
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
@@ -138,7 +160,7 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
 
 
 def _stand_in(
-    name: str, content: Section, data: bytes, folder: str, settings: Sequence[str]
+    content: Section, data: bytes, source: _SceneSource, settings: Sequence[str]
 ) -> Scene:
     """Return the default scene of a linkage file."""
     from linkage_ros.description.linkage_writer import (
@@ -158,9 +180,8 @@ def _stand_in(
     scene = parse_yaml(text, f'{content.file}, as a scene')
     # A drive moves one input, which is then published; several inputs come from a topic.
     closed = closure if len(closure.linkage.inputs) == 1 and not settings else None
-    return _build_scene(
-        scene, text, _SceneSource(name, folder, open_linkage, closed=closed), settings
-    )
+    source = replace(source, open_linkage=open_linkage, closed=closed)
+    return _build_scene(scene, text, source, settings)
 
 
 def parse_scene(
@@ -271,6 +292,8 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
                 f'0 is one tick for every crank sample, and {drive} has none',
                 'name a rate',
             )
+    if source.confinement is not None:
+        source.confinement.refuse_scene(scene, content)
     return scene
 
 
@@ -353,12 +376,15 @@ def _read_scene_linkage(
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
     parts = {**parts_of(linkage), 'left_out': not_imported}
+    driven = DRIVE.read(section_with('drive'), 'drive', parts, source.folder)
+    if source.confinement is not None:
+        source.confinement.refuse_drive(section_with('drive'), driven)
     prefix = OF_A_LINKAGE.read_key(section_with('prefix'), 'prefix', parts)
     return SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
-        drive=DRIVE.read(section_with('drive'), 'drive', parts, source.folder),
+        drive=driven,
         effects=EFFECTS_BY_NAME.read(section_with('effects'), 'effects', parts, ''),
         loads=OF_A_LINKAGE.read_key(section_with('loads'), 'loads', parts),
         prefix=prefix if prefix is not None else f'{name}_' if name else '',

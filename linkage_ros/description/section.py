@@ -297,12 +297,18 @@ class Section:
         self._taken.add(key)
 
     def finish(self, known: Sequence[str] = ()) -> None:
-        """Refuse the remaining keys; the remedy suggests the read keys and ``known``."""
+        """
+        Refuse the remaining keys; the remedy suggests the read keys and ``known``.
+
+        A file without any known key may be any file, and the error names none of its keys.
+        """
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))
                 known_names = f'known: {list_names(names)}' if names else 'leave it out'
                 remedy = did_you_mean(key, names, known_names)
+                if not self._path and not any(each in names for each in self._content):
+                    raise self.error('', 'has no known key', remedy)
                 raise self.error(key, 'unknown key', remedy)
 
     def _line_of(self, key: str) -> int:

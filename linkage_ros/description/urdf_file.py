@@ -32,6 +32,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
+from xml.parsers.expat import ErrorString
 
 from linkage_ros.description.file_access import read_regular
 from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
@@ -185,7 +186,8 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
         if noun not in ('a URDF', 'an XML file'):
             raise FileError(file, '', f'is {noun}, not a URDF', 'name a URDF file') from None
         line, _ = error.position
-        raise FileError(file, '', f'is not XML ({error})', 'name a URDF file', line) from None
+        reason = f'is not XML ({ErrorString(error.code)})'  # repeats nothing of the file
+        raise FileError(file, '', reason, 'name a URDF file', line) from None
     except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration
         raise FileError(file, '', f'is not XML ({error})', 'name a URDF file') from None
     return _Reader(file).read(root)
@@ -197,7 +199,7 @@ class _Reader:
 
     def read(self, root: ET.Element) -> UrdfFile:
         if root.tag != 'robot':
-            raise self._file_error('', f'holds <{root.tag}>, not <robot>', 'name a URDF file')
+            raise self._file_error('', 'is XML, and not a <robot>', 'name a URDF file')
         for element in root.iter():
             if 'ros.org/wiki/xacro' in element.tag or '${' in ''.join(element.attrib.values()):
                 raise self._file_error(

@@ -23,7 +23,7 @@ from typing import Any, cast, ClassVar
 from linkage_ros.description.file_access import read_regular
 from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
 from linkage_ros.description.section import LinedDict, Section
-from linkage_ros.errors import FileError, quote
+from linkage_ros.errors import FileError
 import yaml
 
 MOST_VALUES = 200_000
@@ -48,6 +48,13 @@ _IN_PLAIN_WORDS = (
     ("expected ',' or ']'", 'has a [ that does not end, or no comma', 'close it: [1, 2]'),
 )
 """A part of PyYAML's message; reason and remedy."""
+
+_QUOTATION = re.compile(r"'(?!<)[^']{2,}'")
+"""
+What a message of PyYAML repeats from a file, unlike the name of a token: ``'<scalar>'``.
+
+A file that is not YAML may be any file, and the node's log is open to the graph.
+"""
 
 LARGEST_FILE = 1_000_000
 """Most bytes of a file."""
@@ -210,9 +217,10 @@ def parse_yaml(data: bytes, file: str) -> Section:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark else 0
         problem = str(error.problem or error.context)
+        unquoted = _QUOTATION.sub('…', problem)
         reason, remedy = next(
             (words for part, *words in _IN_PLAIN_WORDS if part in problem),
-            (f'is not valid YAML ({problem})', 'correct the line'),
+            (f'is not valid YAML ({unquoted})', 'correct the line'),
         )
         raise FileError(file, '', reason, remedy, line) from None
     except (yaml.YAMLError, ValueError) as error:
@@ -224,7 +232,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
         if loader is not None:
             loader.dispose()
     if not isinstance(content, dict):
-        raise FileError(file, '', f'holds {quote(content)}', 'write a mapping (key: value)')
+        raise FileError(file, '', 'is not a mapping', 'write key: value')
     return Section(file, '', content)
 
 
@@ -245,12 +253,12 @@ class _StrictLoader(BoundedLoader):
             line = key_node.start_mark.line + 1
             if not isinstance(key, str) or not key.isprintable():
                 raise FileError(
-                    self.file, '', f'the key {quote(key)} is not a name', 'write a name', line
+                    self.file, '', 'has a key that is not a name', 'write a name', line
                 )
             if key in mapping:
                 first = mapping.lines[key]
                 raise FileError(
-                    self.file, key, f'is a duplicate (first in line {first})', 'remove one', line
+                    self.file, '', f'has the key of line {first} again', 'remove one', line
                 )
             mapping[key] = self.construct_object(value_node, deep=True)
             mapping.lines[key] = line

@@ -20,12 +20,13 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial, wraps
 from math import inf
+from pathlib import Path
 from sys import maxsize
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.description import load_scene, Scene, scene_notes
+from linkage_ros.description import Confinement, load_scene, Scene, scene_notes
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure
 from linkage_ros.messages import NANOSECONDS
@@ -120,6 +121,7 @@ class LinkageNode(LifecycleNode):
         super().__init__('linkage_node', **options)
         self._logs_failure = logs_failure
         declare_parameters(self, LINKAGE_NODE)
+        self._set_at_start = self._set_scene()
         self.failure: LinkageError | None = None
         """Reason why the node could not be configured."""
         self.recording = RunRecording(self.get_logger())
@@ -174,13 +176,13 @@ class LinkageNode(LifecycleNode):
     @_log_errors
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene and check that it can be built."""
-        file = self.get_parameter('scene').value
+        file, settings = self._set_scene()
         try:
             if not file:
                 raise LinkageError(
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
-            scene = load_scene(file, [each for each in self.get_parameter('set').value if each])
+            scene = load_scene(file, settings, self._confinement)
             pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
             self._scene_topics.connect(scene, pipeline)
             for closure in pipeline.closures:
@@ -198,6 +200,24 @@ class LinkageNode(LifecycleNode):
             self.get_logger().warning(str(note))
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
+
+    def _set_scene(self) -> tuple[str, list[str]]:
+        """Return the scene's file and the settings beside it, as the parameters have them."""
+        settings = self.get_parameter('set').value
+        return self.get_parameter('scene').value, [each for each in settings if each]
+
+    @property
+    def _confinement(self) -> Confinement | None:
+        """What the scene may name; None for what the process was started with."""
+        if self._set_scene() == self._set_at_start:
+            return None
+        own_file, _ = self._set_at_start
+        return Confinement(
+            folder=Path(self.get_parameter('scene_directory').value).absolute(),
+            own_file=own_file,
+            runs=None if self.get_parameter('runs_directory').value else Path.cwd(),
+            trusts_effects=self.get_parameter('trust_effects').value,
+        )
 
     @_log_errors
     def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:

@@ -69,6 +69,17 @@ LINKAGE_NODE = (
         changeable=_UNCONFIGURED,
     ),
     NodeParameter('runs_directory', '', "Folder of the bags; '' for the scene's own"),
+    NodeParameter(
+        'scene_directory',
+        '',
+        "Folder below which a scene may name files if it is set after the start; '': the working "
+        'directory',
+    ),
+    NodeParameter(
+        'trust_effects',
+        False,
+        'Whether a scene that is set after the start may import user-defined effects',
+    ),
     NodeParameter('autostart', True, 'Whether the node configures and activates itself'),
     NodeParameter('thread_priority', 0, 'Priority of the tick under SCHED_FIFO; 0: none', (0, 99)),
     NodeParameter(

@@ -9,9 +9,12 @@
 """Floods of messages and storms of calls, from `campaigns.attacks.graph`, bounded in time."""
 
 from campaigns.attacks.graph import attack
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tick import SampleRouter
-from rcl_interfaces.msg import Parameter, ParameterValue
+import pytest
+from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -46,6 +49,74 @@ def test_a_parameter_of_no_known_type_does_not_end_the_node(graph, write_scene, 
     assert sum('a call failed' in line for line in node.log.splitlines()) <= 3, 'once a period'
     assert node.end() == 0
     assert 'Traceback' not in node.log
+
+
+@pytest.fixture
+def peer(graph):
+    """Return a function that sets a node's scene, and gives what it logs when configured so."""
+    log = graph.listen(Log, '/rosout')
+
+    def set_scene(scene, *settings):
+        request = SetParameters.Request(
+            parameters=[
+                Parameter(
+                    name='scene',
+                    value=ParameterValue(
+                        type=ParameterType.PARAMETER_STRING, string_value=str(scene)
+                    ),
+                ),
+                Parameter(
+                    name='set',
+                    value=ParameterValue(
+                        type=ParameterType.PARAMETER_STRING_ARRAY,
+                        string_array_value=settings or [''],
+                    ),
+                ),
+            ]
+        )
+        answer = graph.call(SetParameters, '/linkage_node/set_parameters', request)
+        assert all(result.successful for result in answer.results)
+        log.clear()
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE))
+        if graph.call(ChangeState, '/linkage_node/change_state', request).success:
+            request.transition.id = Transition.TRANSITION_CLEANUP
+            assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+            return ''
+        return wait_for(lambda: log and log[-1].msg, 'the reason')
+
+    return set_scene
+
+
+def test_a_peer_reads_writes_and_imports_nothing_of_the_machine(
+    peer, write_scene, start, folder, tmp_path, monkeypatch
+):
+    secret = 'hunter2'
+    (tmp_path / 'token.txt').write_text(secret)
+    (folder / 'beside.yaml').write_text(f'password: {secret}')
+    (tmp_path / 'evil.py').write_text(f'open({str(tmp_path / "imported")!r}, "w")')
+    own = write_scene('own', 'rate: 100')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    node = start(own, '-p', 'autostart:=false', ready='')
+    for scene, setting in (
+        (tmp_path / 'token.txt', ''),
+        (folder / 'beside.yaml', ''),
+        ('/proc/self/environ', ''),
+        (own, f'linkage={tmp_path}/token.txt'),
+        (own, f'linkage={{urdf: {tmp_path}/token.txt, input: m}}'),
+        (own, f'drive={{bag: {{file: {tmp_path}/token.txt}}}}'),
+        (own, 'effects={"evil.mod": {}}'),
+        (own, f'record={{directory: {tmp_path}/runs}}'),
+    ):
+        reason = peer(scene, *filter(None, [setting]))
+        assert 'after the start of the node' in reason or 'neither a scene nor a linkage' in reason
+        assert secret not in reason
+    assert not (tmp_path / 'imported').exists()
+    assert not (tmp_path / 'runs').exists()
+    assert peer(own, 'rate=500') == '', 'what it was started with may be set up in another way'
+    assert peer('demo', 'rate=500') == ''
+    assert peer(own) == ''
+    assert node.end() == 0
+    assert secret not in node.log
 
 
 def test_what_huge_messages_are_for_is_not_remembered():

@@ -43,6 +43,7 @@ HEIGHTS = (
     ('stages.faults',),
     # What a scene is: its keys are declared by what it brings.
     (
+        'description.confinement',
         'description.scene',
         'description.scene_file',
         'description.notes',
