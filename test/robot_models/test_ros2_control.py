@@ -182,7 +182,6 @@ FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joi
     [
         ('-0.9', 'OPEN'),  # beyond the limit of the motor, 42.4 degrees
         ('0.1', 'OPEN'),
-        ('nan', 'INDETERMINATE'),
         ('inf', 'INDETERMINATE'),
         ('1e300', 'OPEN'),
     ],
@@ -202,13 +201,74 @@ def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
     assert f': {status}; the last valid command stays' in line
 
 
+def test_one_joint_without_a_command_leaves_the_last_of_all(programs):
+    lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
+    lines += ['to_actuators 0.1 0 0 -0.1 0 0', 'to_actuators nan 1 0 0.1 1 0']
+    answers, _ = run(programs('ankle'), lines)
+    (good, _, _), (kept, status, _) = map(numbers_of, answers)
+    assert status == NUMBERS['INDETERMINATE']
+    assert kept.tolist() == [[position, 0.0, effort] for position, _, effort in good.tolist()]
+
+
+DEACTIVATED = 'to_actuators nan nan nan'
+"""What a transmission finds while no controller commands: NaN, as the handles begin."""
+
+
+def test_without_a_command_the_actuators_get_none_and_no_earlier_one_comes_back(programs):
+    lines = [
+        *FINGER,
+        'configure',
+        DEACTIVATED,  # the start: nothing was commanded yet
+        'sleep 1200',
+        'to_actuators -0.3 0 2',
+        'to_joints 0.6 0 0',  # moved by hand
+        DEACTIVATED,
+        'to_actuators 0.1 1 1',  # the first command after it has no pose
+        DEACTIVATED,
+        'to_actuators -0.6 0 0',
+        'sleep 1200',
+    ]
+    answers, errors = run(programs('finger'), lines)
+    start, given, moved, off, wrong, again, new = map(numbers_of, answers)
+    for none, status, allocated in (start, off, again):
+        assert np.isnan(none).all()
+        assert (status, allocated) == (0, 0)
+    assert given[0][0] == pytest.approx([0.3, 0.0, -2.0], abs=1e-14)
+    assert moved[0][0, 0] == pytest.approx(-0.6, abs=1e-14)
+    assert wrong[1] == NUMBERS['OPEN']
+    assert np.isnan(wrong[0][0, [0, 2]]).all()
+    assert wrong[0][0, 1] == 0.0
+    assert new[0][0, 0] == pytest.approx(0.6, abs=1e-14)
+    assert errors == ''
+
+
+def test_each_kind_of_command_may_be_absent_by_itself(programs):
+    lines = [*FINGER, 'configure', 'to_joints 0.3 0 0', 'to_actuators nan 2 nan',
+             'to_actuators -0.3 nan nan', 'to_actuators nan nan 1']  # fmt: skip
+    answers, _ = run(programs('finger'), lines)
+    found = [numbers_of(answer)[0][0].tolist() for answer in answers[1:]]
+    assert found[0] == pytest.approx([np.nan, -2.0, np.nan], nan_ok=True)
+    assert found[1] == pytest.approx([0.3, np.nan, np.nan], nan_ok=True)
+    assert found[2] == pytest.approx([np.nan, np.nan, -1.0], nan_ok=True)
+
+
+def test_another_configuration_knows_nothing_of_the_last(programs):
+    """The handles of a component are given anew when it is activated again."""
+    lines = [*FINGER, 'configure', 'to_actuators -0.3 0 2', 'to_joints 0.3 0 0', 'configure',
+             'to_joints nan 0 0', 'to_actuators 0.1 0 0']  # fmt: skip
+    answers, _ = run(programs('finger'), lines)
+    _, _, (state, _, _), (command, _, _) = map(numbers_of, answers)
+    assert np.isnan(state).all()
+    assert np.isnan(command[0, [0, 2]]).all()
+
+
 def test_states_beyond_limits_are_told_and_commands_are_not_taken(programs):
     lines = [*FINGER, 'configure', 'to_joints 0.8 0 0', 'to_actuators -0.8 0 0']
     answers, _ = run(programs('finger'), lines)
     (joints, state, _), (actuators, command, _) = map(numbers_of, answers)
     assert (state, command) == (NUMBERS['LIMITED'], NUMBERS['OPEN'])
     assert joints[0, 0] == pytest.approx(-0.8, abs=1e-14)
-    assert actuators[0, 0] == 0.8
+    assert np.isnan(actuators[0, 0])
 
 
 def test_another_assembly_is_not_the_commanded_one(programs):
@@ -216,7 +276,8 @@ def test_another_assembly_is_not_the_commanded_one(programs):
     answers, _ = run(programs('ankle'), [*lines, 'to_actuators 9 0 0 -0.5 0 0'])
     found, status, _ = numbers_of(answers[0])
     assert status == NUMBERS['OPEN']
-    assert not found.any()
+    assert np.isnan(found[:, [0, 2]]).all()
+    assert not found[:, 1].any()
 
 
 def test_velocities_and_efforts_alone_are_at_the_last_state(programs):

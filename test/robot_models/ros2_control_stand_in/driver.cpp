@@ -1,7 +1,7 @@
 // Runs a transmission by lines from the standard input; its numbers are hexadecimal.
 //
 //   actuator NAME ROLE REDUCTION OFFSET        joint NAME ROLE REDUCTION OFFSET [INTERFACE...]
-//   configure [INTERFACE...]                   all interfaces, if none is named
+//   configure [INTERFACE...]                   all interfaces, if none is named; again, another time
 //   to_joints NUMBER...                        position, velocity, effort of each actuator
 //   to_actuators NUMBER...                     the same of each joint
 //   time COUNT                                 both ways, from where the values are
@@ -69,7 +69,7 @@ int main()
       }
       (what == "joint" ? info.joints : info.actuators).push_back(one);
     } else if (what == "configure") {
-      transmission = make_plugin()->load(info);
+      transmission = transmission ? transmission : make_plugin()->load(info);
       if (!transmission) {
         return 1;
       }

@@ -208,6 +208,11 @@ public:
     const std::vector<JointHandle> & joint_handles,
     const std::vector<ActuatorHandle> & actuator_handles) override
   {
+    has_state_ = false;
+    told_ = filled<JOINTS>();
+    given_ = filled<INPUTS>();
+    log_.note(log_.state, 0, {});
+    log_.note(log_.command, 0, {});
     statuses_.clear();
     for (std::size_t which = 0; which < INTERFACES.size(); ++which) {
       joints_[which].clear();
@@ -267,11 +272,23 @@ public:
     }
   }
 
+  // Without any command the actuators get none: after a deactivation the last one is not repeated,
+  // since they may have been moved since.
   void joint_to_actuator() override
   {
+    std::array<bool, 3> is_given{};
+    for (std::size_t which = 0; which < INTERFACES.size(); ++which) {
+      is_given[which] = has_commands_[which] && is_any_given(read_commands(which));
+      if (!is_given[which]) {
+        given_[which].fill(std::nan(""));
+      }
+    }
     Jacobian jacobian = state_;
     bool is_valid = has_state_;
-    if (has_commands_[POSITION]) {
+    if (!is_given[POSITION]) {
+      log_.note(log_.command, 0, {});
+      tell_status();
+    } else {
       Values commands = read_commands(POSITION), inputs{};
       for (std::size_t k = 0; k < INPUTS; ++k) {
         commands[k] -= names_.offsets[COMMANDED[k]];
@@ -290,16 +307,15 @@ public:
         given_[POSITION][k] = inputs[k] * names_.reductions[k];
       }
     }
-    give_rates(jacobian, is_valid);
-    if (is_valid && has_commands_[EFFORT]) {
+    if (is_given[VELOCITY]) {
+      give_rates(jacobian, is_valid);
+    }
+    if (is_given[EFFORT] && is_valid) {
       give_efforts(jacobian);
     }
     for (std::size_t which = 0; which < INTERFACES.size(); ++which) {
-      // Before the first valid command the actuators' values stay as they are.
       for (std::size_t k = 0; has_commands_[which] && k < INPUTS; ++k) {
-        if (std::isfinite(given_[which][k])) {
-          set(actuators_[which][k], given_[which][k]);
-        }
+        set(actuators_[which][k], given_[which][k]);
       }
     }
   }
@@ -338,16 +354,15 @@ private:
     }
   }
 
-  // Without a pose the actuators stop.
+  // Without a pose, or rates of the inputs that move the joints so, the actuators stop.
   void give_rates(const Jacobian & jacobian, bool is_valid)
   {
     Values of_inputs{};
-    if (has_commands_[VELOCITY] &&
-      (!is_valid || jacobian.solve(read_commands(VELOCITY), of_inputs, false)))
-    {
-      for (std::size_t k = 0; k < INPUTS; ++k) {
-        given_[VELOCITY][k] = of_inputs[k] * names_.reductions[k];
-      }
+    if (!is_valid || !jacobian.solve(read_commands(VELOCITY), of_inputs, false)) {
+      of_inputs.fill(0.0);
+    }
+    for (std::size_t k = 0; k < INPUTS; ++k) {
+      given_[VELOCITY][k] = of_inputs[k] * names_.reductions[k];
     }
   }
 
@@ -381,6 +396,17 @@ private:
     if (handle) {
       static_cast<void>(handle.set_value(value));
     }
+  }
+
+  // NaN is no command.
+  static bool is_any_given(const Values & commands)
+  {
+    for (const double command : commands) {
+      if (!std::isnan(command)) {
+        return true;
+      }
+    }
+    return false;
   }
 
   Values read_commands(std::size_t which) const
@@ -422,7 +448,7 @@ private:
   std::array<bool, 3> has_actuators_{}, has_commands_{};
   Jacobian state_;
   bool has_state_ = false;
-  // The last valid states of the joints and commands of the actuators; NaN before the first
+  // The last valid states of the joints and commands of the actuators; NaN where there are none
   std::array<std::array<double, JOINTS>, 3> told_ = filled<JOINTS>();
   std::array<Values, 3> given_ = filled<INPUTS>();
 };
