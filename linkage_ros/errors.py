@@ -32,6 +32,24 @@ _PYTHON_PACKAGES = {'mcap': 'mcap', 'numpy': 'numpy', 'yaml': 'PyYAML'}
 """Packages that every installation needs beside ROS: import name and package name."""
 
 
+_named: dict[str, str] = {}
+
+
+def name_instead(temporary: str | PathLike[str], named: str | PathLike[str]) -> None:
+    """
+    Let errors name what the user named instead of a temporary file or folder made from it.
+
+    The user cannot look into it: it is gone when the error is read.
+    """
+    _named[str(temporary)] = str(named)
+
+
+def _as_named(text: str) -> str:
+    for temporary, named in _named.items():
+        text = text.replace(temporary, named)
+    return text
+
+
 class LinkageError(Exception):
     """
     Root of all errors that this package raises on purpose.
@@ -49,7 +67,7 @@ class LinkageError(Exception):
 
     def __init__(self, where: str | PathLike[str], reason: str, remedy: str) -> None:
         self.where, self.reason, self.remedy = (
-            shorten(escape_unprintable(' '.join(text.split())), _LONGEST_PART)
+            shorten(escape_unprintable(' '.join(_as_named(text).split())), _LONGEST_PART)
             for text in (str(where), reason, remedy)
         )
         super().__init__(f'{self.where}: {self.reason}; {self.remedy}')

@@ -16,12 +16,15 @@ for a terminal.
 
 from __future__ import annotations
 
+import json
 import re
 
 from linkage_ros.errors import escape_unprintable, shorten
 
 _IN_COMMENT = re.compile(r'\\|(?<=\*)/|(?<=/)\*|(?<=\?)\?')
 """A backslash, and what ends a comment or begins one or a trigraph together with what precedes."""
+
+_TRIGRAPH = re.compile(r'(?<=\?)\?')
 
 _FORMULA = re.compile("'*[-+=@\uff0b\uff0d\uff1d\uff20]")
 """Beginning of a cell that a spreadsheet computes, here behind our own mark."""
@@ -40,6 +43,11 @@ def comment_text(name: str) -> str:
     one, or be a trigraph: ``*\/``. A character that is not printable is written as ``\x1b``.
     """
     return escape_unprintable(_IN_COMMENT.sub(r'\\\g<0>', name))
+
+
+def c_string(text: str) -> str:
+    r"""Return a literal of C; a backslash keeps two question marks from being a trigraph."""
+    return _TRIGRAPH.sub(r'\\?', json.dumps(text, ensure_ascii=False))
 
 
 def csv_text(text: str) -> str:

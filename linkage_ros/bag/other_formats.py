@@ -23,7 +23,7 @@ import shutil
 from tempfile import mkdtemp
 from typing import Any
 
-from linkage_ros.errors import BagError
+from linkage_ros.errors import BagError, name_instead
 
 MCAP_SUFFIXES = '.mcap', '.mcap.zstd'
 BAG_SUFFIXES = *MCAP_SUFFIXES, '.db3', '.db3.zstd', '.bag'
@@ -94,6 +94,7 @@ def _decompressed_file(file: Path, size: int, _changed: int) -> Path:
     name = file.name.removesuffix('.zstd')
     try:
         target = Path(mkdtemp(dir=_temporary_folder())) / name
+        name_instead(target, file)
         with file.open('rb') as packed, target.open('wb') as content:
             pieces = zstandard.ZstdDecompressor().read_to_iter(packed, write_size=_PIECE)
             for piece in pieces:

@@ -11,13 +11,21 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from math import degrees, isfinite, nan, pi, radians, remainder, tau
 from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
-from linkage_ros.description import check_kind, check_new, check_output_name, TABLE_KINDS, Units
+from linkage_ros.description import (
+    check_kind,
+    check_new,
+    check_output_name,
+    files_of_scene,
+    TABLE_KINDS,
+    Units,
+)
 from linkage_ros.errors import decimal_comma, LinkageError, list_names, quote
 from linkage_ros.kinematics import Linkage
 
@@ -31,6 +39,9 @@ LINKAGES = ('.yaml', '.yml')
 """Suffixes of linkage and scene files."""
 
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
+
+_WRITTEN = ('output', 'picture', 'draw', 'page')
+"""Arguments that name a file to write."""
 
 _ALL_DIGITS = 1e15
 """From here on a double has no decimals."""
@@ -111,7 +122,7 @@ def add_force(parser: argparse._ActionsContainer) -> None:
 
 def refuse_existing(arguments: argparse.Namespace) -> None:
     """Raise if what the user names to write exists, without ``--force``, or cannot be written."""
-    for name in ('output', 'picture', 'draw', 'page'):
+    for name in _WRITTEN:
         path = getattr(arguments, name, None)
         if isinstance(path, Path):
             check_new(path, force=getattr(arguments, 'force', False))
@@ -124,6 +135,19 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
             bag = getattr(arguments, 'bag', None)
             if bag is not None and bag.resolve().is_relative_to(path.resolve()):
                 raise LinkageError(path, 'is the bag that is read', 'name another with -o')
+            if path.is_file() and any(map(path.samefile, _read_files(arguments))):
+                raise LinkageError(path, 'is a file that is read', 'name another with -o')
+
+
+def _read_files(arguments: argparse.Namespace) -> Iterator[Path]:
+    """Yield the files that arguments name to read, and those that scenes among them name."""
+    for name, value in vars(arguments).items():
+        if name in _WRITTEN or not isinstance(value, (str, Path)):
+            continue
+        with suppress(OSError, ValueError):  # a text that is not the name of a file
+            if Path(value).is_file():
+                yield Path(value)
+                yield from filter(Path.is_file, files_of_scene(Path(value)))
 
 
 def output_or(arguments: argparse.Namespace, default: Path) -> Path:

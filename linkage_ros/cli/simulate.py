@@ -39,7 +39,7 @@ from linkage_ros.description import (
     table_file,
     TABLE_KINDS,
 )
-from linkage_ros.errors import escape_unprintable, LinkageError
+from linkage_ros.errors import escape_unprintable, LinkageError, name_instead
 from linkage_ros.messages import EFFORT, POSITION, RATE, UNITS
 from linkage_ros.replay import (
     check_simulated,
@@ -150,9 +150,16 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         return int(stop.is_set())
     with TemporaryDirectory() as folder:
         bag = Path(folder) / 'run'
-        _simulate_into(scene, bag, ticks, stop)
+        name_instead(bag, f'the run of {arguments.scene}')
+        counts = _simulate_into(scene, bag, ticks, stop)
         if stop.is_set():
             return 1
+        if not counts['/joint_states']:
+            raise LinkageError(
+                arguments.scene,
+                f'publishes no joint states in {ticks:,} ticks',
+                'name a folder by -o, and linkage info says why',
+            )
         try:
             found = export_bag(bag, output, None, stop)
         except StoppedError:

@@ -13,6 +13,7 @@ from linkage_ros.description.file_access import (
     check_output_name as check_output_name,
     read_regular as read_regular,
     remove_bag as remove_bag,
+    write_folder as write_folder,
 )
 from linkage_ros.description.file_kinds import (
     BINARY as BINARY,
@@ -87,6 +88,7 @@ from linkage_ros.description.scene import (
     StorageParameters as StorageParameters,
 )
 from linkage_ros.description.scene_file import (
+    files_of_scene as files_of_scene,
     kind_of as kind_of,
     LINKAGE_FILE as LINKAGE_FILE,
     load_scene as load_scene,

@@ -16,12 +16,13 @@ is written, at every instant the whole old one is there, or the whole new one.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EINVAL, EISDIR
 import os
 from pathlib import Path
 from secrets import token_hex
+from shutil import rmtree
 import stat
 from typing import BinaryIO
 
@@ -128,8 +129,41 @@ def atomic_write(file: str | Path, data: bytes) -> None:
         with replace_file(target) as stream:
             stream.write(data)
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a circle of links
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
+        raise _unwritable_error(file, error, 'name another file') from None
+
+
+def _unwritable_error(path: str | Path, error: Exception, remedy: str) -> LinkageError:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return LinkageError(path, f'cannot be written ({reason})', remedy)
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """
+    Write a folder with the files of these paths in it, or nothing.
+
+    They are written beside the folder first. In a folder that exists each then replaces the old
+    one, and other files stay. A LinkageError says that the folder cannot be written.
+    """
+    temporary = _temporary_name(folder)
+    try:
+        _check_folder(folder)
+        for path, data in files.items():
+            (temporary / path).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / path).write_bytes(data)
+        if not folder.exists():
+            temporary.rename(folder)
+            return
+        for path in files:
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / path).replace(folder / path)
+    except (OSError, ValueError) as error:
+        raise _unwritable_error(folder, error, 'name another folder') from None
+    finally:
+        rmtree(temporary, ignore_errors=True)
+
+
+def _temporary_name(target: Path) -> Path:
+    return target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
 
 
 @contextmanager
@@ -139,7 +173,7 @@ def replace_file(target: Path) -> Iterator[BinaryIO]:
 
     On an OSError the old file stays, and no other file is left.
     """
-    temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
+    temporary = _temporary_name(target)
     try:
         with temporary.open('xb') as stream:
             with suppress(FileNotFoundError):

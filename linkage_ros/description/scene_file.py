@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from os.path import isfile
@@ -235,6 +235,24 @@ def parse_scene(
 
     source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
     return _build_scene(content, files[SCENE_FILE], source, settings)
+
+
+def files_of_scene(file: Path) -> Iterator[Path]:
+    """Yield the files that a scene names; none for another file, or one that cannot be read."""
+    try:
+        scene = read_yaml(file)[0].mapping
+    except FileError:
+        return
+    linkages = scene.get('linkages')
+    for entry in (scene, *(linkages if isinstance(linkages, list) else ())):
+        match entry:
+            case {'linkage': str(name)}:
+                yield linkage_of_scene(name, file.parent)
+            case {'linkage': {'urdf': str(name)}}:
+                yield file.parent / name
+        match entry:
+            case {'drive': {'bag': {'file': str(name)}}}:
+                yield file.parent / name
 
 
 def seed_of(name: str) -> int:

@@ -125,3 +125,34 @@ def test_the_bag_that_is_read_is_never_overwritten(folder, command, given) -> No
     assert refused.returncode == 2
     assert 'bag: is the bag that is read' in refused.stderr
     assert linkage(folder, 'info', 'bag').returncode == 0
+
+
+READS = {
+    'the scene itself': ('accuracy', ['scene.yaml', '--need', '5'], 'scene.yaml'),
+    'the linkage of a scene': ('accuracy', ['scene.yaml', '--need', '5'], 'linkage.yaml'),
+    'a linkage of several': ('accuracy', ['both.yaml', '--need', '5'], 'linkage.yaml'),
+    'a robot': ('urdf', ['robot.urdf'], 'robot.urdf'),
+    'the robot of a scene': ('urdf', ['of_robot.yaml'], 'robot.urdf'),
+    'the same by another name': ('urdf', ['robot.urdf'], 'link.urdf'),
+    'pairs': ('synthesize', ['--pairs', 'pairs.csv'], 'pairs.csv'),
+}
+
+
+@pytest.mark.parametrize('kind', READS)
+def test_a_file_that_the_command_reads_is_never_overwritten(tmp_path, kind) -> None:
+    command, words, output = READS[kind]
+    files = {
+        'scene.yaml': 'linkage: linkage.yaml\n',
+        'both.yaml': 'linkages: [{name: a, linkage: four_bar}, {name: b, linkage: linkage.yaml}]',
+        'of_robot.yaml': 'linkage: {urdf: robot.urdf, input: m}\n',
+        'linkage.yaml': 'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
+        'robot.urdf': '<robot name="r"/>',
+        'pairs.csv': '40,50\n60,61\n90,80\n',
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / 'link.urdf').symlink_to(tmp_path / 'robot.urdf')
+    refused = linkage(tmp_path, command, *words, '-o', output, '--force')
+    assert refused.returncode == 2
+    assert f'{output}: is a file that is read; name another with -o\n' in refused.stderr
+    assert {name: (tmp_path / name).read_text() for name in files} == files

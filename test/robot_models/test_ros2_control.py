@@ -13,6 +13,8 @@ The real ones, with a ResourceManager and a joint_trajectory_controller, take mi
 docs/how_to/ros2_control.md says what was run with them.
 """
 
+import errno
+import os
 from pathlib import Path
 from random import Random
 import shutil
@@ -378,6 +380,90 @@ def test_what_cannot_be_written_is_one_line(told, tmp_path, capsys):
     (line,) = capsys.readouterr().err.splitlines()
     assert told in line
     assert not (tmp_path / 'arm').exists()
+
+
+def test_a_name_is_a_name_in_all_of_cs_spellings(tmp_path):
+    """Trigraphs, which C++14 still has: ??/ is a backslash, so a text would end early."""
+    (tmp_path / 'arm.yaml').write_text(
+        'links:\n'
+        '  ground: {O2: [0, 0], O4: [0.1, 0]}\n'
+        '  crank: {O2: [0, 0], A: [0.04, 0]}\n'
+        '  coupler: {A: [0, 0], B: [0.12, 0]}\n'
+        '  rocker: {O4: [0, 0], B: [0.08, 0]}\n'
+        'input: {joint: crank_joint, parent: ground, child: crank}\n'
+        'assembly: {B: left}\n'
+        'joints:\n'
+        """  'a??/"};int injected(){return 42;}//': {parent: crank, child: coupler}\n"""
+        """  'b???/\\??': {parent: crank, child: rocker}\n"""
+        '  rocker_joint: {parent: ground, child: rocker}\n'
+    )
+    package = tmp_path / 'arm'
+    options = ('--driven-by', 'rocker_joint', '--branch', '1')
+    file = str(tmp_path / 'arm.yaml')
+    assert main(['compile', file, '--ros2-control', str(package), *options]) == 0
+    program = tmp_path / 'names.cpp'
+    program.write_text(
+        '#include <cstdio>\n#include "linkage.hpp"\n'
+        'int main() {for (auto name : arm_plugin::JOINT_NAMES) {std::puts(name);}}\n'
+    )
+    for standard in ('c++14', 'c++17'):
+        subprocess.run(
+            ['c++', f'-std={standard}', '-w', f'-I{package / "src"}', str(program),
+             '-o', str(tmp_path / 'names')],
+            check=True, timeout=120,
+        )  # fmt: skip
+        done = subprocess.run(
+            [str(tmp_path / 'names')], capture_output=True, text=True, check=True
+        )
+        names = ['rocker_joint', 'a??/"};int injected(){return 42;}//', 'b???/\\??']
+        assert done.stdout.splitlines() == names
+
+
+UNWRITABLE = {
+    'a' + 'b' * 300: 'cannot be written (File name too long); name another folder',
+    'there/is_none/arm': 'there is no folder',
+    'file/arm': 'cannot be written (Not a directory); name another folder',
+}
+
+
+@pytest.mark.parametrize('name', UNWRITABLE)
+def test_a_folder_that_cannot_be_made_is_one_line(name, tmp_path, capsys):
+    (tmp_path / 'file').write_text('')
+    assert main(['compile', 'ankle_motors', '--ros2-control', str(tmp_path / name)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert UNWRITABLE[name] in line
+    assert [file.name for file in tmp_path.iterdir()] == ['file']
+
+
+@pytest.mark.parametrize('count', range(6))
+@pytest.mark.parametrize('force', [False, True])
+def test_a_package_is_written_whole_or_not_at_all(count, force, tmp_path, capsys, monkeypatch):
+    """The disk is full after some files."""
+    folder = tmp_path / 'ankle_transmission'
+    if force:
+        folder.mkdir()
+        (folder / 'mine').write_text('mine')
+    left = [count]
+    write_bytes = Path.write_bytes
+
+    def write_until_full(file, data):
+        left[0] -= 1
+        if left[0] < 0:
+            write_bytes(file, data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write_bytes(file, data)
+
+    typed = ['compile', 'ankle_motors', '--ros2-control', str(folder), *['--force'] * force]
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, 'write_bytes', write_until_full)
+        assert main(typed) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'cannot be written (No space left on device); name another folder' in line
+    assert sorted(str(file.relative_to(tmp_path)) for file in tmp_path.rglob('*')) == (
+        ['ankle_transmission', 'ankle_transmission/mine'] if force else []
+    )
+    assert main(typed) == 0
+    assert (folder / 'src' / 'transmission.cpp').is_file()
 
 
 @pytest.mark.parametrize('name', ['Arm', '9arm', 'my-arm', 'a__b', 'arm_'])

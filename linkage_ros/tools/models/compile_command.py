@@ -20,13 +20,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+import os
 from pathlib import Path
 import re
 from threading import Event
 from typing import Any
 
 from linkage_ros.cli import add_file, add_output, add_robot, bounded_number, robot_of
-from linkage_ros.description import atomic_write, linkage_content, read_any_closure
+from linkage_ros.description import (
+    atomic_write,
+    linkage_content,
+    read_any_closure,
+    write_folder,
+)
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
@@ -140,7 +146,7 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
             folder, f'{quote(name)} is no name of a ROS package',
             'use lower-case letters, digits and _, as in gripper_transmission',
         )  # fmt: skip
-    if folder.exists() and not (arguments.force and folder.is_dir()):
+    if os.path.lexists(folder) and not (arguments.force and folder.is_dir()):
         raise LinkageError(
             folder, 'exists already', 'name another, or add --force to write into it'
         )
@@ -148,9 +154,7 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
     inverse = _driven_closure(closure, commanded, arguments.branch)
     joints = _requested_joints(closure, arguments.joints)
     joints = tuple(dict.fromkeys((*commanded, *joints)))
-    for path, text in write_package(closure, inverse, name, file.name, joints).items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        atomic_write(folder / path, text.encode())
+    write_folder(folder, write_package(closure, inverse, name, file.name, joints))
     print(folder)
     return 0
 

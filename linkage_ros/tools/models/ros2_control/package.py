@@ -17,7 +17,6 @@ the inputs, and the velocities and efforts follow from the derivatives: power in
 from __future__ import annotations
 
 from collections.abc import Sequence
-import json
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
@@ -25,7 +24,7 @@ from xml.sax.saxutils import escape, quoteattr
 from linkage_ros import __version__
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics import Status
-from linkage_ros.names import comment_text
+from linkage_ros.names import c_string, comment_text
 from linkage_ros.tools.models.source_code import C, STATUSES, Subject, write_source
 
 _HERE = Path(__file__).parent
@@ -40,7 +39,7 @@ _COPIED = {
 
 def write_package(
     closure: Any, inverse: Any, name: str, file: str, joints: Sequence[str]
-) -> dict[str, str]:
+) -> dict[str, bytes]:
     """
     Return the files of a package, by their paths in it.
 
@@ -77,7 +76,7 @@ def write_package(
         files[f'src/{subject.name}.h'] = write_source(subject, language)
     files['src/linkage.hpp'] = _constants(forward, back)
     files['transmission.urdf'] = _transmission_element(forward)
-    return files
+    return {path: text.encode() for path, text in files.items()}
 
 
 def commanded_joints(closure: Any, typed: Sequence[str]) -> tuple[str, ...]:
@@ -140,7 +139,7 @@ inline int to_inputs(const double * commanded, double * inputs)
 
 
 def _literals(names: Sequence[str]) -> str:
-    return ', '.join(json.dumps(name, ensure_ascii=False) for name in names)
+    return ', '.join(map(c_string, names))
 
 
 def _transmission_element(forward: Subject) -> str:
