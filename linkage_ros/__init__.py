@@ -67,4 +67,4 @@ from linkage_ros.faces import lazy_names
 
 __version__ = '0.1.0'
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+__getattr__, __dir__ = lazy_names(__name__)

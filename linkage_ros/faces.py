@@ -14,16 +14,15 @@ The list is the folder's stub, `__init__.pyi`, which type checkers read as well.
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 from importlib import import_module
-from pkgutil import get_data
 import sys
-from typing import Any
 
 
 def home_modules(stub: str) -> dict[str, str]:
     """Return the module of each name that a stub exports."""
+    import ast  # local import: a program starts sooner without it
+
     return {
         alias.name: statement.module
         for statement in ast.parse(stub).body
@@ -32,22 +31,33 @@ def home_modules(stub: str) -> dict[str, str]:
     }
 
 
-def lazy_names(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return `__getattr__`, `__dir__` and `__all__` of a package, as its stub lists its names."""
-    stub = get_data(package, '__init__.pyi')
-    assert stub is not None
-    homes = home_modules(stub.decode())
+def lazy_names(package: str) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return `__getattr__`, with `__all__`, and `__dir__` of a package: the names of its stub."""
     module = sys.modules[package]
+    homes: dict[str, str] = {}
 
-    def import_name(name: str) -> Any:
-        if name not in homes:
+    def find_homes() -> dict[str, str]:
+        if not homes:
+            from pkgutil import get_data  # local import: as above
+
+            stub = get_data(package, '__init__.pyi')
+            assert stub is not None
+            homes.update(home_modules(stub.decode()))
+        return homes
+
+    def import_name(name: str) -> object:
+        if name == '__all__':
+            return [*find_homes()]
+        # Python asks a package for names of its own, as __path__, which no stub has.
+        home = None if name.startswith('__') else find_homes().get(name)
+        if home is None:
             message = f'module {package!r} has no attribute {name!r}'
             raise AttributeError(message, name=name, obj=module)
-        value = getattr(import_module(homes[name]), name)
+        value: object = getattr(import_module(home), name)
         setattr(module, name, value)
         return value
 
     def list_names() -> list[str]:
-        return sorted({*vars(module), *homes})
+        return sorted({*vars(module), *find_homes()})
 
-    return import_name, list_names, [*homes]
+    return import_name, list_names

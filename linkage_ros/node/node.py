@@ -208,7 +208,7 @@ class LinkageNode(LifecycleNode):
 
     @property
     def _confinement(self) -> Confinement | None:
-        """What the scene may name; None for what the process was started with."""
+        """Return what the scene may name; None for what the process was started with."""
         if self._set_scene() == self._set_at_start:
             return None
         own_file, _ = self._set_at_start

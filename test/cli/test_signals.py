@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 import signal
@@ -334,3 +335,44 @@ def wait_until_read_from(process: subprocess.Popen[str], file: Path) -> None:
                         return
         time.sleep(0.01)
     pytest.fail('it has ended before it was told to')
+
+
+STARTS = """
+import os, signal, sys
+class Interrupts:
+    left = int(sys.argv.pop(1))
+    first = 'linkage_ros.early_signals'
+    def find_spec(self, name, path=None, target=None):
+        self.left -= self.first in sys.modules and name != self.first
+        if self.left == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupts())
+import importlib
+program = importlib.import_module(sys.argv.pop(1))
+print('imported')
+sys.exit(program.main())
+"""
+"""Imports a program, and is interrupted at one of its imports; what Python does before is its."""
+
+PROGRAMS = {
+    'linkage_ros.__main__': ('solve', 'four_bar', '--at', '10'),
+    **{
+        f'linkage_ros.node.{name}': ('--help',)
+        for name in ('linkage_node', 'linkage_relay', 'crank_source', 'pd_controller')
+        if find_spec('rclpy')
+    },
+}
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize('program', PROGRAMS)
+def test_a_signal_in_the_first_instants_shows_no_traceback(tmp_path, program):
+    for number in (1, 2, 3, 5, 8, 13, 21, 34, 55, 89):
+        done = subprocess.run(
+            [sys.executable, '-c', STARTS, str(number), program, *PROGRAMS[program]],
+            cwd=tmp_path, env=environment(tmp_path), capture_output=True, text=True, check=False,
+            timeout=60,
+        )  # fmt: skip
+        assert 'Traceback' not in done.stderr
+        assert 'Fatal' not in done.stderr
+        assert len(done.stderr.splitlines()) <= 1

@@ -42,8 +42,9 @@ def damage(kind, content):
         case 'cut':
             return content[: len(content) // 2]
         case 'flipped':
-            half = len(content) // 2
-            return content[:half] + bytes([content[half] ^ 0xFF]) + content[half + 1 :]
+            changed = bytearray(content)
+            changed[len(content) // 2] ^= 0xFF
+            return bytes(changed)
         case 'foreign':
             return b'a text' * 100
         case _:

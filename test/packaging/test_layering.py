@@ -31,6 +31,7 @@ HEIGHTS = (
         'signals',
         'generated_code',
         'processes',
+        'early_signals',
         'dask_workers',
         'workbench',
     ),

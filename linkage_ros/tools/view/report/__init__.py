@@ -10,4 +10,4 @@
 
 from linkage_ros.faces import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_names(__name__)
+__getattr__, __dir__ = lazy_names(__name__)
