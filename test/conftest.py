@@ -9,9 +9,10 @@
 """For all tests: how many run and in which order, how Hypothesis judges examples, a browser."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 import gc
 from math import inf
+import re
 from typing import Any
 
 from hypothesis import HealthCheck, settings
@@ -20,6 +21,15 @@ import pytest
 
 from .browser import chromium
 from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
+
+WITHOUT_KEY = {
+    'aiohttp', 'casadi', 'dask', 'distributed', 'ezdxf', 'flint', 'fmpy', 'jax',
+    'matplotlib', 'mpmath', 'mujoco', 'numba', 'PIL', 'plotly', 'pyarrow', 'pylinkage',
+    'pythonfmu3', 'rich', 'scipy', 'torch', 'yourdfpy', 'zstandard',
+}  # fmt: skip
+"""Packages without a rosdep key, or too large for a robot: `colcon test` runs without them."""
+
+_skipped: set[str] = set()
 
 # A property is not judged by the duration of an example.
 settings.register_profile(
@@ -42,6 +52,25 @@ def browser() -> Iterator[Any]:
     """Give a running Chromium; not for the whole session, since its event loop runs as long."""
     with chromium.browser() as started:
         yield started
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Skip a file of tests that needs a package which package.xml cannot name."""
+    report = yield
+    text = str(report.longrepr) if report.failed else ''
+    package = re.search(r"No module named '(\w+)", text)
+    # What a file that was skipped holds may be imported by another one.
+    part = re.search(r"cannot import name '\w+' from '[.\w]+' \((.*)\)", text)
+    if (package and package[1] in WITHOUT_KEY) or (part and part[1] in _skipped):
+        report.outcome = 'skipped'
+        what = f'needs the package {package[1]}' if package else f'needs {part[1]}'
+        report.longrepr = report.nodeid, 0, f'Skipped: {what}'
+    if report.skipped:
+        _skipped.add(str(collector.path))
+    return report
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,0 +1,55 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""`colcon test` on a robot: tests skip themselves where a package is missing that has no key."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from ..conftest import WITHOUT_KEY
+
+PROGRAM = """
+import sys
+from importlib.machinery import PathFinder
+import pytest
+class WithoutSome(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        hidden = name.partition('.')[0] in sys.argv[1].split()
+        return None if hidden else super().find_spec(name, path, target)
+sys.meta_path = [WithoutSome if finder is PathFinder else finder for finder in sys.meta_path]
+sys.exit(pytest.main(['--collect-only', '-q', '-p', 'no:cacheprovider', *sys.argv[2:]]))
+"""
+
+
+def collect(root, hidden, *places):
+    """Return what pytest says when it collects tests where some packages are hidden."""
+    done = subprocess.run(
+        [sys.executable, '-c', PROGRAM, ' '.join(hidden), *places], cwd=root, check=False,
+        capture_output=True, text=True, timeout=200,
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_without_packages_that_have_no_key_all_other_tests_are_collected(root):
+    code, said = collect(root, WITHOUT_KEY, 'test')
+    assert code == 0, said[-2000:]
+    collected = int(re.search(r'(\d+)/\d+ tests collected', said)[1])
+    skipped = {*re.findall(r'SKIPPED \[1\] (\S+\.py):0: needs', said)}
+    assert len(skipped) > 50
+    assert collected > 4000
+
+
+def test_a_package_that_every_robot_has_is_missed_aloud(root):
+    code, said = collect(root, ['rosbags'], 'test/bag/test_split.py')
+    assert code != 0
+    assert "No module named 'rosbags'" in said
