@@ -72,6 +72,9 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
             'loops open by',
             f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose',
         )
+    if account['merged_by_m']:
+        apart = units.format_length(account['merged_by_m'], '.2g')
+        yield 'merged', f'places of the pose that are up to {apart} apart'
     if account['left_out']:
         yield 'left out, in no loop', ', '.join(account['left_out'])
     yield from _reach_facts(account, units)

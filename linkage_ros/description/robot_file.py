@@ -51,15 +51,17 @@ from linkage_ros.description.urdf_file import (
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
-    check_pose,
+    closure_in_pose,
     cross,
     direction_of,
     dot,
     Elimination,
+    extent_of,
     GROUND,
     GROUND_FRAME,
     length,
     minus,
+    ONE_PLACE,
     plus,
     Ratio,
     scale,
@@ -124,8 +126,7 @@ def read_robot_closure(
     given = read_parameters(content, ROBOT, {'slide': slides})
 
     def close(without: Sequence[str] = ()) -> SpaceClosure:
-        closure = SpaceClosure(robot.linkage(publish_inputs, without), name)
-        check_pose(closure)
+        closure = closure_in_pose(robot.linkage(publish_inputs, without), name)
         check_limits(closure)
         return closure
 
@@ -190,7 +191,8 @@ class _Robot:
         frames = self._place_links({})
         places = [frames[urdf.joints[name].child].origin for name in self._moving]
         places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
-        self._size = max(max(one) - min(one) for one in zip(*places, strict=True)) or 1.0
+        size = extent_of(places)
+        self._size = size if size > ONE_PLACE else 1.0
 
     def _find_groups(self) -> list[tuple[set[str], list[UrdfLoop]]]:
         """Return the joints that loops and ratios tie together, with the loops."""

@@ -21,7 +21,7 @@ from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
-    check_pose,
+    closure_in_pose,
     GROUND_FRAME,
     SpaceClosure,
     SpaceLinkage,
@@ -39,8 +39,7 @@ def read_space_closure(
 ) -> SpaceClosure:
     """Read a spatial linkage and check that its pose closes; errors as in `read_closure`."""
     try:
-        closure = SpaceClosure(_read_linkage(content, publish_inputs), name)
-        check_pose(closure)
+        closure = closure_in_pose(_read_linkage(content, publish_inputs), name)
         check_limits(closure)
     except DefinitionError as error:
         where = _own_key(content, error.where)

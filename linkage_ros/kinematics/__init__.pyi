@@ -152,10 +152,12 @@ from linkage_ros.kinematics.sides import (
     written_sides as written_sides,
 )
 from linkage_ros.kinematics.space.closure import (
-    check_pose as check_pose,
+    closure_in_pose as closure_in_pose,
     SpaceClosure as SpaceClosure,
 )
 from linkage_ros.kinematics.space.linkage import (
+    extent_of as extent_of,
+    ONE_PLACE as ONE_PLACE,
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
 )

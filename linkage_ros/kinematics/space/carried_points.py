@@ -30,8 +30,8 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
 )
 
-_SAME = 1e-9
-"""Points of one link nearer to each other than this are one."""
+_SAME = 0.5e-6
+"""Points of one link nearer to each other than this are one; no others are, after `merge_pose`."""
 
 
 class CarriedPoints:

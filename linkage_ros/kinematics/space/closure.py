@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from math import dist, remainder, sqrt, tau
@@ -24,6 +25,7 @@ from linkage_ros.kinematics.space.linkage import (
     SpaceLinkage,
     SpatialJoint,
 )
+from linkage_ros.kinematics.space.merged_pose import merge_pose
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import (
     cross,
@@ -79,6 +81,8 @@ class SpaceClosure(StepwiseClosure):
     def __init__(self, linkage: SpaceLinkage, name: str = '') -> None:
         if not isinstance(linkage, SpaceLinkage):
             raise TypeError(f'linkage: {quote(linkage)} is not a SpaceLinkage; load() reads files')
+        check_space_linkage(linkage)
+        linkage = merge_pose(linkage)
         check_space_linkage(linkage)
         self.turns_with = {}
         self._plan = plan = SpacePlan(linkage, _add_knot)
@@ -317,7 +321,31 @@ def _add_knot(plan: SpacePlan) -> bool:
     return add_knot(plan)
 
 
-def check_pose(closure: SpaceClosure) -> None:
+def closure_in_pose(linkage: SpaceLinkage, name: str = '') -> SpaceClosure:
+    """
+    Return the closure of a linkage that is closed in its pose, and meets redundant equations.
+
+    Which of these are solved follows from the order of the joints. Those that are chosen may have
+    a change point where all together have none: then the reverse order is tried.
+    """
+    closure = SpaceClosure(linkage, name)
+    try:
+        _check_closed(closure)
+    except _OverconstrainedError:
+        hinges = dict(reversed(linkage.hinges.items()))
+        turned = SpaceClosure(replace(linkage, hinges=hinges), name)
+        with suppress(_OverconstrainedError):
+            _check_closed(turned)
+            return turned
+        raise
+    return closure
+
+
+class _OverconstrainedError(DefinitionError):
+    """Redundant equations are missed."""
+
+
+def _check_closed(closure: SpaceClosure) -> None:
     """Refuse a linkage whose pose does not close, or whose redundant equations are not met."""
     pose = closure.linkage.pose.inputs
     position = closure.close_unlimited(*pose)
@@ -336,7 +364,7 @@ def check_pose(closure: SpaceClosure) -> None:
     if gap > _MET * size_of(closure.linkage):
         count, places = closure.freedom.redundant, ', '.join(f'{value:.4g}' for value in inputs)
         equations = f'{count} equation{"s" * (count != 1)}'
-        raise DefinitionError(
+        raise _OverconstrainedError(
             'points',
             f'the linkage is over-constrained: {equations} more than needed, missed by '
             f'{gap:.3g} m where the input is {places}',

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
+from linkage_ros.kinematics.space.merged_pose import MERGED
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.vectors import scale, Vector, ZERO
 import numpy as np
@@ -201,7 +202,7 @@ def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[
     for hinge in linkage.hinges.values():
         arm = place - np.array(hinge.at) / plan.scale
         axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
-        if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < _RANK:
+        if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < MERGED:
             return True
     return False
 

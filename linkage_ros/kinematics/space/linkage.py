@@ -15,10 +15,10 @@ two points is a rod. In the pose every joint has its ``value``, which is 0 unles
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import dist, isfinite
+from math import dist, frexp, isfinite, ldexp
 
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics.checks import check_all_limits
@@ -33,6 +33,9 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
 )
 from linkage_ros.kinematics.space.vectors import length, Vector, ZERO
+
+ONE_PLACE = 1e-6
+"""Extent of axes that meet in one place but for rounding, in [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,8 @@ class SpaceLinkage:
     open_by
         By how much the loops of that robot do not close in the pose, in [m]; None without a
         robot. What they miss, the pose is corrected by.
+    merged_by
+        The largest distance between places that a closure takes for one, in [m].
 
     """
 
@@ -104,6 +109,7 @@ class SpaceLinkage:
     traced: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     open_by: float | None = None
+    merged_by: float = 0.0
 
     @cached_property
     def pair_joints(self) -> dict[str, SpatialJoint]:
@@ -259,7 +265,21 @@ def _check_name(key: str, name: str, what: str, names: object) -> None:
 
 
 def size_of(linkage: SpaceLinkage) -> float:
-    """Return the size of a linkage: the greatest extent of its points and hinges, in [m]."""
+    """
+    Return the size of a linkage: the greatest extent of its points and hinges, in [m].
+
+    Hinges alone that meet within a micrometre meet in one place, which has no size: then it is 1.
+    """
     places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
-    extents = [max(one) - min(one) for one in zip(*places, strict=True)]
-    return max(extents, default=0.0) or 1.0
+    size = extent_of(places)
+    return size if size > (0.0 if linkage.points else ONE_PLACE) else 1.0
+
+
+def extent_of(places: Iterable[Vector]) -> float:
+    """Return the greatest extent of places along an axis of the ground."""
+    return max((max(one) - min(one) for one in zip(*places, strict=True)), default=0.0)
+
+
+def unit_of(linkage: SpaceLinkage) -> float:
+    """Return the power of two above the size of a linkage, in [m]."""
+    return ldexp(1.0, frexp(size_of(linkage))[1])

@@ -29,7 +29,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
-from math import atan2, dist, frexp, hypot, lcm, ldexp, tau
+from math import atan2, dist, hypot, lcm, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
@@ -37,7 +37,7 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.solved_links import count_turns
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
-from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint
+from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
 from linkage_ros.kinematics.space.steps import (
     AimedHinge,
     CarriedPoint,
@@ -106,7 +106,7 @@ class SpacePlan:
     def __init__(self, linkage: SpaceLinkage, add_knot: Callable[[SpacePlan], bool]) -> None:
         self.linkage = linkage
         self._add_knot = add_knot
-        self.scale = ldexp(1.0, frexp(size_of(linkage))[1])
+        self.scale = unit_of(linkage)
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
         self.groups: list[SpaceGroup] = []
@@ -300,9 +300,7 @@ class SpacePlan:
         at = self.linkage.pair_joints[name].at
         for point in filter(self.is_known, self.carried[ends[1]]):
             arm = minus(self.places[point], scale(1.0 / self.scale, at))
-            if not slides and length(cross(axis, arm)) < _SQUARE * length(arm):
-                continue
-            if not slides and not length(arm):
+            if not slides and length(cross(axis, arm)) < _SQUARE:
                 continue
             to = self.point_index(point)
             joint, frame = self.make_joint(name, *ends, self.places[point])
@@ -351,7 +349,10 @@ class SpacePlan:
         axis, way = self.axes[slide], minus(self.places[end], self.places[start])
         along = dot(way, axis)
         beside = length(drop_rounding(minus(way, scale(along, axis))))
-        return Rod(along - self.pose_value(slide), self.coordinates[slide], beside)
+        # On the axis it is a cylinder from pin to pin, whose length is not negative.
+        is_cylinder = beside < _SQUARE and along > 0.0
+        across = None if is_cylinder else beside
+        return Rod(along - self.pose_value(slide), self.coordinates[slide], across)
 
     def _close(self, name: str) -> bool:
         """Close a hinge or slide by a rod."""

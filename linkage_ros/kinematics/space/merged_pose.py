@@ -1,0 +1,77 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Places of a pose that nearly coincide, made one before anything is planned.
+
+CAD writes 7e-18 or 1e-9 for 0. Two axes that should meet then miss each other by that, and a
+direction from one place to the other would be noise. Nobody builds two joints that are a millionth
+of the size apart: nearer places are one, and so is what axes lead to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from math import dist
+
+from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage, SpatialJoint, unit_of
+from linkage_ros.kinematics.space.vectors import direction_of, minus, plus, scale, Vector
+
+MERGED = 1e-6
+"""Places nearer to each other than this, relative to the size, are one."""
+
+_ROUNDING = 2.0**-50
+"""Distance of places that are one but for rounding, relative to the size."""
+
+
+def merge_pose(linkage: SpaceLinkage) -> SpaceLinkage:
+    """
+    Return a linkage without places that nearly coincide; itself if it has none.
+
+    All places that are one take that of the first in the file: points and hinges. An axis is
+    turned to a place that it leads to, at the distance at which a link is held by it.
+    """
+    unit, places = unit_of(linkage), _Places(MERGED * size_of(linkage))
+    points = {name: places.merge(place) for name, place in linkage.points.items()}
+    hinges = {
+        name: replace(hinge, at=places.merge(hinge.at)) for name, hinge in linkage.hinges.items()
+    }
+    hinges = {name: _turn_axis(hinge, unit, places) for name, hinge in hinges.items()}
+    if not places.largest:
+        return linkage
+    merged_by = max(places.largest, linkage.merged_by)
+    return replace(linkage, points=points, hinges=hinges, merged_by=merged_by)
+
+
+def _turn_axis(hinge: SpatialJoint, unit: float, places: _Places) -> SpatialJoint:
+    end = plus(hinge.at, scale(unit, direction_of(hinge.axis)))
+    to = places.merge(end, _ROUNDING * unit)
+    return hinge if to is end else replace(hinge, axis=minus(to, hinge.at))
+
+
+class _Places:
+    """Places further than a bound from each other, found in cells of that size."""
+
+    def __init__(self, bound: float) -> None:
+        self._bound = bound
+        self._cells: dict[tuple[float, ...], list[Vector]] = {}
+        self.largest = 0.0
+        """The largest distance of two places that were merged."""
+
+    def merge(self, place: Vector, rounding: float = 0.0) -> Vector:
+        """Return the place that a new one is merged with, if not by rounding; or itself."""
+        cell = tuple(one // self._bound for one in place)
+        for near in product(*((one - 1.0, one, one + 1.0) for one in cell)):
+            for other in self._cells.get(near, ()):
+                if (apart := dist(place, other)) < self._bound:
+                    if apart <= rounding:
+                        return place
+                    self.largest = max(self.largest, apart)
+                    return other
+        self._cells.setdefault(cell, []).append(place)
+        return place
