@@ -361,6 +361,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         **_examine_states(closure, sweep),
         **_examine_joints(closure, sweep),
         'robot_open_by_m': linkage.open_by,
+        'robot_turned_by_rad': linkage.turned_by,
         'merged_by_m': linkage.merged_by,
         'left_out': list(linkage.left_out),
         'groups': [group._asdict() for group in closure.groups],

@@ -68,10 +68,10 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         met = 'equations, met within the worst residual'
         yield 'redundant', f'{account["redundant_equations"]} {met}'
     if account['robot_open_by_m'] is not None:
-        yield (
-            'loops open by',
-            f'{units.format_length(account["robot_open_by_m"], ".2g")} in the pose',
-        )
+        open_by = units.format_length(account['robot_open_by_m'], '.2g')
+        if turned_by := account['robot_turned_by_rad']:
+            open_by += f' and {units.convert(turned_by):.2g} {units.angle}'
+        yield 'loops open by', f'{open_by} in the pose'
     if account['merged_by_m']:
         apart = units.format_length(account['merged_by_m'], '.2g')
         yield 'merged', f'places of the pose that are up to {apart} apart'

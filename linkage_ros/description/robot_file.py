@@ -23,7 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
-from math import hypot, inf, remainder, tau
+from math import atan2, hypot, inf, remainder, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.description.grammar import ListOf, Named
@@ -75,7 +75,7 @@ from linkage_ros.kinematics import (
 )
 
 _MET = 1e-3
-"""Largest gap of a loop in the pose, relative to the size."""
+"""Largest gap of a loop in the pose, relative to the size; of its directions in [rad]."""
 
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
@@ -180,6 +180,7 @@ class _Robot:
         chosen = [group for group in groups if not self._driven or group[0] & {*self._driven}]
         self._loops = [loop for _, loops in chosen for loop in loops]
         self._closed = [loop for loop in self._loops if loop.kind != 'rod']
+        self._directed = [loop for loop in self._loops if _is_directed(loop)]
         looped = {name for loop in self._loops for name in self._names_of(loop)}
         self.needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
         """Joints that follow others in loops, which may move them as well."""
@@ -259,7 +260,8 @@ class _Robot:
                 remedy = did_you_mean(link, self._urdf.links, 'name a link, or LINK.x,y,z')
                 raise DefinitionError('close', f'there is no link {quote(link)}', remedy)
             x, y, z = map(float, place)
-            ends.append(LoopEnd(link, (x, y, z), axis=(0.0, 0.0, 1.0)))
+            directed = found is None and kind == 'fixed'
+            ends.append(LoopEnd(link, (x, y, z), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), directed))
         if len(ends) != 2:
             raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
         return UrdfLoop(pair, kind, (ends[0], ends[1]))
@@ -327,13 +329,35 @@ class _Robot:
             gaps.append(minus(gap, scale(along, axis)))
         return gaps
 
+    def _turns(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
+        """Return by how much the second frame of each directed loop is turned, in [rad]."""
+        turns = []
+        for loop in self._directed:
+            one, other = (_end_frame(end, frames) for end in loop.ends)
+            if loop.kind == 'hinge':
+                axes = [
+                    frame.turn(direction_of(end.axis))
+                    for frame, end in zip((one, other), loop.ends, strict=True)
+                ]
+                turns.append(_turn_of_axis(*axes))
+            else:
+                turns.append(_turn_of_frame(one, other))
+        return turns
+
+    def _left(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
+        """Return what is left of all equations; directions are lengths at the size."""
+        turns = (scale(self._size, turn) for turn in self._turns(frames))
+        return [*chain(*self._gaps(frames), *turns)]
+
     def _slopes(
         self, frames: Mapping[str, SpaceFrame], free: Sequence[str], ratios: Mapping[str, Ratio]
     ) -> list[list[float]]:
-        """Return for each free joint the rates of all gaps at a rate of 1."""
-        rates = {name: [ZERO] * len(self._closed) for name in free}
-        for number, loop in enumerate(self._closed):
+        """Return for each free joint the rates of what is left at a rate of 1."""
+        loops = [*self._closed, *self._directed]
+        rates = {name: [ZERO] * len(loops) for name in free}
+        for number, loop in enumerate(loops):
             ways = self._ways(*(end.link for end in loop.ends))
+            turns = number >= len(self._closed)
             for end, way, sign in zip(loop.ends, ways, (-1.0, 1.0), strict=True):
                 place = _end_frame(end, frames).origin
                 for joint in way:
@@ -341,10 +365,17 @@ class _Robot:
                     if of.of in rates and joint.kind in MOVING:
                         frame = frames[joint.child]
                         rate = frame.turn(direction_of(joint.axis))
-                        if joint.kind != 'prismatic':
+                        if turns:
+                            rate = scale(0.0 if joint.kind == 'prismatic' else self._size, rate)
+                        elif joint.kind != 'prismatic':
                             rate = cross(rate, minus(place, frame.origin))
                         before = rates[of.of][number]
                         rates[of.of][number] = plus(before, scale(sign * of.ratio, rate))
+            if turns and loop.kind == 'hinge':
+                first, _ = loop.ends
+                axis = _end_frame(first, frames).turn(direction_of(first.axis))
+                for row in rates.values():  # The turn about the hinge itself is free.
+                    row[number] = minus(row[number], scale(dot(row[number], axis), axis))
         return [[*chain(*row)] for row in rates.values()]
 
     def _meet(
@@ -353,7 +384,7 @@ class _Robot:
         """Return values at which the loops close, as far as free joints do it, and the gap."""
         for _ in range(_MOST_STEPS):
             frames = self._place_links(values)
-            left = [*chain(*self._gaps(frames))]
+            left = self._left(frames)
             if hypot(*left) <= _ROUNDED * self._size or not free:
                 break
             columns = self._slopes(frames, free, ratios)
@@ -393,14 +424,20 @@ class _Robot:
         free = [name for name in self._moving if name not in (*self._driven, *ratios)]
         told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
         values = self._move(told, {}, self._ratios)
-        gaps = map(length, self._gaps(self._place_links(values)))
-        names = [loop.name for loop in self._closed]
-        open_by, worst = max(zip(gaps, names, strict=True), default=(0.0, ''))
-        if open_by > _MET * self._size:
-            reason = (
-                f'the loop {worst} of {self._urdf.file} is open by {open_by:.3g} m in the pose'
-            )
-            raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
+        frames = self._place_links(values)
+        open_by, turned_by = (
+            max(zip(map(length, found), (loop.name for loop in loops), strict=True),
+                default=(0.0, ''))
+            for found, loops in ((self._gaps(frames), self._closed),
+                                 (self._turns(frames), self._directed))
+        )  # fmt: skip
+        for (apart, worst), unit, most in (
+            (open_by, 'm', _MET * self._size), (turned_by, 'rad', _MET),
+        ):  # fmt: skip
+            if apart > most:
+                file = self._urdf.file
+                reason = f'the loop {worst} of {file} is open by {apart:.3g} {unit} in the pose'
+                raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
         values, _ = self._meet(values, free, ratios)
         frames, joints = self._place_links(values), self._urdf.joints
         on = {self._urdf.root: GROUND}
@@ -434,7 +471,8 @@ class _Robot:
             published=(*(self._driven if publish_inputs else ()), *published),
             ratios={name: of for name, of in ratios.items() if name in found},
             left_out=(*left_out, *(f'mimic of {name}' for name in without)),
-            open_by=open_by,
+            open_by=open_by[0],
+            turned_by=turned_by[0],
         )
 
     def _add_loop(
@@ -467,6 +505,34 @@ class _Robot:
 
 def _product(one: Sequence[float], other: Sequence[float]) -> float:
     return sum(a * b for a, b in zip(one, other, strict=True))
+
+
+def _is_directed(loop: UrdfLoop) -> bool:
+    """Return whether what closes a loop says how the second frame lies in the first."""
+    one, other = loop.ends
+    if loop.kind == 'hinge':
+        return other.is_directed
+    return loop.kind in ('fixed', 'slide') and one.is_directed and other.is_directed
+
+
+def _turn_of_axis(one: Vector, other: Vector) -> Vector:
+    """Return the turn from one axis to another, in [rad]; of a hinge both ways are one."""
+    sine, cosine = cross(one, other), dot(one, other)
+    sine = sine if cosine >= 0.0 else scale(-1.0, sine)
+    size = length(sine)
+    return scale(atan2(size, abs(cosine)) / size, sine) if size else ZERO
+
+
+def _turn_of_frame(one: SpaceFrame, other: SpaceFrame) -> Vector:
+    """Return the turn from one frame to another, in [rad]."""
+    pairs = [*zip(one[:3], other[:3], strict=True)]
+    sine = scale(0.5, plus(plus(*(cross(*pair) for pair in pairs[:2])), cross(*pairs[2])))
+    angle = atan2(size := length(sine), 0.5 * (sum(dot(*pair) for pair in pairs) - 1.0))
+    if size > _ROUNDED:
+        return scale(angle / size, sine)
+    # A half turn: its axis is what both frames share.
+    shared = max((plus(*pair) for pair in pairs), key=length)
+    return scale(angle, direction_of(shared))
 
 
 def _end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:

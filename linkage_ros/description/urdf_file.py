@@ -21,7 +21,8 @@ URDF has no loops. These tags outside of it close some:
   where q of the successor is ``<ratio>`` times q of the predecessor; and the older
   ``<loop_constraint>``, a pin (M. Chignoli et al., arXiv:2411.19753; generalized_rbda)
 
-An axis is in the frame of the first end; as in URDF it is 1 0 0 if it is not written.
+An axis is in the frame of the first end, and in that of the second if that says none. As in URDF
+it is 1 0 0 if it is not written. An end without ``rpy`` and axis says a place, and no direction.
 """
 
 from __future__ import annotations
@@ -118,6 +119,7 @@ class LoopEnd(NamedTuple):
     xyz: Vector
     rpy: Vector = (0.0, 0.0, 0.0)
     axis: Vector = (1.0, 0.0, 0.0)  # Of any length except 0
+    is_directed: bool = True  # Whether it says how its frame lies, and not a place alone
 
 
 class UrdfLoop(NamedTuple):
@@ -266,17 +268,19 @@ class _Reader:
                 break
         else:
             raise self._file_error(where, 'has no two ends', 'write <parent> and <child>')
-        ends = []
+        ends: list[LoopEnd] = []
         for end, axes in zip(found, (('parent_axis', 'axis'), ('child_axis',)), strict=True):
             link = self._checked_link(end.get('link', ''), end.tag, where, links)
             own = (end.find('origin'), element.find(f'{end.tag}_origin'))
             origin = next((each for each in own if each is not None), end)
             axis = next((each for each in map(element.find, axes) if each is not None), None)
-            way = self._read_vector(axis, 'xyz', where, '1 0 0')
+            way = ends[0].axis if ends else (1.0, 0.0, 0.0)
+            way = way if axis is None else self._read_vector(axis, 'xyz', where, '1 0 0')
             if way == (0.0, 0.0, 0.0):
                 raise self._file_error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
             xyz, rpy = (self._read_vector(origin, key, where, '0 0 0') for key in ('xyz', 'rpy'))
-            ends.append(LoopEnd(link, xyz, rpy, way))
+            is_directed = axis is not None or 'rpy' in origin.attrib
+            ends.append(LoopEnd(link, xyz, rpy, way, is_directed))
         return ends[0], ends[1]
 
     def _read_couplings(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[Any]:

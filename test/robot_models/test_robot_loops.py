@@ -8,6 +8,7 @@
 
 """Robots whose URDF has loops: read in each dialect, solved, run, written, and refused."""
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 import re
@@ -17,8 +18,10 @@ from linkage_ros import load, load_scene
 from linkage_ros.cli.main import main
 from linkage_ros.description import linkage_content, parse_yaml
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics import SpaceClosure
 from linkage_ros.resources import spatial_linkage_names
 from linkage_ros.tools.models import model_of, urdf_model
+from linkage_ros.tools.models.space_urdf import space_urdf
 import numpy as np
 import pytest
 import yaml
@@ -353,6 +356,22 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
     assert count > 5
 
 
+@pytest.mark.parametrize('name', ['bennett', 'spherical_four_bar'])
+def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name):
+    """Its frame is welded as it lies where the joints have values that are not 0."""
+    linkage = load(name).linkage
+    values = {joint: RNG.uniform(-3.0, 3.0) for joint in linkage.hinges}
+    hinges = {k: replace(hinge, value=values[k]) for k, hinge in linkage.hinges.items()}
+    written = SpaceClosure(replace(linkage, hinges=hinges))
+    (tmp_path / 'robot.urdf').write_bytes(space_urdf(name, written.linkage))
+    robot = load(tmp_path / 'robot.urdf')
+    assert robot.linkage.turned_by < 1e-12
+    for inputs in near_pose(written, 0.3, 5):
+        joints = dict(zip(robot.joint_names, robot.position(*inputs).joints, strict=True))
+        found = [joints[joint] for joint in written.joint_names]
+        assert found == pytest.approx(written.position(*inputs).joints, abs=1e-12)
+
+
 def test_each_rod_ends_where_the_platform_carries_it(hexapod):
     """By yourdfpy, at the joints of the model as they come back, beside the file's own points."""
     yourdfpy = pytest.importorskip('yourdfpy')
@@ -430,3 +449,75 @@ def test_a_robot_that_a_linkage_file_cannot_be_is_said(tmp_path):
         linkage_content(Path('four_bar.yaml'), {'input': 'x'})
     scene = parse_yaml(SCENE.encode(), 'legs.yaml')
     assert scene.section('linkage').text('urdf') == 'robots/ankle.urdf'
+
+
+WELDED = """
+<robot name="welded"><link name="base"/><link name="crank"/><link name="rod"/><link name="rocker"/>
+<link name="end"/><joint name="q1" type="continuous"><parent link="base"/><child link="crank"/>
+<axis xyz="0 0 1"/></joint><joint name="q2" type="continuous"><parent link="crank"/>
+<child link="rod"/><origin xyz="0.1 0 0" rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>
+<joint name="q3" type="continuous"><parent link="base"/><child link="rocker"/>
+<origin xyz="0.35 0 0"/><axis xyz="0 0 1"/></joint><joint name="q4" type="continuous">
+<parent link="rocker"/><child link="end"/><origin xyz="-0.0023993155270964905 0.1693927420185106 0"
+rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>%s</robot>
+"""
+CLOSED_BY = '<loop_joint name="loop" type="{}"><link1 link="rod" xyz="0.3 0 0" rpy="0 0 0"/>'
+CLOSED_BY += '<link2 link="end" xyz="0 0 0" rpy="{} {} {}"/><axis xyz="0 0 1"/></loop_joint>'
+
+
+def angle_between(kind, rpy):
+    """Return how far frames that were parallel are apart, or their z axes, by matrices."""
+    turned = origin(ET.fromstring(f'<origin rpy="{" ".join(map(str, rpy))}"/>'))[:3, :3]
+    if kind == 'revolute':
+        return np.arccos(np.clip(abs(turned[2, 2]), 0, 1))
+    return np.arccos(np.clip((np.trace(turned) - 1) / 2, -1, 1))
+
+
+@pytest.mark.parametrize('kind', ['fixed', 'revolute', 'prismatic'])
+def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind):
+    for _ in range(12):
+        rpy = RNG.uniform(0.4, 3.0, 3) * RNG.choice([-1, 1], 3)
+        with pytest.raises(LinkageError, match=r'the loop loop of .* is open by') as caught:
+            read(tmp_path, WELDED % CLOSED_BY.format(kind, *rpy), input='q1')
+        told = float(re.search(r'open by (\S+) rad', str(caught.value))[1])
+        assert told == pytest.approx(angle_between(kind, rpy), abs=6e-3)
+
+
+@pytest.mark.parametrize('kind', ['fixed', 'revolute'])
+def test_frames_of_a_closing_that_differ_by_rounding_are_told(tmp_path, kind, capsys):
+    rpy = (3e-4, -2e-4, 0.0)
+    text = WELDED % CLOSED_BY.format(kind, *rpy)
+    if kind == 'revolute':
+        text = text.replace('"q4" type="continuous"', '"q4" type="fixed"')
+    closure = read(tmp_path, text, input='q1')
+    assert closure.linkage.turned_by == pytest.approx(angle_between(kind, rpy), rel=1e-6)
+    assert main(['check', str(tmp_path / 'robot.urdf'), '--input', 'q1', '--radians']) == 0
+    assert ' m and 0.00036 rad in the pose' in capsys.readouterr().out
+
+
+TIP = '<link name="tip"/><joint name="tip" type="fixed"><parent link="rod"/><child link="tip"/>'
+TIP += '<origin xyz="0.3 0 0" rpy="0 0 -0.5"/></joint>'
+
+
+@pytest.mark.parametrize('welded', [CLOSED_BY.format('fixed', 0, 0, 0.5), 'tip=end:fixed'])
+def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_path, welded):
+    text, close = WELDED % (welded if '<' in welded else TIP), [] if '<' in welded else [welded]
+    with pytest.raises(LinkageError, match=r'is open by 0\.5 rad in the pose; near it') as caught:
+        read(tmp_path, text, input='q1', close=close)
+    at = yaml.safe_load(str(caught.value).partition('at: ')[2])
+    assert at == {'q4': -0.5}
+    closure = read(tmp_path, text, input='q1', close=close, at=at)
+    assert closure.linkage.turned_by < 1e-15
+    # Rod and end are one link: by the angles from base to it, over crank and over rocker.
+    for crank in RNG.uniform(-3.0, 3.0, 5):
+        joints = closure.position(crank)
+        over_crank = crank + 0.6 + joints['q2']
+        away = over_crank - (joints['q3'] + 0.6 + joints['q4'] + 0.5)
+        assert np.remainder(away + np.pi, 2.0 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-12)
+
+
+def test_places_are_welded_as_they_stand(tmp_path):
+    close = ['rod.0.3,0,0=end.0,0,0:fixed']
+    closure = read(tmp_path, WELDED.replace('rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>%s', '/>'
+                   '<axis xyz="0 0 1"/></joint>%s') % '', input='q1', close=close)  # fmt: skip
+    assert closure.linkage.turned_by == 0.0

@@ -93,6 +93,8 @@ class SpaceLinkage:
     open_by
         By how much the loops of that robot do not close in the pose, in [m]; None without a
         robot. What they miss, the pose is corrected by.
+    turned_by
+        By how much the directions of frames that these loops join differ there, in [rad].
     merged_by
         The largest distance between places that a closure takes for one, in [m].
 
@@ -109,6 +111,7 @@ class SpaceLinkage:
     traced: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     open_by: float | None = None
+    turned_by: float = 0.0
     merged_by: float = 0.0
 
     @cached_property

@@ -18,7 +18,7 @@ A strut is a rod that slides in a tube, on two hinges at its first point, a ball
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
+from math import atan2, hypot, isfinite
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics import (
@@ -183,6 +183,18 @@ class _SpaceTree:
     def _add_loop(self, name: str, kind: str, links: tuple[str, str], place: Vector) -> None:
         """Write that two links meet at a place, which is given in the pose."""
         loop = ET.SubElement(self._robot, 'loop_joint', name=name, type=kind)
+        one = self._frames[links[0]]
         for tag, link in zip(('link1', 'link2'), links, strict=True):
-            xyz = format_numbers(*self._frames[link].locate(place))
-            ET.SubElement(loop, tag, link=link, xyz=xyz, rpy='0 0 0')
+            frame = self._frames[link]
+            rpy = format_numbers(*_roll_pitch_yaw(*map(frame.resolve, one[:3])))
+            xyz = format_numbers(*frame.locate(place))
+            ET.SubElement(loop, tag, link=link, xyz=xyz, rpy=rpy)
+
+
+def _roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:
+    """Return the angles about fixed axes that turn the ground's axes to these."""
+    cosine = hypot(x[0], x[1])
+    pitch = atan2(-x[2], cosine)
+    if cosine < _FLAT:  # Roll and yaw turn about one axis.
+        return atan2(-z[1], y[1]), pitch, 0.0
+    return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])
