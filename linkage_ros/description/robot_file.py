@@ -80,6 +80,9 @@ _MET = 1e-3
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
 
+_ROUNDED_VALUE = 1e-12
+"""Rounding of a joint that loops move, in [rad] or relative to the size."""
+
 _DAMPING, _MOST_STEPS = 1e-10, 12
 """Of Newton's method: damping relative to the size, and most steps."""
 
@@ -438,6 +441,7 @@ class _Robot:
                 file = self._urdf.file
                 reason = f'the loop {worst} of {file} is open by {apart:.3g} {unit} in the pose'
                 raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
+        as_told = values
         values, _ = self._meet(values, free, ratios)
         frames, joints = self._place_links(values), self._urdf.joints
         on = {self._urdf.root: GROUND}
@@ -455,9 +459,15 @@ class _Robot:
             turns, limits = joint.kind != 'prismatic', joint.limits
             if turns and limits.high - limits.low >= tau:  # It does not limit an angle.
                 limits = replace(limits, low=-inf, high=inf)
+            value, told_value = values[name], as_told[name]
+            if value != told_value and limits.low <= told_value <= limits.high:
+                # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
+                room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._size
+                low, high = min(limits.low, value - room), max(limits.high, value + room)
+                limits = replace(limits, low=low, high=high)
             axis, ends = frame.turn(direction_of(joint.axis)), (on[joint.parent], on[joint.child])
             if ends[0] != ends[1]:  # It is not held by a fixed loop.
-                joined = SpatialJoint(*ends, axis, frame.origin, values[name], limits)
+                joined = SpatialJoint(*ends, axis, frame.origin, value, limits)
                 (made.hinges if turns else made.slides)[name] = joined
         found = [*made.hinges, *made.slides]
         for loop in self._loops:
