@@ -73,9 +73,9 @@ class NameOrNames(ListOf):
     """A name, or a list of names."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
-        if isinstance(content.mapping[key], str):
-            return (content.text(key),)
-        return tuple(content.texts(key))
+        if isinstance(content.mapping.get(key), list):
+            return tuple(content.texts(key))
+        return (content.text(key),)
 
     def json_schema(self) -> Schema:
         several = {**ListOf.json_schema(self), 'minItems': 1}
