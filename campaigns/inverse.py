@@ -10,25 +10,36 @@
 ``python -m campaigns.inverse``: cranks of a joint's value, their errors and their number.
 
 On every branch of every joint of the shipped linkages of one input, at random values and at 1e-14
-of its ends, the error of a crank is compared with what roundings allow. On random four-bars, the
-number of cranks of a value is compared with the number of passes that a scan of the range finds.
+of its ends, the error of a crank is compared with what roundings allow. On random four-bars, and
+on random linkages whose slides pass through infinity, the number of cranks of a value is compared
+with the number of passes that a scan of the range finds, and each crank has to give the value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import datetime
-from math import pi, tau
+from math import pi, remainder, tau
 import random
 import sys
 from typing import Any
 
 from bench import ROOT
 from bench.report import Table
+from campaigns.accuracy.random_families import DYADS
 from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
+from campaigns.topologies.topology import TopologyBuilder
 from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, CrankBranch, Input, is_iterated, Linkage, RevoluteJoint
+from linkage_ros.kinematics import (
+    Closure,
+    CrankBranch,
+    GROUND,
+    Input,
+    is_iterated,
+    Linkage,
+    RevoluteJoint,
+)
 from linkage_ros.resources import linkage_names, named_file
 import numpy as np
 
@@ -118,6 +129,51 @@ def random_four_bars(count: int, rng: random.Random) -> Iterator[Closure]:
             yield closure
 
 
+def random_slides(count: int, rng: random.Random) -> Iterator[Closure]:
+    """
+    Yield linkages in which a block slides on a line of the ground and on one of the input's link.
+
+    Where these lines are parallel, it passes through infinity, and so does what hangs on it.
+    """
+    while count:
+        build = TopologyBuilder(rng)
+        driven = build.sliding(GROUND) if rng.random() < 0.2 else build.turning(GROUND)
+        known = [GROUND, driven, *build.dyad('PRP', driven, GROUND)]
+        for _ in range(rng.randrange(3)):
+            one, other = rng.sample(known, 2)
+            known += build.dyad(rng.choice(DYADS), one, other)
+        closure = Closure(build.topology().linkage)
+        if closure.input_ranges:
+            count -= 1
+            yield closure
+
+
+def moving_joints(closure: Closure) -> list[str]:
+    """Return the dependent joints that move over the first range of the input."""
+    found = closure.solve(np.linspace(*closure.input_ranges[0][:2], 50), derivatives=0).positions
+    return [
+        joint
+        for joint, values in zip(closure.joint_names, found, strict=True)
+        if joint not in closure.input_names and np.nanmax(values) - np.nanmin(values) > 1e-6
+    ]
+
+
+def is_wrong(closure: Closure, joint: str, value: float, crank: float) -> bool:
+    """Return whether a joint does not have a value at a crank, within what roundings allow."""
+    position = closure.position(crank)
+    row = closure.joint_names.index(joint)
+    if not position.status.has_rates:
+        return False  # Its errors there have no bound, and its rate is infinite.
+    off = position.joints[row] - value
+    slope = closure.velocity(position, 1.0).joints[row]
+    if closure.turning[row]:
+        off = remainder(off, tau)
+    # A crank beside a place where the joint turns back is no better than the root of a rounding.
+    size = tau if closure.turning[row] else closure.scale
+    bound = 1e3 * U * (abs(slope) * (abs(crank) + 1.0) + abs(value) + size)
+    return not abs(off) <= bound
+
+
 def passes_of(closure: Closure, joint: str, value: float, count: int = _SCAN) -> int:
     """Return how often a joint passes a value while the crank goes through its ranges."""
     passed = 0
@@ -139,7 +195,9 @@ def main() -> int:
     begin = datetime.now().astimezone()
     parser = parser_of('inverse', __doc__, page=PAGE, jobs=1)
     parser.add_argument('--states', type=int, default=6000, help='random values on each branch')
-    parser.add_argument('--four-bars', type=int, default=10_000, help='random four-bars to scan')
+    parser.add_argument(
+        '--linkages', type=int, default=10_000, help='random linkages of each family to scan'
+    )
     arguments = parser.parse_args()
     rng = random.Random(arguments.seed)
     table = Table('Errors', ('joint', 'branches', 'values', 'error', 'off'))
@@ -153,33 +211,36 @@ def main() -> int:
             cells = str(len(branches)), f'{count:,}', f'{error:.2f}', f'{off:.1e}'
             table.rows.append((f'{name} {joint}', *cells))
     table.rows.append(('all', '', f'{values:,}', f'{greatest:.2f}', ''))
-    missed, more = _compare(arguments.four_bars, rng)
-    scans = Table('Cranks of a value, on random four-bars', ('', ''))
-    scans.rows.extend(
-        [
-            ('four-bars', f'{arguments.four_bars:,}'),
-            ('with fewer cranks than a scan passes', str(missed)),
-            ('with more, since the scan is coarser', str(more)),
-        ]
+    scans = Table(
+        'Cranks of a value, on random linkages',
+        ('', 'linkages', 'fewer than a scan passes', 'more, since the scan is coarser', 'wrong'),
     )
+    faults = 0
+    for kind, family in (('four-bars', random_four_bars), ('with poles of slides', random_slides)):
+        missed, more, wrong = _compare(family(arguments.linkages, rng), arguments.linkages, rng)
+        scans.rows.append((kind, f'{arguments.linkages:,}', str(missed), str(more), str(wrong)))
+        faults += missed + wrong
     machine: Any = machine_of(begin, arguments, 'values', values)
     publish([table, scans, machine], PAGE if arguments.write else None)
-    return int(greatest > 8.0 or missed > 0)
+    return int(greatest > 8.0 or faults > 0)
 
 
-def _compare(count: int, rng: random.Random) -> tuple[int, int]:
-    """Return on how many four-bars cranks are missed, and on how many the scan misses some."""
-    missed = more = 0
-    advance = progress_lines(count, 'four-bars')
-    for closure in random_four_bars(count, rng):
-        joint = rng.choice(closure.joint_names)
+def _compare(closures: Iterable[Closure], count: int, rng: random.Random) -> tuple[int, int, int]:
+    """Return on how many linkages cranks are missed, the scan misses some, and one is wrong."""
+    missed = more = wrong = 0
+    advance = progress_lines(count, 'linkages')
+    for closure in closures:
+        joint = rng.choice(moving_joints(closure))
         low, high = closure.input_ranges[0][:2]
-        value = closure.position(rng.uniform(low, high))[joint]
-        found, passed = len(closure.cranks(joint, value)), passes_of(closure, joint, value)
-        missed += found < passed
-        more += found > passed
+        position = closure.position(rng.uniform(low, high))
+        if position.joints:
+            value = position[joint]
+            cranks, passed = closure.cranks(joint, value), passes_of(closure, joint, value)
+            missed += len(cranks) < passed
+            more += len(cranks) > passed
+            wrong += any(is_wrong(closure, joint, value, crank) for _, crank in cranks)
         advance(1)
-    return missed, more
+    return missed, more, wrong
 
 
 if __name__ == '__main__':

@@ -17,15 +17,18 @@ does not; likewise at b::
     both     s = 2/π·atan2(√(y − a), √(b − y))         a only   s = √((y − a)/(b − a))
     b only   s = 1 − √((b − y)/(b − a))                neither  s = (y − a)/(b − a)
 
-The crank is a smooth function of s, also at the ends. A table of it starts Newton's method on the
+The crank is a smooth function of s, also at the ends. A slide may pass through infinity, where the
+lines that it lies between are parallel: its branches end before such a pole. On branches that go
+far, angles u = atan(y/c) take the place of y, a and b above, with the size c of the linkage: they
+are smooth up to the pole. A table of the crank starts Newton's method on the
 compiled closed form; two steps are usual. So a crank depends on y and the branch, on nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import ceil, floor, inf, isfinite, nan, pi, remainder, sin, tau
+from math import ceil, floor, inf, isnan, nan, pi, remainder, sin, tan, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names
@@ -41,8 +44,8 @@ from linkage_ros.kinematics.arithmetic import (
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import golden_section, last_inside, sample_inputs
-from linkage_ros.kinematics.results import InputRange, LoopClosure, PlanarClosure
+from linkage_ros.kinematics.monotonic_pieces import FARTHEST, monotonic_pieces
+from linkage_ros.kinematics.results import LoopClosure, PlanarClosure
 from linkage_ros.kinematics.start_table import StartTable
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
@@ -50,7 +53,6 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
 
-_SAMPLES, _MOST_SAMPLES = 720, 20_000
 _STEPS, _LAST = 6, 1e-9
 """Most Newton steps, and the greatest last one, of a branch's width: the next is its square."""
 
@@ -58,17 +60,14 @@ _BISECTIONS = 120
 _SAME = 1e-9
 """A joint that moves less than this does not move, in [rad] or of the linkage's size."""
 
-_FLAT = 1e-13
-"""A joint that turns back and again within this only slows down, likewise."""
-
-_BESIDE = 1e-2
-"""Greatest distance of cranks between which an output slows down, in [rad] or [m]."""
-
-_DEEPER = 10.0
-"""Depth that a valley may have below its sample, relative to the height of those beside it."""
+_FOUND = 1e-6
+"""Farthest that an output is from its wanted value at a crank that is found, likewise."""
 
 _FLAT_SLOPE = 1e-9
 """The slope of an output that stands, of its mean slope on the branch."""
+
+_LONG = 16.0
+"""A slide that is longer, in sizes of the linkage, goes far: its table is one of angles."""
 
 _BESIDE_TOGGLE = 1e-12
 """Distance from a toggle, of a branch's width, within which the crank is extrapolated."""
@@ -158,13 +157,27 @@ class CrankBranch:
         self.least, self.most = sorted((self.first, self.last))
         width = self.most - self.least
         self._greatest_last = _LAST * width
-        rounding = UNIT_ROUNDOFF * (max(map(abs, (self.low, self.high))) + evaluate.size)
+        longest = max(map(abs, (self.low, self.high)))
+        goes_far = not self.turning and longest > _LONG * evaluate.size
+        # The size c in u = atan(y/c), of a branch that goes far; else 0.
+        self._far = evaluate.size if goes_far else 0.0
+        self._height = self._rise_between(self.low, self.high)
+        self.endless = tuple(
+            goes_far and abs(end) > 0.5 * FARTHEST * evaluate.size for end in (self.low, self.high)
+        )
+        """For low and high whether the branch ends there next to a pole."""
+        if goes_far:
+            longest = min(map(abs, (self.low, self.high)))
+        rounding = UNIT_ROUNDOFF * (longest + evaluate.size)
         self.slack = 8.0 * rounding
         """A value beyond an end by no more is at the end."""
         # The turns of crank and output after which the poses repeat, in [rad]; else 0.
         self.period, self.rise = (period, self.high - self.low) if period else (0.0, 0.0)
         near = [
-            [abs(evaluate(end + share * (other - end))[1]) for share in (_NEAR, _NEARER)]
+            [
+                abs(self._slope_of_rise(*evaluate(end + share * (other - end))))
+                for share in (_NEAR, _NEARER)
+            ]
             for end, other in ((self.first, self.last), (self.last, self.first))
         ]
         # For both whether the output turns back there; else the range of the crank ends there.
@@ -174,7 +187,7 @@ class CrankBranch:
         low_back, high_back = self.turns_back
         self._lowest = self.low + rounding * low_back
         self._highest = self.high - rounding * high_back
-        self.flat = _FLAT_SLOPE * (self.high - self.low) / width
+        self.flat = _FLAT_SLOPE * self._height * (self._far or 1.0) / width
         """With a smaller slope the output stands, and the crank has no rate."""
         self._make_table(piece, near)
 
@@ -195,7 +208,7 @@ class CrankBranch:
                 moved = remainder(moved, tau) if self.turning else moved
                 self._steep_cells[i] = (at, beside, abs(moved))
         self.cranks, slopes = [self.first], [0.0]
-        way, height = (1.0 if self.last > self.first else -1.0), self.high - self.low
+        way, height = (1.0 if self.last > self.first else -1.0), self._height
         k = 0
         for i in range(1, cells):
             y, rise = self._output_at(i / cells)
@@ -205,7 +218,7 @@ class CrankBranch:
             start = below + (above - below) * ((y - less) / (more - less))
             crank, slope = self._refine_crank(y, below, above, start)
             self.cranks.append(crank)
-            slopes.append(rise / abs(slope) if slope else inf)
+            slopes.append(rise / abs(self._slope_of_rise(y, slope)) if slope else inf)
         self.cranks.append(self.last)
         slopes.append(0.0)
         both = all(self.turns_back)
@@ -228,7 +241,9 @@ class CrankBranch:
             (p, s, 3.0 * (q - p) - 2.0 * s - e, 2.0 * (p - q) + s + e)
             for (p, q), (s, e) in zip(pairwise(self.cranks), pairwise(tangents), strict=True)
         ]
-        self._known = self._evaluate.fast, self.turning, self._greatest_last, self.least, self.most
+        square = self._far * self._far
+        last = self._greatest_last
+        self._known = self._evaluate.fast, self.turning, square, last, self.least, self.most
         self._least_steps = self._count_steps()
 
     def _count_steps(self) -> int:
@@ -240,7 +255,10 @@ class CrankBranch:
                 crank = self._start_at(self._cubics[i], t)
                 for count in range(1, _STEPS):
                     value, slope = self._evaluate(crank)
-                    step = self._step_from(value, slope, y, i + t) if slope else nan
+                    try:
+                        step = self._step_from(value, slope, y, i + t) if slope else nan
+                    except UndecidedError:
+                        break
                     crank -= step
                     most = max(most, count)
                     if not abs(step) >= self._greatest_last:
@@ -254,6 +272,9 @@ class CrankBranch:
         Next to a toggle at y₀ it is that for the squares of y − y₀, which the crank goes as.
         """
         step = self._without_turns(value - y) / slope
+        if self._far:  # That for tan(u − u₀), with u of the value and u₀ of y
+            square = self._far * self._far
+            step = step * ((square + value * y) / (square + y * y))
         for i, ((_, end), _, moved) in self._steep_cells.items():
             inside = place > float(i) if i else place < 1.0
             way, found = self._without_turns(y - end), self._without_turns(value - end)
@@ -271,27 +292,43 @@ class CrankBranch:
         """Return a difference of outputs, without whole turns."""
         return nearest_remainder(difference, tau) if self.turning else difference
 
+    def _rise_between(self, low: Any, high: Any) -> Any:
+        """Return the rise from one output to another: that of their angles u on a long branch."""
+        far = self._far
+        return atan2(far * (high - low), far * far + low * high) if far else high - low
+
+    def _slope_of_rise(self, value: float, slope: float) -> float:
+        """Return the slope of such a rise at an output with a slope."""
+        far = self._far
+        return slope * (far / (far * far + value * value)) if far else slope
+
     def _output_at(self, s: float) -> tuple[float, float]:
-        """Return the output at s, and its derivative by s."""
-        height = self.high - self.low
+        """Return the output at s, and the derivative of the rise up to it by s."""
+        height, end = self._height, self.low
         if all(self.turns_back):
-            return self.low + height * sin(0.5 * pi * s) ** 2, 0.5 * pi * height * sin(pi * s)
-        if self.turns_back[0]:
-            return self.low + height * s * s, 2.0 * height * s
-        if self.turns_back[1]:
-            return self.high - height * (1.0 - s) ** 2, 2.0 * height * (1.0 - s)
-        return self.low + height * s, height
+            rise, slope = height * sin(0.5 * pi * s) ** 2, 0.5 * pi * height * sin(pi * s)
+        elif self.turns_back[0]:
+            rise, slope = height * s * s, 2.0 * height * s
+        elif self.turns_back[1]:
+            end = self.high
+            rise, slope = -height * (1.0 - s) ** 2, 2.0 * height * (1.0 - s)
+        else:
+            rise, slope = height * s, height
+        if not self._far:
+            return end + rise, slope
+        y = self._far * tan(atan2(end, self._far) + rise)
+        return min(max(y, self.low), self.high), slope
 
     def _table_parameter(self, y: float) -> float:
         """Return s of a value between the ends."""
-        low, high = y - self.low, self.high - y
         if self.turns_back[0]:
+            low = self._rise_between(self.low, y)
             if self.turns_back[1]:
-                return atan2(sqrt(low), sqrt(high)) * (2.0 / pi)
-            return sqrt(low / (self.high - self.low))
+                return atan2(sqrt(low), sqrt(self._rise_between(y, self.high))) * (2.0 / pi)
+            return sqrt(low / self._height)
         if self.turns_back[1]:
-            return 1.0 - sqrt(high / (self.high - self.low))
-        return low / (self.high - self.low)
+            return 1.0 - sqrt(self._rise_between(y, self.high) / self._height)
+        return self._rise_between(self.low, y) / self._height
 
     def distance_beyond(self, y: float) -> float:
         """Return how much a value is beyond the branch, in its unit; 0 if it is reached."""
@@ -313,7 +350,8 @@ class CrankBranch:
         """
         Return the crank at a value that is reached, and nearly the slope of the output there.
 
-        In [rad] or [m]; where the output turns back, the slope is 0, at a toggle infinite.
+        In [rad] or [m]; where the output turns back, the slope is 0, at a toggle infinite. Both
+        are NaN where the output jumps over the value.
         """
         turns = 0.0
         if not self.low <= y <= self.high:
@@ -331,7 +369,7 @@ class CrankBranch:
         t = place - i
         crank = self._start_at(self._cubics[i], t)
         if i not in self._steep_cells:
-            fast, turning, last, least, most = self._known
+            fast, turning, square, last, least, most = self._known
             for count in range(1, 1 + _STEPS):
                 found = fast(crank, 1.0)
                 if found is None:
@@ -343,6 +381,8 @@ class CrankBranch:
                 if not slope:
                     break
                 step = off / slope
+                if square:  # As in `_step_from`
+                    step *= (square + value * y) / (square + y * y)
                 crank -= step
                 if count >= self._least_steps and -last < step < last:
                     if least <= crank <= most:
@@ -354,6 +394,9 @@ class CrankBranch:
                 # So near the toggle the closed form has too few digits: the crank goes as y².
                 return end + (beside - end) * (way / moved) ** 2 + turns, inf
         crank, slope = self._refine_crank(y, self.cranks[i], self.cranks[i + 1], crank)
+        off = self._without_turns(self._rise_between(self._evaluate(crank)[0], y))
+        if not abs(off) <= _FOUND * (1.0 if self._far else self._evaluate.size):
+            return nan, nan
         return crank + turns, slope
 
     def trace_crank(
@@ -468,7 +511,7 @@ def crank_branches(
     branches: list[CrankBranch] = []
     for interval in ranges:
         period = interval.highest - interval.lowest if interval.is_whole else 0.0
-        for piece, turns_on in _monotonic_pieces(evaluate, interval):
+        for piece, turns_on in monotonic_pieces(evaluate, interval):
             if abs(piece[-1][1] - piece[0][1]) > _SAME * evaluate.size:
                 by = dict(zip(interval[:2], interval.by, strict=True))
                 ends = by.get(piece[0][0], ''), by.get(piece[-1][0], '')
@@ -477,119 +520,6 @@ def crank_branches(
     if ranges and not branches:
         raise DefinitionError(output.name, 'does not move with the input', 'name another joint')
     return branches
-
-
-def _monotonic_pieces(
-    evaluate: OutputFunction, interval: InputRange
-) -> Iterator[tuple[list[tuple[float, float]], bool]]:
-    """
-    Yield the pieces of a range on which the output moves one way, and whether it turns on.
-
-    Each is a list of cranks with the output, in order.
-    """
-
-    def does_close(crank: float) -> bool:
-        return isfinite(evaluate(crank)[0])
-
-    low, high = interval.lowest, interval.highest
-    count = _SAMPLES
-    if interval.turning:
-        count = min(_MOST_SAMPLES, _SAMPLES * max(1, ceil((high - low) / tau)))
-    cranks = sample_inputs(interval, count)
-    if interval.is_whole:
-        # Symmetric linkages turn back at round angles, where the slope has no sign.
-        cranks = [crank + (high - low) * 0.307 / count for crank in cranks]
-    sampled = [(crank, *evaluate(crank)) for crank in cranks]
-    turns = list(_turning_points(evaluate, sampled))
-    if interval.is_whole:
-        turns = sorted(low + (turn - low) % (high - low) for turn in turns)
-    turns = _real_turns(evaluate, turns, interval)
-    known = [(crank, value) for crank, value, _ in sampled if isfinite(value)]
-    begin, end = low, high
-    if interval.is_whole:
-        if turns:
-            begin, end = turns[0], turns[0] + (high - low)
-        known = sorted((begin + (crank - begin) % (high - low), value) for crank, value in known)
-    places = [begin, *(turn for turn in turns if begin < turn < end), end]
-    for first, last in pairwise(places):
-        inner = [(crank, value) for crank, value in known if first < crank < last]
-        if not inner:
-            middle = 0.5 * (first + last)
-            inner = [(middle, evaluate(middle)[0])]
-        # The end of a range is rounded, and may lie beyond the toggle.
-        ends = [
-            end if isfinite(evaluate(end)[0]) else last_inside(does_close, inside, end)
-            for inside, end in ((inner[0][0], first), (inner[-1][0], last))
-        ]
-        piece = [(end, evaluate(end)[0]) for end in ends]
-        piece[1:1] = inner
-        yield _unwrap_piece(piece) if evaluate.turning else piece, interval.is_whole and not turns
-
-
-def _turning_points(
-    evaluate: OutputFunction, sampled: Sequence[tuple[float, float, float]]
-) -> Iterator[float]:
-    """Yield the cranks at which the slope changes its sign, also twice between samples."""
-    known = [(crank, slope) for crank, _, slope in sampled if isfinite(slope) and slope]
-
-    def signed_slope(sign: float) -> Callable[[float], float]:
-        return lambda crank: evaluate(crank)[1] * sign
-
-    def keeps_sign(sign: float) -> Callable[[float], bool]:
-        return lambda crank: evaluate(crank)[1] * sign > 0.0
-
-    for i in range(1, len(known)):
-        (before, slope_before), (here, slope) = known[i - 1], known[i]
-        if slope_before * slope < 0.0:
-            yield last_inside(keeps_sign(slope_before), before, here)
-        elif i + 1 < len(known):
-            after, slope_after = known[i + 1]
-            sign = 1.0 if slope > 0.0 else -1.0
-            sides = sign * slope_before, sign * slope_after
-            # A valley that is shallow beside its height does not reach zero.
-            if min(sides) >= abs(slope) and _DEEPER * (sum(sides) - 2.0 * abs(slope)) > abs(slope):
-                least, at = golden_section(signed_slope(sign), before, after)
-                if least < 0.0:
-                    yield last_inside(keeps_sign(slope), before, at)
-                    yield last_inside(keeps_sign(slope), after, at)
-
-
-def _real_turns(
-    evaluate: OutputFunction, ends: Sequence[float], interval: InputRange
-) -> list[float]:
-    """Return the turning points without those where the output only slows down."""
-    slight = _FLAT * evaluate.size
-    kept: list[float] = []
-
-    def are_same(one: float, other: float) -> bool:
-        off = evaluate(one)[0] - evaluate(other)[0]
-        return abs(remainder(off, tau) if evaluate.turning else off) <= slight
-
-    for end in ends:
-        if kept and end - kept[-1] < _BESIDE and are_same(kept[-1], end):
-            kept.pop()
-        else:
-            kept.append(end)
-    if not interval.is_whole:
-        outer = (interval.lowest, interval.highest)
-        return [
-            end
-            for end in kept
-            if not any(abs(end - one) < _BESIDE and are_same(end, one) for one in outer)
-        ]
-    if len(kept) > 1 and interval.highest - kept[-1] + kept[0] - interval.lowest < _BESIDE:
-        return kept[1:-1] if are_same(kept[0], kept[-1]) else kept
-    return kept
-
-
-def _unwrap_piece(piece: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return a piece with unwrapped angles, its middle in (−π, π]."""
-    (first, value), *others = piece
-    found = [(first, value)]
-    for crank, angle in others:
-        found.append((crank, angle - tau * round((angle - found[-1][1]) / tau)))
-    turns = tau * round(0.5 * (found[0][1] + found[-1][1]) / tau)
-    return [(crank, angle - turns) for crank, angle in found]
 
 
 class Inverse(NamedTuple):
@@ -610,11 +540,8 @@ class Inverse(NamedTuple):
                 lowest, highest = branch.low - branch.slack, branch.high + branch.slack
                 turns = range(ceil((lowest - value) / tau), floor((highest - value) / tau) + 1)
                 values = [value + tau * k for k in turns]
-            found += [
-                (branch.number, branch.find_crank(y)[0])
-                for y in values
-                if not branch.distance_beyond(y)
-            ]
+            cranks = [branch.find_crank(y)[0] for y in values if not branch.distance_beyond(y)]
+            found += [(branch.number, crank) for crank in cranks if not isnan(crank)]
         return found
 
     def find_branch(self, number: int | None = None, near: float | None = None) -> CrankBranch:

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from math import inf, isfinite, tau
+from math import inf, isfinite, isnan, nan, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite, UndecidedError
@@ -152,12 +152,12 @@ class InverseClosure(Closure):
         (y,) = self._single_number('inputs', inputs)
         if hasattr(y, 'apply'):
             return self._trace_position(y)
-        if not isfinite(y):
-            return Position(Status.INDETERMINATE, 0.0, (), _given_state(y, [0.0], []), [], self)
         branch = self.branch
-        if beyond := branch.distance_beyond(y):
+        if isfinite(y) and (beyond := branch.distance_beyond(y)):
             return Position(Status.OPEN, beyond, (), _given_state(y, [0.0], []), [], self)
-        crank, slope = branch.find_crank(y)
+        crank, slope = branch.find_crank(y) if isfinite(y) else (nan, nan)
+        if isnan(crank):
+            return Position(Status.INDETERMINATE, 0.0, (), _given_state(y, [0.0], []), [], self)
         found = self.closed.position(crank)
         status = found.status
         if abs(slope) < branch.flat:
@@ -272,9 +272,9 @@ class InverseClosure(Closure):
         """Return the range of the joint on its branch."""
         one = self.branch
         turns = max(1, round(abs(one.rise) / tau))
-        return (
-            InputRange(one.low, one.high, self.inverse.output.turning, turns=turns, by=one.by),
-        )
+        limited = tuple(not endless for endless in one.endless)
+        ends = one.low, one.high
+        return (InputRange(*ends, self.inverse.output.turning, limited, turns, one.by),)
 
     @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:

@@ -135,9 +135,15 @@ def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
 def through_the_end(
     parts: list[tuple[float, float]], low: float, high: float, turn: float = tau
 ) -> list[tuple[float, float]]:
-    """Return the parts of whole turns; the parts at both ends are one through the end."""
-    if len(parts) < 2 or parts[0][0] != low or parts[-1][1] != high:
+    """
+    Return the parts of whole turns; the parts at both ends are one through the end.
+
+    There too a single place without a pose is no gap.
+    """
+    if not parts or parts[0][0] - low + high - parts[-1][1] > _POINT * (high - low):
         return parts
+    if len(parts) == 1:
+        return [(low, high)]
     (_, end), *others, (begin, _) = parts
     return [*others, (begin, end + turn)]
 

@@ -11,18 +11,35 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
-from math import pi, remainder, sqrt, tau
+from math import asin, atan2, pi, remainder, sqrt, tan, tau
 import os
 import pickle
 import random
 import subprocess
 import sys
 
-from campaigns.inverse import errors_of, passes_of, random_four_bars
+from campaigns.inverse import (
+    errors_of,
+    is_wrong,
+    moving_joints,
+    passes_of,
+    random_four_bars,
+    random_slides,
+)
 from flint import arb
 from linkage_ros import Closure, DefinitionError, Limits, linkage_names, load
-from linkage_ros.kinematics import CODES, CrankBranch, InputRange, Status
-from linkage_ros.kinematics.crank_branches import _monotonic_pieces
+from linkage_ros.kinematics import (
+    CODES,
+    CrankBranch,
+    Input,
+    InputRange,
+    Linkage,
+    SlideJoint,
+    Slider,
+    Status,
+)
+from linkage_ros.kinematics.monotonic_pieces import monotonic_pieces
+from linkage_ros.tools.models.source_code import LANGUAGES, Subject, write_source
 from linkage_ros.tools.study import prove, SingularError
 import numpy as np
 import pytest
@@ -33,6 +50,8 @@ from ..support.sampling import sample_count
 U = 2.0**-53
 STATES = int(os.environ.get('LINKAGE_STATES') or sample_count(100, 30))
 """States on each branch; 10⁶ in all take LINKAGE_STATES=6000."""
+
+FREE = Limits()
 
 LINKAGES = [
     name
@@ -146,6 +165,125 @@ def test_all_cranks_of_a_value_are_found():
         assert len(found) >= passes_of(closure, joint, value), (closure, joint, value)
         cases += 1
     assert cases >= STATES
+
+
+def test_all_cranks_of_a_value_are_found_about_poles_of_slides():
+    """A slide passes through infinity, and links that hang on it turn round there."""
+    rng = random.Random(9)
+    endless = 0
+    for closure in random_slides(STATES, rng):
+        low, high = closure.input_ranges[0][:2]
+        position = closure.position(rng.uniform(low, high))
+        moving = moving_joints(closure) if position.joints else []
+        for joint in (*rng.sample(moving, min(1, len(moving))), *moving[-1:]):
+            branches = closure.branches(joint)
+            endless += any(any(branch.endless) for branch in branches)
+            value = position[joint]
+            found = closure.cranks(joint, value)
+            assert len(found) >= passes_of(closure, joint, value), (closure.linkage, joint, value)
+            for _, crank in found:
+                assert not is_wrong(closure, joint, value, crank), (closure.linkage, joint, value)
+    assert endless > STATES // 4
+
+
+def tangent_mechanism(limits=FREE):
+    """Return a linkage whose shoe slides at height 1, by a pin in the slot of the crank."""
+    return Closure(
+        Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'G': (0.0, 1.0)},
+                'crank': {'O': (0.0, 0.0), 'X': (1.0, 0.0)},
+                'shoe': {'P': (0.0, 0.0), 'Q': (0.2, 0.0)},
+            },
+            inputs=(Input('crank_joint', 'ground', 'crank', limits=limits),),
+            assembly={},
+            joints={'shoe_slide': SlideJoint('rail'), 'slot_slide': SlideJoint('slot')},
+            sliders={
+                'rail': Slider('P', 'ground', 'G', (1.0, 0.0), 'shoe'),
+                'slot': Slider('P', 'crank', 'O', (1.0, 0.0)),
+            },
+        )
+    )
+
+
+@pytest.mark.parametrize('slide', [-1e6, -40.0, -0.5, 0.0, 1e-9, 3.0, 1e3, 1.9e6])
+def test_slide_through_infinity_has_a_branch_up_to_each_pole(slide):
+    """The slide is cot(crank): its poles are 0 and pi, and each value has two cranks a turn."""
+    closure = tangent_mechanism()
+    expected = atan2(1.0, slide)
+    cranks = [crank for _, crank in closure.cranks('shoe_slide', slide)]
+    assert len(cranks) == 2
+    for number, crank in enumerate(cranks, 1):
+        assert remainder(crank - expected, pi) == pytest.approx(0.0, abs=1e-15)
+        inverse = closure.driven_by('shoe_slide', branch=number)
+        position = inverse.position(slide)
+        assert position.status is Status.CLOSED
+        assert position.joints[0] == crank
+        velocity = inverse.velocity(position, 0.7)
+        # A crank of 6 is rounded by 4e-16, and so is its distance from the pole.
+        exact = {'rel': 1e-13 + 4e-15 * abs(slide)}
+        assert velocity.joints[0] == pytest.approx(-0.7 / (1.0 + slide * slide), **exact)
+        changed = inverse.acceleration(position, velocity, 0.0).joints[0]
+        bend = 2.0 * slide * 0.49 / (1.0 + slide * slide) ** 2
+        assert changed == pytest.approx(bend, **exact, abs=1e-15 / (1.0 + slide**4))
+
+
+@pytest.mark.parametrize('slide', [3e6, -1e19, 1e300, -1.7e308])
+def test_slide_too_near_a_pole_is_open(slide):
+    closure = tangent_mechanism()
+    assert closure.cranks('shoe_slide', slide) == []
+    inverse = closure.driven_by('shoe_slide', branch=1)
+    position = inverse.position(slide)
+    assert position.status is Status.OPEN
+    assert abs(slide) - position.gap == pytest.approx(2.0**21, rel=1e-3, abs=1e-6 * abs(slide))
+    assert inverse.input_ranges[0].toggles == ()
+
+
+def test_pole_is_no_end_of_the_range_of_the_crank():
+    (whole,) = tangent_mechanism().input_ranges
+    assert whole.is_whole
+    (limited,) = tangent_mechanism(Limits(-1.0, 2.0)).input_ranges
+    assert limited[:2] == (-1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ('limits', 'ends'),
+    [
+        (Limits(-1.0, 2.0), [(-1.0, 0.0), (0.0, 2.0)]),
+        (Limits(0.0, 2.0), [(0.0, 2.0)]),
+        (Limits(0.3, pi), [(0.3, pi)]),
+        (Limits(0.5, 7.0), [(0.5, pi), (pi, tau), (tau, 7.0)]),
+    ],
+)
+def test_limits_may_lie_on_both_sides_of_a_pole(limits, ends):
+    branches = tangent_mechanism(limits).branches('shoe_slide')
+    found = [(branch.least, branch.most) for branch in branches]
+    assert found == [pytest.approx(each, abs=1e-6) for each in ends]
+    assert not any(any(branch.turns_back) for branch in branches)
+
+
+def test_slide_that_returns_from_infinity_ends_there_too():
+    """The slot's slide is 1/sin(crank): it comes back on the side on which it went."""
+    closure = tangent_mechanism(Limits(0.5, 6.0))
+    found = [(one.least, one.most, one.turns_back) for one in closure.branches('slot_slide')]
+    places = [0.5, pi / 2.0, pi, 1.5 * pi, 6.0]
+    assert [each[:2] for each in found] == [
+        pytest.approx(each, abs=1e-6) for each in pairwise(places)
+    ]
+    cranks = sorted(crank for _, crank in closure.cranks('slot_slide', 1.25))
+    assert cranks == pytest.approx([asin(0.8), pi - asin(0.8)], abs=1e-15)
+
+
+def test_compiled_code_inverts_beside_a_pole():
+    inverse = tangent_mechanism().driven_by('shoe_slide', branch=1)
+    subject = Subject(inverse, 'm', 'x.yaml', 0, inverse.joint_names)
+    made: dict = {}
+    exec(write_source(subject, LANGUAGES['.py'](subject)), made)
+    rng = random.Random(4)
+    for _ in range(STATES):
+        slide = tan(rng.uniform(-1.57, 1.57))
+        status, joints = made['position']([slide])[:2]
+        assert (status, joints) == (0, inverse.position(slide).joints), slide
 
 
 def test_calls_in_any_order_give_the_same_bits():
@@ -381,7 +519,7 @@ class Cubic:
 
 def test_flat_place_within_a_branch_goes_on():
     output = Cubic()
-    ((piece, turns_on),) = _monotonic_pieces(output, InputRange(-1.1, 0.9))
+    ((piece, turns_on),) = monotonic_pieces(output, InputRange(-1.1, 0.9))
     assert not turns_on
     branch = CrankBranch(output, piece, 1)
     for y in (-1.0, -1e-3, -1e-9, 1e-6, 0.5):
@@ -391,6 +529,6 @@ def test_flat_place_within_a_branch_goes_on():
 
 @pytest.mark.parametrize('bend', [1e-2, 1e-3, -1e-3])
 def test_joint_that_turns_back_only_a_little_has_three_branches(bend):
-    pieces = list(_monotonic_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
+    pieces = list(monotonic_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
     ends = [piece[0][0] for piece, _ in pieces[1:]]
     assert ends == pytest.approx(sorted((0.0, -2.0 * bend / 3.0)), abs=1e-12)

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, nan
+from math import floor, isfinite, isnan, nan
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
@@ -77,4 +77,6 @@ class DependentSampleReader:
         if self._branch.distance_beyond(value):
             return Rejection.NO_CRANK
         crank, rate = crank_of(self._branch, value, rates[0] if rates else nan)
+        if isnan(crank):
+            return Rejection.NO_CRANK
         return CrankSample(stamp, (crank,), (rate,) if rates else None)
