@@ -165,7 +165,7 @@ class ReplayBag:
         if not isinstance(event, CounterfactualTick):
             offer(handles[_EVENT_KEYS[type(event)]], *event)
             return
-        log_time, time, _, tick = event
+        log_time, time, tick = event.log_time, event.time, event.tick
         if tick is None:
             return
         if tick.message:

@@ -15,14 +15,15 @@ metadata promise; 1: undecided, stopped, or the bag is damaged and the part befo
 the same.
 
 --scene runs another scene, --set the scene of the bag with other values; its joints are compared
-with the recorded ones. -o writes it to a new bag, which replays by itself. Then a difference
-is not a failure.
+with the recorded ones, tick by tick. The scene of the bag runs beside it: if it differs from
+its own run, as at another rate or where the bag lacks the start, the first line says by how
+much. -o writes a new bag, which replays by itself. Then a difference is not a failure.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +31,14 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag import Bag, read_run_metadata, recorded_events, RUN_FILE, RunMetadata
+from linkage_ros.bag import (
+    Bag,
+    missing_start_reason,
+    read_run_metadata,
+    recorded_events,
+    RUN_FILE,
+    RunMetadata,
+)
 from linkage_ros.cli.arguments import (
     add_bag,
     add_force,
@@ -78,7 +86,7 @@ from linkage_ros.replay import (
     versions_here,
 )
 from linkage_ros.signals import heed_signals
-from linkage_ros.tick import EXTRA
+from linkage_ros.tick import EXTRA, Tick
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
@@ -320,14 +328,16 @@ def _replayed_with(
     run, recorded = _own_account(bag)
     topic = find_crank_topic(bag, reading.read_silently(), scene, run, recorded, crank_topic)
     source = ReplaySource(bag, run, recorded, topic)
-    counterfactual = Counterfactual(scene, recorded)
+    own_samples = topic == run.crank_topic
+    counterfactual = Counterfactual(bag, scene, recorded, takes_own_samples=own_samples)
     names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
     kinds = {run.joint_states_topic: JOINT_STATE_TYPE}
     extras = {name: topic.type for topic, name in names.items() if topic.key == EXTRA}
     kinds |= extras
-    shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
-    comparison = Comparison([(name, kinds[name]) for name in shared])
+    outputs = [run.joint_states_topic, *run.extras]
+    shared = [name for name in outputs if name and name in kinds]
+    comparison, unchanged = (Comparison([(name, kinds[name]) for name in shared]) for _ in '12')
     own = own_joint_states(recorded) if recorded is not None else bool
     begin: list[int] = []
     published = 0
@@ -344,15 +354,22 @@ def _replayed_with(
                 if isinstance(event, CounterfactualTick):
                     if event.tick is not None and event.tick.message:
                         published += 1
-                    then, now = _side_by_side(event, run, extras, shared)
+                    recorded_now = dict(zip(outputs, event.recorded, strict=False))
+                    then = [recorded_now.get(name, b'') for name in shared]
+                    now = _messages(event.tick, [run.joint_states_topic, *extras], shared)
                     if any(then) or any(now):
                         begin = begin or [event.time]
-                        comparison.add_tick(TickPlace(comparison.ticks + 1, event.time), then, now)
+                        at = TickPlace(comparison.ticks + 1, event.time)
+                        comparison.add_tick(at, then, now)
+                        if any(then) and event.unchanged is not None:
+                            again = _messages(event.unchanged, outputs, shared)
+                            unchanged.add_tick(at, then, again)
     comparison.update_deviations()
     turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
     recorded_joints = recorded.joint_names if recorded is not None else ()
     return bag_account(bag, scene, reading, begin) | {
         'crank_topic': topic,
+        'unchanged': _unchanged_account(unchanged, bag, run, scene, recorded, turning),
         'joint_states': published,
         'topics': [attributes_json(each, _TOPIC) for each in comparison.topics],
         'joints': joints_account(comparison, turning),
@@ -363,6 +380,32 @@ def _replayed_with(
         'new_bag': str(output) if new_bag is not None else None,
         'written': new_bag.message_counts if new_bag is not None else {},
     }
+
+
+def _unchanged_account(
+    comparison: Comparison,
+    bag: Bag,
+    run: RunMetadata,
+    scene: Scene,
+    recorded: Scene | None,
+    turning: Mapping[str, bool],
+) -> dict[str, Any] | None:
+    """Return how the recorded scene differs from its own run, and why; None if it was not run."""
+    if recorded is None or not comparison.ticks:
+        return None
+    why = [missing] if (missing := missing_start_reason(bag, run)) else []
+    if scene.rate != recorded.rate:
+        why.insert(0, f'{_rate_text(scene)} instead of {_rate_text(recorded)}')
+    return {
+        'compared_ticks': comparison.ticks,
+        'different_ticks': comparison.differing,
+        'why': ', '.join(why) or None,
+        'greatest': greatest_differences(comparison, turning),
+    }
+
+
+def _rate_text(scene: Scene) -> str:
+    return f'{scene.rate:g} Hz' if scene.rate else 'a tick for each sample'
 
 
 def _own_account(bag: Bag) -> tuple[RunMetadata, Scene | None]:
@@ -394,16 +437,11 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
     )
 
 
-def _side_by_side(
-    event: CounterfactualTick, run: RunMetadata, extras: Iterable[str], shared: list[str]
-) -> tuple[list[bytes], list[bytes]]:
-    """Return the messages of a tick, recorded and new, on each topic that both runs have."""
-    then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
-    now: dict[str, bytes] = {}
-    if event.tick is not None:
-        now = dict(zip(extras, event.tick.extras, strict=False))
-        now[run.joint_states_topic] = event.tick.message
-    return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
+def _messages(tick: Tick | None, names: Sequence[str], shared: Sequence[str]) -> list[bytes]:
+    """Return the messages of a tick, whose topics have ``names``, on the shared topics."""
+    made = (tick.message, *tick.extras) if tick is not None else ()
+    by_name = dict(zip(names, made, strict=False))
+    return [by_name.get(name, b'') for name in shared]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -534,6 +572,9 @@ def _proof_parts(account: dict[str, Any]) -> Iterator[Table | str]:
 
 
 def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
+    unchanged = account['unchanged']
+    if unchanged and unchanged['different_ticks']:
+        yield escape_unprintable(_unchanged_text(account['bag'], unchanged))
     yield (
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
         f'from {escape_unprintable(account["crank_topic"])}'
@@ -549,6 +590,19 @@ def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
         yield ''
         counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
         yield f'{account["new_bag"]}: {counts}'
+
+
+def _unchanged_text(bag: str, unchanged: Mapping[str, Any]) -> str:
+    """Return the line that says how much of the difference is not of the other scene."""
+    apart = ', '.join(
+        f'{_number_text(row["difference"])} {row["unit"]}' for row in unchanged['greatest']
+    )
+    return (
+        f'{bag}: the unchanged scene itself differs in {unchanged["different_ticks"]} of '
+        f'{unchanged["compared_ticks"]} ticks'
+        + (f', by up to {apart}' if apart else '')
+        + (f' ({unchanged["why"]})' if unchanged['why'] else '')
+    )
 
 
 def _find_shortcomings(account: dict[str, Any]) -> Iterator[str]:

@@ -9,10 +9,14 @@
 """
 Run another scene on the crank samples of a bag, or on the commands that it holds.
 
-If both scenes have the same rate, the ticks come from the bag. Where the bag has none, because
-the linkage was open or had no crank state, ticks are one period apart. At another rate ticks are
+If both scenes have the same rate, the ticks are those of the run. Where the bag has none, the
+recorded scene tells why: if the linkage was open or had no crank state, ticks are one period
+apart; else the run lost them, and the other scene makes none either. At another rate ticks are
 one period apart from the first one on, and each moves to a tick of the bag that is within half a
 period, so that both can be compared. A scene with a rate of 0 ticks for every good sample.
+
+The recorded scene runs beside the other one, at the same ticks. So it is known how much of the
+difference comes from the ticks, or from what the bag lacks, and not from the other scene.
 
 A fault that is the same in both scenes begins and ends as in the run; others follow the other
 scene. The events that are yielded are those that a recorder would have been given, so that a
@@ -47,7 +51,7 @@ from linkage_ros.messages import (
     text_message,
     TIME_END,
 )
-from linkage_ros.replay.replay import change_text, read_change
+from linkage_ros.replay.replay import change_text, read_change, Rerun
 from linkage_ros.tick import list_run_topics, Pipeline, Tick
 
 if TYPE_CHECKING:
@@ -72,9 +76,9 @@ class CounterfactualTick(NamedTuple):
     time: int
     recorded: tuple[bytes, ...]  # Recorded messages of the tick; empty if the bag has none
     tick: Tick | None  # Result of the scene; None if it does not tick then
+    unchanged: Tick | None = None  # Result of the recorded scene; None if it cannot be run
 
 
-HeardEvent: TypeAlias = SampleEvent | FaultEvent | ResetEvent | TickEvent
 ReplayEvent: TypeAlias = SampleEvent | FaultEvent | ResetEvent | CounterfactualTick
 
 
@@ -102,11 +106,19 @@ class Counterfactual:
     """
     A scene, with all drives on one topic, that runs on the samples of a bag.
 
-    ``recorded`` is the recorded scene; None if unknown.
+    ``recorded`` is the recorded scene; None if unknown. ``takes_own_samples`` says whether the
+    samples are those that it took.
     """
 
-    def __init__(self, scene: Scene, recorded: Scene | None) -> None:
+    def __init__(
+        self, bag: Bag, scene: Scene, recorded: Scene | None, *, takes_own_samples: bool
+    ) -> None:
         self._scene = scene
+        self._unchanged: Rerun | None = None
+        if recorded is not None and not recorded.not_imported:
+            drives = [scene_linkage.drive[0] for scene_linkage in recorded.linkages]
+            if takes_own_samples or not set(drives) & set(_TOPICS):
+                self._unchanged = Rerun(bag, recorded)
         self._shared_faults: set[str] = set()
         # Under torque the linkage moves without commands, too.
         self._moves_without_samples = scene.linkages[0].drive[0] == 'torque'
@@ -147,15 +159,22 @@ class Counterfactual:
 
     def run(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         """Yield the events of the run, in order: samples, faults, resets and ticks."""
-        heard = (event for event in events if not isinstance(event, WrenchEvent))
-        return self._on_clock(heard) if self._period else self._on_samples(heard)
+        return self._on_clock(events) if self._period else self._on_samples(events)
+
+    def _let_unchanged_take(self, event: Event) -> None:
+        """Let the recorded scene take an event; one that it refuses ends its run."""
+        if self._unchanged is not None:
+            try:
+                self._unchanged.take(event)
+            except BagError:
+                self._unchanged = None
 
     def must_record(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one that a replay has to know of."""
         published = tick.message or tick.extras
         return self.suppresses_ticks and not published and self._pipeline.changes_state(tick)
 
-    def _on_samples(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
+    def _on_samples(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
         made: CounterfactualTick | None = None  # its recorded messages may follow
         for event in events:
             if isinstance(event, TickEvent):
@@ -168,47 +187,68 @@ class Counterfactual:
             if made is not None:
                 yield made
                 made = None
-            if isinstance(event, FaultEvent):
-                yield from self._follow_fault(event)
-            elif isinstance(event, ResetEvent):
-                yield self._reset_pipeline(event)
-            elif (yield from self._offer_sample(event)):
+            if (yield from self._follow(event)):
                 now = self._faulty_time(event.log_time)
                 made = self._run_tick(now, self._pipeline.newest_stamp, ())
         if made is not None:
             yield made
 
-    def _on_clock(self, events: Iterable[HeardEvent]) -> Iterator[ReplayEvent]:
-        taken: int | None = None  # time of a tick that took samples and perhaps published nothing
+    def _on_clock(self, events: Iterable[Event]) -> Iterator[ReplayEvent]:
+        taken: tuple[int, int] | None = None  # times of the first and the last sample of a tick
         for event in events:
             at = event.log_time
-            if taken is not None and taken != at:
-                yield from self._tick_when_due(taken, taken, ())
+            if taken is not None and self._is_of_later_tick(event, *taken):
+                yield from self._tick_silently(taken[1])
                 taken = None
             if at < self._last_event_time:
                 yield from self._catch_up(self._last_event_time + 1)
                 self._due = None
             if isinstance(event, TickEvent):
+                self._let_unchanged_take(event)
                 yield from self._tick_when_due(at, event.time, event.messages)
                 taken = None
                 self._last_event_time = at
                 continue
             yield from self._catch_up(at)
             self._last_event_time = at
-            if isinstance(event, FaultEvent):
-                yield from self._follow_fault(event)
-                continue
-            if isinstance(event, ResetEvent):
-                yield self._reset_pipeline(event)
-                continue
-            yield from self._offer_sample(event)
-            if self._recorded_has_rate:
-                taken = at
-            elif self._due is None:
-                self._due = at
+            yield from self._follow(event)
+            if isinstance(event, SampleEvent):
+                if self._recorded_has_rate:
+                    taken = (taken[0] if taken else at), at
+                elif self._due is None:
+                    self._due = at
         if taken is not None:
-            yield from self._tick_when_due(taken, taken, ())
+            yield from self._tick_silently(taken[1])
         yield from self._catch_up(self._last_event_time + 1)
+
+    def _follow(self, event: Event) -> Generator[ReplayEvent, None, bool]:
+        """Let both scenes take an event; return whether it is a good sample."""
+        self._let_unchanged_take(event)
+        if isinstance(event, SampleEvent):
+            return (yield from self._offer_sample(event))
+        if isinstance(event, FaultEvent):
+            yield from self._follow_fault(event)
+        elif isinstance(event, ResetEvent):
+            yield self._reset_pipeline(event)
+        return False
+
+    def _is_of_later_tick(self, event: Event, first: int, last: int) -> bool:
+        """Return whether an event belongs to a later tick than the samples of a time span."""
+        if isinstance(event, TickEvent):
+            # A tick takes samples after the time that it solves for.
+            return event.time > last
+        if isinstance(event, SampleEvent | WrenchEvent):
+            return not first <= event.log_time <= first + self._period // 2
+        return True
+
+    def _tick_silently(self, at: int) -> Iterator[FaultEvent | CounterfactualTick]:
+        """Tick where the run took samples and the bag has no message, unless that is elsewhere."""
+        if not (self._same_rate and self._would_be_recorded(at)):
+            yield from self._tick_when_due(at, at, ())
+
+    def _would_be_recorded(self, at: int) -> bool:
+        """Return whether the bag would hold a tick at a time, in [ns], if the run had made it."""
+        return self._unchanged is None or not self._unchanged.pipeline.is_idle(at)
 
     def _tick_when_due(
         self, log_time: int, at: int, recorded: tuple[bytes, ...]
@@ -239,6 +279,9 @@ class Counterfactual:
             if not ticks:
                 self._due = due + -(-(to - self._slack - due) // self._period) * self._period
                 return
+            if self._same_rate and self._would_be_recorded(due):
+                self._due = due + self._period  # the run lost this tick
+                continue
             now = max(due, self._last_event_time)
             yield from self._change_faults(now)
             now = self._faulty_time(now)
@@ -260,7 +303,15 @@ class Counterfactual:
         tick = self._pipeline.tick(at)
         if tick.message or tick.extras or self.must_record(tick):
             self._last_written = now
-        return CounterfactualTick(now, at, recorded, tick)
+        return CounterfactualTick(now, at, recorded, tick, self._tick_unchanged(at))
+
+    def _tick_unchanged(self, at: int) -> Tick | None:
+        """Return the tick of the recorded scene at a time, in [ns]; None if it cannot be run."""
+        try:
+            return self._unchanged.tick(at) if self._unchanged is not None else None
+        except LinkageError:
+            self._unchanged = None
+            return None
 
     def _offer_sample(self, event: SampleEvent) -> Generator[SampleEvent | FaultEvent, None, bool]:
         """Offer a sample; return whether it was good."""

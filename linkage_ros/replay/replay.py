@@ -28,6 +28,8 @@ from linkage_ros import __version__
 from linkage_ros.bag import (
     Bag,
     BagMessage,
+    Event,
+    FaultEvent,
     read_run_metadata,
     recorded_events,
     ResetEvent,
@@ -174,16 +176,10 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
         Messages of the bag.
 
     """
-    pipeline = Pipeline(scene)
-    closures, injection = pipeline.closures, pipeline.injection
-    last = 0
+    rerun = Rerun(bag, scene)
     for event in recorded_events(read_run_metadata(bag), own_joint_states(scene), messages):
-        if event.log_time < last:
-            pipeline = Pipeline(scene, closures, injection)
-        last = event.log_time
-        if isinstance(event, ResetEvent):
-            pipeline = Pipeline(scene, closures, injection)
-        elif isinstance(event, TickEvent):
+        rerun.take(event)
+        if isinstance(event, TickEvent):
             if event.time >= TIME_END:
                 raise BagError(
                     bag.path,
@@ -191,16 +187,37 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
                     'name another bag',
                 )
             joint_states, *extras = event.messages
-            tick = pipeline.tick(event.time)
+            tick = rerun.tick(event.time)
             yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
-        elif isinstance(event, SampleEvent):
-            pipeline.offer(event.data, event.log_time)
+
+
+class Rerun:
+    """The scene of a run once more: it takes the run's events, and ticks when it is asked to."""
+
+    def __init__(self, bag: Bag, scene: Scene) -> None:
+        self._bag, self._scene = bag, scene
+        self.pipeline = Pipeline(scene)
+        """The pipeline as the last reset built it."""
+        self._closures, self._injection = self.pipeline.closures, self.pipeline.injection
+        self._last = 0
+
+    def take(self, event: Event) -> None:
+        """Take the next event; a tick only moves the time on."""
+        is_back, self._last = event.log_time < self._last, event.log_time
+        if is_back or isinstance(event, ResetEvent):
+            self.pipeline = Pipeline(self._scene, self._closures, self._injection)
+        if isinstance(event, SampleEvent):
+            self.pipeline.offer(event.data, event.log_time)
         elif isinstance(event, WrenchEvent):
             # The account of a damaged bag may name more topics than its scene.
-            if event.number < len(pipeline.wrenches):
-                pipeline.wrenches[event.number].offer_wrench(event.data, event.log_time)
-        elif injection is not None:
-            turn_fault(bag, injection, event.data)
+            if event.number < len(self.pipeline.wrenches):
+                self.pipeline.wrenches[event.number].offer_wrench(event.data, event.log_time)
+        elif isinstance(event, FaultEvent) and self._injection is not None:
+            turn_fault(self._bag, self._injection, event.data)
+
+    def tick(self, time: int) -> Tick:
+        """Return the tick at a time, in [ns]."""
+        return self.pipeline.tick(time)
 
 
 def own_joint_states(scene: Scene) -> OwnJointStates:

@@ -309,6 +309,18 @@ class LinkagePipeline:
         """Return whether a gap in the readings began at the last tick, if that had no pose."""
         return any(sensor.gap_begins for sensor in self._sensor_stages)
 
+    def is_idle(self, now: int) -> bool:
+        """Return whether a tick at a time, in [ns], would give nothing; False if it may do so."""
+        if self.scene_linkage.drive[0] != 'topic' or any(
+            sensor.gap is not None for sensor in self._sensor_stages
+        ):
+            return False
+        crank = self.drive.state(now)
+        if crank is None:
+            return True
+        speaks = any(extra.writer.no_pose is not None for extra in self.extras)
+        return not (speaks or self.drive_stages or self._solve_loops(*crank.angles).joints)
+
     def is_stale(self, now: int) -> bool:
         """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
         return now - self.drive.stamp > self.drive.max_age > 0

@@ -161,6 +161,14 @@ class Pipeline:
             for linkage, state in zip(self.linkages, tick.states, strict=True)
         )
 
+    def is_idle(self, now: int) -> bool:
+        """
+        Return whether a tick at a time, in [ns], would give no message and change no state.
+
+        The pipeline is not changed. False also where only a tick can tell.
+        """
+        return all(linkage.is_idle(now) for linkage in self.linkages)
+
     @property
     def closures(self) -> list[Closure]:
         """Closures of the linkages."""

@@ -10,6 +10,7 @@
 
 from collections.abc import Iterable
 from functools import partial
+from itertools import count
 import json
 from pathlib import Path
 from typing import NamedTuple
@@ -48,8 +49,12 @@ def _first(waiting: list[tuple[bytes, dict[str, int]]]) -> tuple[bytes, dict[str
     return waiting.pop(0) if waiting else None
 
 
-def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
-    """Run a scene through these moments, into a bag in the folder."""
+def run(folder: Path, scene_file: Path, moments: Iterable[Moment], taking: int = 0) -> Run:
+    """
+    Run a scene through these moments, into a bag in the folder.
+
+    To take a message takes the time ``taking``, in [ns].
+    """
     scene = load_scene(scene_file)
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
@@ -97,6 +102,6 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
         loop.reset_requested |= reset
         for name, on in asked:
             injection.request_change(name, on)
-        tick(time)
+        tick(time, count(time, taking).__next__)
     recorder.stop()
     return Run(read_bag(folder), published, extras, loop)
