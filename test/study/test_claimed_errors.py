@@ -9,13 +9,15 @@
 """Claimed errors are those of an own run against the truth; a need is met when it is run."""
 
 from functools import partial
-from math import remainder, tau
+from math import gcd, remainder, tau
 import os
 import random
 
 from linkage_ros.description import load_scene
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tools.study import (
+    draw_ticks,
+    draw_times,
     errors_in_use,
     measure_age_of_command,
     measure_drive_step,
@@ -244,6 +246,101 @@ def test_the_age_in_use_is_that_of_a_listener(tmp_path, name, rate):
         worst, rms = max(apart[use]), np.sqrt(np.mean(np.square(apart[use])))
         assert worst / 1.5 <= claimed.worst <= 1.5 * worst, use
         assert rms / 1.5 <= claimed.rms <= 1.5 * rms, use
+
+
+# Round speeds of motors, in turns a minute: ticks at round rates meet few phases of the crank.
+SPEEDS = (60, 100, 120, 300, 600, 900, 1200, 1500, 1800, 3000, 3600, 6000)
+QUICK = 100
+"""Periods of a quick measurement."""
+
+
+def of_all_phases(closure, speed, age):
+    """Return worst and rms of states of a steady crank, held and carried, over phases and ages."""
+    sizes = [1.0 if turns else 1.0 / _size(closure.linkage) for turns in closure.turning]
+    phases, ages = 1500, 20
+    angles = tau * np.arange(phases) / phases
+    begun = closure.solve(angles, derivatives=0).positions
+    tiny = 1e-6  # a difference stands for the rate
+    ahead, behind = (closure.solve(angles + d, derivatives=0).positions for d in (tiny, -tiny))
+    turning = np.array(closure.turning)[:, None]
+
+    def difference(one, other):
+        apart = one - other
+        return np.where(turning, apart - tau * np.round(apart / tau), apart)
+
+    rates = difference(ahead, behind) / (2.0 * tiny) * speed
+    found = {'held': [], 'carried': []}
+    # The midpoints of equal parts for the mean, and the end for the worst.
+    for old in [*((k + 0.5) * age / ages for k in range(ages)), age]:
+        now = closure.solve(angles + speed * old, derivatives=0).positions
+        for use, moved in (('held', 0.0), ('carried', rates * old)):
+            off = np.abs(difference(begun + moved, now)) * np.array(sizes)[:, None]
+            found[use].append(off.max(axis=0))
+    return {
+        use: (float(np.max(each)), float(np.sqrt(np.mean(np.square(each[:-1])))))
+        for use, each in found.items()
+    }
+
+
+@pytest.mark.sample(12)
+@pytest.mark.parametrize('rpm', SPEEDS)
+@pytest.mark.parametrize('name', ['four_bar', 'whitworth_quick_return', 'slider_crank'])
+@pytest.mark.parametrize('periods', [QUICK, 300])
+def test_the_age_in_use_knows_all_phases_of_a_steady_crank(tmp_path, name, rpm, periods):
+    speed, rates = rpm * tau / 60.0, [100.0, 1000.0, 2000.0]
+    (tmp_path / 'scene.yaml').write_text(
+        f'linkage: {name}\ndrive: {{constant_rate: {{rate: {speed}, start: 2.0}}}}\n'
+    )
+    motions = motions_of(load_scene(tmp_path / 'scene.yaml'), None, 10.0)
+    for rate, pair in zip(rates, errors_in_use(motions, rates, 10.0, periods), strict=True):
+        true = of_all_phases(motions[0].closure, speed, 1.0 / rate)
+        for use, claimed in zip(('held', 'carried'), pair, strict=True):
+            worst, rms = true[use]
+            # Random phases leave gaps, so the worst is met only nearly.
+            assert 0.75 * worst <= claimed.worst <= 1.001 * worst, (rate, use)
+            assert rms / 1.35 <= claimed.rms <= 1.35 * rms, (rate, use)
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize('rpm', SPEEDS)
+@pytest.mark.parametrize('carried', [True, False])
+def test_the_age_of_a_command_knows_all_phases_of_a_steady_crank(tmp_path, rpm, carried):
+    speed, rate = rpm * tau / 60.0, 500.0
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: four_bar\nrate: 1000\n'
+        f'drive: {{topic: {{carry_forward: {str(carried).lower()}}}}}\n'
+    )
+    scene = load_scene(tmp_path / 'scene.yaml')
+    (motion,) = motions_of(scene, 'sine', 10.0)
+    turning = motion._replace(
+        path=lambda time: ((speed * time * 1e-9,), (speed,)), sample_rate=rate
+    )
+    claimed = measure_age_of_command(turning, scene, 10.0, quick=True).own_setting.error
+    if carried:
+        # A steady crank is carried forward without an error.
+        assert claimed.worst < 1e-9
+        return
+    # A crank that is late by an age moves the joints as a state held for it.
+    worst, rms = of_all_phases(motion.closure, speed, 1.0 / rate)['held']
+    assert 0.75 * worst <= claimed.worst <= 1.001 * worst
+    assert rms / 1.35 <= claimed.rms <= 1.35 * rms
+
+
+@pytest.mark.parametrize('most', [48, 500])
+def test_times_that_are_judged_meet_all_phases_of_a_round_period(most):
+    # Of solving (48 times) and of the drive's step (500 ticks), over 10 s.
+    for hertz in (*range(1, 41), 50, 60, 75, 100, 125):
+        of_ticks = gcd(1000, hertz) / 1000  # distance of the phases that ticks have at all
+        for times, apart in (
+            (draw_times(10.0, most), 0.0),
+            (draw_ticks(1000.0, 10.0, most), of_ticks),
+        ):
+            phases = np.sort([time * 1e-9 * hertz % 1.0 for time in times])
+            # Kolmogorov's distance from phases that are all as likely: over 2.5/√n by chance once
+            # in 100,000 times.
+            uneven = np.abs(phases - (np.arange(len(phases)) + 0.5) / len(phases)).max()
+            assert uneven < 2.5 / len(phases) ** 0.5 + apart, (hertz, most)
+            assert times[-1] == 10_000_000_000
 
 
 def _size(linkage):

@@ -68,6 +68,10 @@ from linkage_ros.tools.study.measuring import (
     Spread as Spread,
     spread_of as spread_of,
 )
+from linkage_ros.tools.study.member_motion import (
+    draw_ticks as draw_ticks,
+    draw_times as draw_times,
+)
 from linkage_ros.tools.study.need import answer_need as answer_need, answers_of as answers_of
 from linkage_ros.tools.study.page import budget_html as budget_html
 from linkage_ros.tools.study.picture import budget_svg as budget_svg

@@ -10,8 +10,8 @@
 The errors that age makes: of a state until it is used, and of a command until it acts.
 
 A listener who holds a state uses it until the next one comes: up to a period old. One who carries
-it forward adds its rates times its age. The error is taken at nodes of Gauss within periods that
-are spread over the motion, which gives its mean square, and at the end of the period, which gives
+it forward adds its rates times its age. The error is taken at nodes of Gauss within periods drawn
+at random over the motion, which gives its mean square, and at the end of the period, which gives
 the worst. A state is used in the process that has made it: what a network adds is not in it.
 
 The samples of a crank come at their own rate, apart from the ticks. What the drive makes of them
@@ -36,9 +36,11 @@ from linkage_ros.tools.study.member_motion import (
     BEGIN,
     Crank,
     cranks_at,
+    draw_instants,
+    draw_ticks,
+    draw_times,
     LinkageMotion,
     scene_key,
-    tick_times,
 )
 from linkage_ros.tools.study.prices import USUAL_RATE
 import numpy as np
@@ -142,9 +144,13 @@ def errors_in_use(
 
 
 def _times_of_use(rate: float, horizon: float, periods: int) -> Any:
-    """Return times of ticks, each with the times of its use, in [ns] (ticks, 1 + parts)."""
-    count = max(1, int(horizon * rate) - 1)
-    numbers = np.unique(np.round(np.linspace(0, count, periods + 1)))
+    """
+    Return times of ticks, each with the times of its use, in [ns] (ticks, 1 + parts).
+
+    No tick has to be a whole number of periods after the first one: when a node begins to tick is
+    chance.
+    """
+    numbers = np.array(draw_instants(max(1.0, horizon * rate - 1.0), periods))
     uses = numbers[:, None] + np.array((0.0, *_PARTS))
     return np.round(uses * (NANOSECONDS / rate)).astype(int)
 
@@ -232,8 +238,10 @@ class _CommandSamples:
 
     def __init__(self, motion: LinkageMotion, rate: float, horizon: float) -> None:
         self._motion = motion
-        self._ticks = tick_times(rate, horizon, _TICKS)
-        self._horizon = round(horizon * NANOSECONDS)
+        # The samples of a bag came at ticks, those of a sine come at any time between two.
+        self._ticks = (
+            draw_ticks(rate, horizon, _TICKS) if motion.samples else draw_times(horizon, _TICKS)
+        )
         self._exact, _ = joints_at(motion.closure, cranks_at(motion, self._ticks))
 
     def measure_error(self, use: TopicDrive, factor: float) -> JointError | None:

@@ -37,9 +37,9 @@ from linkage_ros.tools.study.member_motion import (
     build_drive,
     Crank,
     cranks_at,
+    draw_ticks,
     LinkageMotion,
     refuse_horizon,
-    tick_times,
 )
 import numpy as np
 
@@ -81,7 +81,7 @@ def measure_drive_step(
     """
     begun = process_time()
     use: TorqueDrive = motion.scene_linkage.drive[1]
-    ticks = tick_times(rate, horizon, _TICKS)
+    ticks = draw_ticks(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = process_time() - begun
     price = _measure_price(motion, rate, horizon, 0.3 if quick else 2.0)

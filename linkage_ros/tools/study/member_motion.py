@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import inf, pi
+from random import Random
 from typing import Any, NamedTuple
 
 from linkage_ros.description import SceneLinkage
@@ -94,11 +95,29 @@ def cranks_at(motion: LinkageMotion, times: Sequence[int], **changes: Any) -> li
     return found
 
 
-def tick_times(rate: float, horizon: float, most: int) -> list[int]:
-    """Return the times of some ticks up to the horizon, in [ns], the last one too."""
+def draw_instants(length: float, most: int) -> list[float]:
+    """
+    Return random instants up to a length, one in each of equal parts, and the length itself.
+
+    There are as many parts as whole units in the length, but no more than ``most``. Equidistant
+    instants would meet one phase only of a motion whose period divides their distance. They are
+    the same at each call, so that settings are compared at the same ones.
+    """
+    random = Random(0)
+    parts = max(1, min(most, int(length)))
+    return [*((part + random.random()) * length / parts for part in range(parts)), length]
+
+
+def draw_ticks(rate: float, horizon: float, most: int) -> list[int]:
+    """Return the times of random ticks up to the horizon, in [ns], the last one too."""
     count = max(1, int(horizon * rate * (1.0 + 1e-12)))
-    chosen = sorted({round(count * k / most) for k in range(1, most + 1)} - {0})
+    chosen = sorted({max(1, round(instant)) for instant in draw_instants(count, most)})
     return [round(number * NANOSECONDS / rate) for number in chosen]
+
+
+def draw_times(horizon: float, most: int) -> list[int]:
+    """Return random times up to the horizon, in [ns], the horizon too."""
+    return [round(instant) for instant in draw_instants(horizon * NANOSECONDS, most)]
 
 
 def scene_key(scene_linkage: SceneLinkage, key: str) -> str:

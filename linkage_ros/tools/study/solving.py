@@ -43,7 +43,7 @@ from linkage_ros.tools.study.four_bar_formulas import (
 )
 from linkage_ros.tools.study.joint_errors import size_of
 from linkage_ros.tools.study.measuring import Candidate, Progress, time_in_turn
-from linkage_ros.tools.study.member_motion import cranks_at, LinkageMotion, tick_times
+from linkage_ros.tools.study.member_motion import cranks_at, draw_times, LinkageMotion
 from linkage_ros.tools.study.newton import solve_by_newton
 import numpy as np
 
@@ -94,7 +94,7 @@ def measure_solving(
     """
     check_installed('flint')
     count = _QUICK_STATES if quick else _STATES
-    times = tick_times(rate, horizon, count)
+    times = draw_times(horizon, count)
     errors: list[JointError] = []
     candidates: list[tuple[str, JointError, Candidate]] = []
     unproved = 0
