@@ -248,7 +248,7 @@ class SingleDofMechanism:
                 reached, event = last, happened if known else None
             if event is _Event.SEGMENT:
                 # The next segment begins just beyond, at a time that differs when it is rounded.
-                length = min(length + 2.0 * ulp(now + length), left)
+                length = min(length + 2.0 * ulp(time + seconds), left)
                 beyond = reach(length)
                 if beyond and not self._find_event(beyond, now, sense, sticks, slips, ()):
                     reached = beyond
@@ -408,6 +408,7 @@ class SingleDofMechanism:
     ) -> float:
         """Return how long a state stays at rest, while the applied forces change with the time."""
         low, high = self.stops
+        motion = motion._replace(ahead=0.0)
         value, _, terms, _ = motion
 
         def holding_margin(ahead: float) -> float:
@@ -417,10 +418,30 @@ class SingleDofMechanism:
                 return max(held, push)
             return max(held, -push) if value <= low else held
 
-        if holding_margin(seconds) >= 0.0:
-            return seconds
-        held = last_before(lambda ahead: ahead, holding_margin, 0.0, seconds, seconds)[0]
-        return min(held + 2.0 * ulp(now + held), seconds)
+        # In a segment the push is linear in time: what rests at both ends of it rests in between.
+        begin, beyond = 0.0, 2.0 * ulp(now + seconds)
+        for cut in range(_KINKS + 1):
+            end, segments = seconds, self._law_segments(motion, now + begin, 0.0)
+
+            def segment_margin(ahead: float, segments: tuple[int, ...] = segments) -> float:
+                return self._segment_margin(motion, now + ahead, segments)
+
+            if cut < _KINKS and segment_margin(seconds) < 0.0:
+                length = seconds - begin
+                end = begin + last_before(begin.__add__, segment_margin, begin, length, seconds)[0]
+                end = min(end + beyond, seconds)
+            if holding_margin(end) < 0.0:
+                # By halves, since a push of exactly 0 has a margin of 0 as long as it lasts.
+                while end - begin > NARROW * seconds:
+                    middle = 0.5 * (begin + end)
+                    begin, end = (
+                        (middle, end) if holding_margin(middle) >= 0.0 else (begin, middle)
+                    )
+                return min(end + beyond, seconds)
+            if end == seconds:
+                break
+            begin = end
+        return seconds
 
     def _law_segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
         """Return the segment of each law for a motion, or for the direction in which it begins."""

@@ -12,10 +12,12 @@ How one freedom moves, sticks and stops, against motions in closed form.
 The mechanisms are made by hand: a mass of 1 on a line, under a constant force or a spring.
 """
 
+from itertools import pairwise
 from math import cos, exp, inf, isfinite, pi, sin, sqrt
 
-from hypothesis import given, strategies as st
+from hypothesis import example, given, strategies as st
 from linkage_ros.dynamics import LARGEST, LawTerm, METHODS, SingleDofMechanism, Terms, TorqueTable
+import numpy as np
 import pytest
 
 STEP = {name: method.step for name, method in METHODS.items()}
@@ -313,6 +315,46 @@ def test_a_step_across_a_row_of_a_table_is_exact(kink, start):
     after = 0.1 - kink
     assert motion.rate == pytest.approx(1.0 + 20.0 * after**2, rel=1e-12)
     assert motion.value == pytest.approx(0.1 + 20.0 / 3.0 * after**3, rel=1e-12)
+
+
+def rising(rows, end):
+    """Return impulse and way of a unit mass under a force with these rows, from 0 to an end."""
+    marks = sorted({0.0, end, *(time for time, _ in rows if 0.0 < time < end)})
+    times, forces = zip(*rows, strict=True)
+    rate = way = 0.0
+    for begin, stop in pairwise(marks):
+        one, other = (float(np.interp(time, times, forces)) for time in (begin, stop))
+        length = stop - begin
+        way += rate * length + (2.0 * one + other) * length * length / 6.0
+        rate += 0.5 * (one + other) * length
+    return rate, way
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(-2.0, 2.0),
+            st.lists(st.tuples(st.floats(0.0, 0.12), st.floats(-40.0, 40.0)), min_size=1,
+                     max_size=4, unique_by=lambda row: round(row[0], 3)),
+        ),
+        min_size=2,
+        max_size=3,
+    )
+)  # fmt: skip
+@example([(1.0, [(0.0, 0.0), (0.1, 20.0)]), (1.0, [(0.05, 0.0), (0.15, 40.0)])])
+@example([(1.0, [(0.05, 0.0), (0.15, 40.0)]), (1.0, [(0.0, 0.0), (1.0, 0.0)])])
+def test_a_step_stops_at_the_rows_of_each_of_several_tables(loads):
+    # The force is linear between the rows of all tables: rk4 is exact from one to the next.
+    tables = [TorqueTable('time', tuple(sorted(rows))) for _, rows in loads]
+    given_by = tuple(LawTerm(lever, 0.0, 0.0) for lever, _ in loads)
+    mass = SingleDofMechanism(
+        lambda _value: Terms(1.0, 0.0, 0.0, 0.0, 0.0, laws=given_by), STEP['rk4'],
+        laws=tuple(tables),
+    )  # fmt: skip
+    motion = mass.advance(mass.state_at(0.0, 0.0), 0.1, 0.0)
+    each = [(lever, *rising(sorted(rows), 0.1)) for lever, rows in loads]
+    assert motion.rate == pytest.approx(sum(x * rate for x, rate, _ in each), abs=1e-11)
+    assert motion.value == pytest.approx(sum(x * way for x, _, way in each), abs=1e-12)
 
 
 def test_a_step_across_many_rows_goes_on_at_a_bounded_cost():
