@@ -139,6 +139,26 @@ class RunState:
         return [name for each in linkages for name in each.scene_linkage.sampled_joints]
 
     @property
+    def takes_commands(self) -> bool:
+        """Whether the drives take commands, which move the inputs, instead of samples of these."""
+        drives = [line.scene_linkage.drive[0] for line in self.loop.pipeline.linkages]
+        return 'torque' in drives
+
+    @property
+    def uncommanded(self) -> str:
+        """Return what acts on the inputs of torque drives while no command comes."""
+        acting = []
+        for line in self.loop.pipeline.linkages:
+            drive = line.scene_linkage.drive[1]
+            unit = 'N' if line.closure.linkage.inputs[0].slider else 'N·m'
+            names = list_names(line.scene_linkage.sampled_joints)
+            what = (
+                f'the brake of {drive.brake:g} {unit} holds' if drive.brake else 'no effort moves'
+            )
+            acting.append(f'{what} {names}')
+        return ', '.join(acting)
+
+    @property
     def sample_age(self) -> float:
         """Return the age of the newest sample by its stamp, in [s]; infinity without one."""
         stamp = self.loop.newest_stamp
@@ -201,12 +221,11 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
     if counts.stale > since[''].stale and age * NANOSECONDS > max_age:
         yield Condition(STALE, f'Samples arrive, but are {age:.1f} s old by their stamps')
     if max_age and age * NANOSECONDS > max_age:
-        text = 'No crank yet' if age == inf else f'No crank for {age:.1f} s, by its stamps'
-        yield Condition(STALE, text)
+        yield Condition(STALE, _describe_silence(run, age))
     if run.cranks_doubled:
         yield Condition(WARN, run.cranks_doubled, 'publishers')
     rejected = since['rejected'].rejected
-    message = 'samples', 'sensor_msgs/JointState'
+    message = 'commands' if run.takes_commands else 'samples', 'sensor_msgs/JointState'
     yield from _find_rejections('rejected', topic, message, counts.rejected, rejected)
     if (new := counts.stale - since['stale'].stale) > 0:
         text = (
@@ -224,6 +243,14 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
                 'than a turn; if these are degrees, publish radians'
             )
             yield Condition(OK, text, f'jump {given.joint}', inf)
+
+
+def _describe_silence(run: RunState, age: float) -> str:
+    """Return that samples or commands are missing, the newest of an age in [s]."""
+    if run.takes_commands:
+        text = 'No command yet' if age == inf else f'No command for {age:.1f} s'
+        return f'{text}: {run.uncommanded}'
+    return 'No crank yet' if age == inf else f'No crank for {age:.1f} s, by its stamps'
 
 
 def closure_conditions(run: RunState, since: Since) -> Iterator[Condition]:
@@ -326,7 +353,7 @@ class Warnings:
         self, run: RunState, publishers: Callable[[], Sequence[str]], period: float
     ) -> None:
         """
-        Warn if no message arrives, and nothing is published.
+        Warn if no message arrives, and nothing is published, or nothing is commanded.
 
         Messages are taken by ticks: a tick that does not end is warned of instead. ``publishers``
         returns the names of the other publishers on the topic.
@@ -348,22 +375,34 @@ class Warnings:
                 f'{crank_topic} wait or are lost; lower the rate, or make the scene cheaper',
                 period,
             )
-        received, published, since = self._last_message
-        if (counts.received, counts.published) != (received, published):
-            self._last_message = (counts.received, counts.published, monotonic())
+        # Without commands the linkage moves on, and its joint states are published.
+        heard = (
+            (run.loop.newest_stamp, 0)
+            if run.takes_commands
+            else (counts.received, counts.published)
+        )
+        *last, since = self._last_message
+        if heard != (*last,):
+            self._last_message = (*heard, monotonic())
             return
         waited = looked - since
         if (counts.received and not max_age) or waited <= max(_PATIENCE, max_age / NANOSECONDS):
             return
         number = len(publishers())
-        self.warn(
-            'waiting',
-            f'no message on {crank_topic} in {waited:.0f} s ({number} '
-            f'publisher{"" if number == 1 else "s"}), so nothing is published; send '
-            f'sensor_msgs/JointState with {list_names(run.inputs)} there, remap the topic, or '
-            'name another drive in a scene, as drive: {sine: …}',
-            period,
-        )
+        among = f'({number} publisher{"" if number == 1 else "s"})'
+        if run.takes_commands:
+            line = (
+                f'no command on {crank_topic} in {waited:.0f} s {among}, so {run.uncommanded}; '
+                f'send sensor_msgs/JointState with the effort of {list_names(run.inputs)} there, '
+                'or remap the topic'
+            )
+        else:
+            line = (
+                f'no message on {crank_topic} in {waited:.0f} s {among}, so nothing is '
+                f'published; send sensor_msgs/JointState with {list_names(run.inputs)} there, '
+                'remap the topic, or name another drive in a scene, as drive: {sine: …}'
+            )
+        self.warn('waiting', line, period)
 
     def warn(self, kind: str, line: str, period: float) -> bool:
         """Warn, unless this kind was already warned of within the period, in [s]."""

@@ -53,7 +53,8 @@ _NEARNESS = {
 def make_statuses(run: RunState, start: Counts) -> list[DiagnosticStatus]:
     """Return the statuses, one for each task; ``start`` has the counts of the last ones."""
     since: Since = defaultdict(lambda: start)
-    crank = 'Samples arriving' if run.crank_topic else 'Driven by the scene'
+    arriving = 'Commands arriving' if run.takes_commands else 'Samples arriving'
+    crank = arriving if run.crank_topic else 'Driven by the scene'
     singularity, near = _describe_singularity(run)
     tasks = [
         ('tick', 'Ticking', tick_conditions(run, since), _tick_values(run, start)),

@@ -62,6 +62,9 @@ _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
 _WATCH_PERIOD = 0.25
 _NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
+_LEASE = 25.0
+"""How long another publisher is seen without a message from it and without a warning, in [s]: the
+middleware remembers one that was killed for up to 20 s."""
 _TWIN_PATIENCE = 0.5
 """How long a node of the same name is seen without a warning, in [s]: one that has just ended."""
 
@@ -157,7 +160,7 @@ class LinkageNode(LifecycleNode):
         self._activation_time = 0
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
-        self._twin_since = inf
+        self._twin_since = self._several_since = inf
         self._real_time = RealTime(
             self.get_parameter('thread_priority').value,
             [each for each in self.get_parameter('cpu_affinity').value if each != -1],
@@ -480,11 +483,14 @@ class LinkageNode(LifecycleNode):
         assert self.loop is not None
         topic, shared = self.crank_topic, self._shares_topic or counts.ignored
         among = ' and '.join(publishers) or 'nodes without a name yet'
-        # Where others share the topic, or each linkage has a publisher, only the numbers tell: a
-        # publisher that starts again begins its numbers again, once.
+        # Two that send are told by their numbers: a publisher that starts again begins its numbers
+        # again, once.
         if counts.interleaved - self._previous_counts.interleaved > 1:
             return f'{topic}: several publishers send the crank, among {among}; stop all but one'
-        if len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1:
+        # One that sends nothing is told by its life, where others do not share the topic.
+        several = len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1
+        self._several_since = min(self._several_since, counts.time) if several else inf
+        if counts.time - self._several_since > _LEASE * NANOSECONDS:
             return f'{topic}: several publishers, {among}; stop all but one'
         return ''
 

@@ -115,13 +115,14 @@ def test_with_both_remappings_of_the_docs_it_does_not_take_itself_for_the_crank(
     wait_for(lambda: publisher.publish(crank(0.7)) or len(states) > 5, 'joint states')
     wait_for(lambda: graph.value('crank', 'Publishers') == '/tester', 'who publishes the crank')
     assert graph.value('crank', 'Topic') == '/joint_states'
-    graph.publisher(JointState, '/joint_states', node='impostor')
-    wait_for(
-        lambda: (
-            publisher.publish(crank(0.7)) or 'several publishers' in graph.status('crank').message
-        ),
-        'the warning of a second publisher',
-    )
+    impostor = graph.publisher(JointState, '/joint_states', node='impostor')
+
+    def is_warned_of():
+        publisher.publish(crank(0.7))
+        impostor.publish(crank(0.7))
+        return 'several publishers' in graph.status('crank').message
+
+    wait_for(is_warned_of, 'the warning of a second publisher')
     named = graph.value('crank', 'Publishers').split(', ')
     assert sorted(named) == ['/impostor', '/tester']
     assert node.end() == 0

@@ -81,15 +81,66 @@ def test_who_waits_in_vain_says_for_what(write_scene, start, linkage, scene, inp
     )
 
 
-def test_who_is_under_torque_waits_for_nothing(graph, write_scene, start):
+def test_who_is_under_torque_moves_and_says_that_no_command_comes(graph, write_scene, start):
     scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
     _, rate, said = scene.partition('rate:')
-    node = start(write_scene('torque', rate + said.partition('record:')[0], 'four_bar'))
+    file = write_scene('torque', rate + said.partition('record:')[0], 'four_bar')
+    node = start(file, '-p', 'warning_period:=0.5')
     joint_states = graph.listen(JointState, '/joint_states')
     wait_for(lambda: joint_states, 'joint states')
-    first = stamp_of(joint_states[0])
-    wait_for(lambda: stamp_of(joint_states[-1]) - first > 4 * NS, 'four seconds')
+    never = (
+        'no command on /crank_commands in 2 s (0 publishers), so the brake of 0.2 N·m holds '
+        'crank_joint; send sensor_msgs/JointState with the effort of crank_joint there, or remap '
+        'the topic'
+    )
+    node.wait_for_log(never)
+    braked = 'No command yet: the brake of 0.2 N·m holds crank_joint'
+    assert graph.wait_for_level('crank', STALE).message == braked
     assert 'no message on' not in node.log
+    publisher = graph.publisher(JointState, '/crank_commands')
+
+    def command():
+        return JointState(name=['crank_joint'], effort=[0.01])
+
+    with publishing(publisher, command):
+        status = graph.wait_for_level('crank', OK)
+        count = node.log.count('no command on')
+        joint_states.clear()
+        wait_for(lambda: len(joint_states) > 2500, 'two seconds with commands')
+        assert node.log.count('no command on') == count
+    assert status.message == 'Commands arriving'
+    # The controller died.
+    wait_for(lambda: node.log.count('no command on') > count, 'the line that commands stopped')
+    message = graph.wait_for_level('crank', STALE).message
+    assert re.fullmatch(
+        r'No command for \d+\.\d s: the brake of 0\.2 N·m holds crank_joint', message
+    )
+
+
+def test_a_publisher_that_died_is_not_taken_for_a_second_one(
+    graph, domain, folder, write_scene, start
+):
+    # A controller is killed, and started anew: the graph still shows the one that is dead.
+    scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
+    _, rate, said = scene.partition('rate:')
+    file = write_scene('restarted', rate + said.partition('record:')[0], 'four_bar')
+    node = start(file, '-p', 'warning_period:=0.5', '-p', 'diagnostics_period:=0.2')
+    ended = graph.publisher(JointState, '/crank_commands', node='dead')  # it sends nothing more
+    restarted = graph.publisher(JointState, '/crank_commands')
+    wait_for(lambda: graph.value('crank', 'Publishers') == '/dead, /tester', 'both in the graph')
+
+    def command():
+        return JointState(name=['crank_joint'], effort=[0.01])
+
+    with publishing(restarted, command):
+        graph.wait_for_level('crank', OK)
+        for _ in range(10):
+            assert graph.next_status('crank').level == OK
+        assert 'several publishers' not in node.log
+        # It is not dead after all.
+        with publishing(ended, command):
+            graph.wait_for_level('crank', WARN)
+            node.wait_for_log('several publishers send the crank, among /dead and /tester')
 
 
 def test_silence(graph, write_scene, start, publisher, joint_states):
@@ -167,8 +218,8 @@ def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(
 
 def test_two_publishers_are_named(graph, write_scene, start, publisher):
     node = start(write_scene('two', TICKING))
-    graph.publisher(JointState, '/crank_states', node='impostor')
-    with publishing(publisher):
+    impostor = graph.publisher(JointState, '/crank_states', node='impostor')
+    with publishing(publisher), publishing(impostor):
         status = graph.wait_for_level('crank', WARN)
     assert '/tester' in status.message
     assert '/impostor' in status.message
