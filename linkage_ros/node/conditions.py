@@ -60,7 +60,10 @@ _REMEDIES = {
     Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
     Rejection.STAMP_ZERO: 'stamp the messages, or write drive: {{topic: {{stamp: arrival}}}}',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
-    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    # Raising max_lead would carry the crank back by the lead.
+    Rejection.STAMP_FUTURE: (
+        'synchronise the clocks, or write drive: {{topic: {{stamp: arrival}}}}'
+    ),
     Rejection.NO_CRANK: 'linkage check --branches shows the range of the joint on its branch',
     Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
     Rejection.WRENCH_NOT_FINITE: 'check the sensor',
@@ -213,9 +216,15 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
     if counts.ignored and counts.ignored == counts.received:
         head = head_of(counts.last_ignored)
         held = sorted(name.decode(errors='replace') for name in head[0]) if head else ()
+        # Two drivers may each publish a part of the inputs.
+        remedy = (
+            ' in one message: let one node publish them together'
+            if set(held) & set(run.inputs)
+            else ': name the joint so there, or remap the topic'
+        )
         text = (
             f'messages on {topic} hold {list_names(map(repr, held))}; the linkage needs '
-            f'{list_names(map(repr, run.inputs))}: name the joint so there, or remap the topic'
+            f'{list_names(map(repr, run.inputs))}{remedy}'
         )
         yield Condition(STALE if max_age else WARN, text, 'ignored')
     if counts.stale > since[''].stale and age * NANOSECONDS > max_age:

@@ -191,9 +191,11 @@ def examine_states(
                 joint_states += 1
                 same += recorded == tick.message
             for watch, state in zip(watched, tick.states, strict=True):
-                crank, position = state.crank, state.position
-                if crank is not None and position is not None and position.joints:
-                    watch.add_state(time, crank.angles, position)
+                if state.has_pose and state.crank is not None:
+                    # Of a compiled state the position is enough: its rates are not asked for.
+                    inputs = state.crank.angles
+                    position = None if state.is_compiled else state.position
+                    watch.add_state(time, inputs, position or watch.closure.position(*inputs))
             if not number % _REPORT_EVERY:
                 progress(number)
                 if stopped():

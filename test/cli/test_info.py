@@ -20,7 +20,10 @@ from typing import Any
 
 from linkage_ros.bag import BagMessage, BagWriter, METADATA_FILE, RUN_FILE
 from linkage_ros.cli import info
+from linkage_ros.description import load_scene, Scene
 from linkage_ros.kinematics import Closure
+from linkage_ros.replay import simulate_run
+from linkage_ros.tick import LinkagePipeline
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 import pytest
@@ -422,3 +425,37 @@ def test_states_beyond_limits_are_counted(
     )
     (linkage,) = tell(run.run(10))['scene']['linkages']
     assert (linkage['states'], linkage['limited']) == (states, limited)
+
+
+@pytest.mark.parametrize('linkage', ['ankle_motors', 'four_bar'])
+def test_of_states_no_rates_are_asked_for(tmp_path, tell, monkeypatch, linkage):
+    # Only the pose says how well a loop closed: rates, in space, would take most of the time.
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(
+        f'linkage: {linkage}\nrate: 100\ndrive: {{sine: {{amplitude: 0.3, frequency: 1}}}}\n'
+        'effects: {velocity: {}}\n'
+    )
+    loaded = load_scene(scene)
+    simulate_run(loaded, tmp_path / 'bag', 100, lambda _: True)
+    worst = read_worst(loaded)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError('rates were asked for')
+
+    monkeypatch.setattr(LinkagePipeline, 'solve_mechanism', refuse)
+    (told,) = tell(tmp_path / 'bag')['scene']['linkages']
+    assert told['states'] == 100
+    assert told['worst_residual']['residual_m'] == worst[0]
+    assert told['nearest_to_toggle']['conditioning'] == worst[1]
+
+
+def read_worst(scene: Scene) -> tuple[float, float]:
+    """Return the worst residual and conditioning of the sine's states, one by one."""
+    closure = scene.linkages[0].closure
+    residuals, conditionings = [], []
+    for index in range(100):
+        angle = 0.3 * sin(2.0 * pi * (index * 0.01))
+        position = closure.position(*[angle] * len(closure.linkage.inputs))
+        residuals.append(closure.residual(position))
+        conditionings.append(closure.singularity_margin(position).conditioning)
+    return max(residuals), min(conditionings)

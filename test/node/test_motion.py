@@ -140,7 +140,8 @@ def test_half_of_two_inputs_is_not_used(graph, write_scene, start, publisher, mo
 
     def told():
         publisher.publish(crank(1.0, name='left_crank'))
-        return "hold 'left_crank'; the linkage needs 'left_crank', 'right_crank'" in node.log
+        needs = "the linkage needs 'left_crank', 'right_crank' in one message"
+        return f"hold 'left_crank'; {needs}" in node.log
 
     wait_for(told, 'the warning')
     wait_for(

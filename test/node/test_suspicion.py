@@ -6,10 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A crank that jumps by more than a turn is suspected to be in degrees, once."""
+"""What a wrong sample is suspected to come from: degrees, two drivers, or two clocks."""
 
 from linkage_ros.description import load_scene
-from linkage_ros.messages import CrankSample
+from linkage_ros.messages import CrankSample, JointStateWriter
 from linkage_ros.node import Warnings
 from linkage_ros.tick import Counts, Pipeline
 import pytest
@@ -42,3 +42,47 @@ def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, sa
         warnings.warn_of_conditions(observe(fake_loop(pipeline=pipeline), counts), 0.0)
     assert len(lines) == said
     assert all('if these are degrees, publish radians' in each for each in lines)
+
+
+@pytest.mark.parametrize(
+    ('held', 'remedy'),
+    [
+        (['left_crank'], ' in one message: let one node publish them together'),
+        (['right_crank', 'elbow'], ' in one message: let one node publish them together'),
+        (['left_motor'], ': name the joint so there, or remap the topic'),
+    ],
+)
+def test_inputs_that_come_one_by_one_are_to_come_in_one_message(held, remedy):
+    pipeline = Pipeline(load_scene('five_bar', ['drive={topic: {}}']))
+    (inputs,) = [line.scene_linkage.sampled_joints for line in pipeline.linkages]
+    assert list(inputs) == ['left_crank_joint', 'right_crank_joint']
+    held = [name.replace('_crank', '_crank_joint') for name in held]
+    last = JointStateWriter(held).write(SECOND, [0.5] * len(held))
+    counts = Counts(chatter=[0], received=9, ignored=9, last_ignored=last)
+    lines = Said()
+    Warnings(lines, Counts(chatter=[0])).warn_of_conditions(
+        observe(fake_loop(pipeline=pipeline), counts), 0.0
+    )
+    (line,) = lines
+    names = ', '.join(map(repr, sorted(held)))
+    needs = "the linkage needs 'left_crank_joint', 'right_crank_joint'"
+    assert line == f'messages on /crank hold {names}; {needs}{remedy}'
+
+
+def test_stamps_ahead_of_the_clock_are_not_to_be_let_in_by_max_lead():
+    # A crank that is let in 0.5 s ahead would be carried back by 0.5 s.
+    pipeline = Pipeline(load_scene('four_bar', ['drive={topic: {}}']))
+    (line,) = pipeline.linkages
+    ahead = CrankSample(SECOND + SECOND // 2, (0.0,), (0.0,))
+    rejection = line.drive.offer(ahead, SECOND)
+    counts = Counts(chatter=[0], received=1)
+    counts.rejected[rejection] = 1
+    lines = Said()
+    Warnings(lines, Counts(chatter=[0])).warn_of_conditions(
+        observe(fake_loop(pipeline=pipeline), counts), 0.0
+    )
+    (told,) = lines
+    assert told == (
+        '/crank: 1 samples rejected: stamp in the future (1): synchronise the clocks, or write '
+        'drive: {topic: {stamp: arrival}}'
+    )

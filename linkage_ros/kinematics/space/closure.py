@@ -13,10 +13,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from math import dist, remainder, sqrt, tau
+from math import dist, sqrt, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.kinematics.arithmetic import remainder
 from linkage_ros.kinematics.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.linkage import (
@@ -36,7 +37,9 @@ from linkage_ros.kinematics.space.vectors import (
     SpaceFrame,
     Vector,
 )
+from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+from linkage_ros.kinematics.straight_line import StraightLine
 from linkage_ros.kinematics.sweep_analysis import grid_positions
 
 if TYPE_CHECKING:
@@ -96,6 +99,7 @@ class SpaceClosure(StepwiseClosure):
         check_freedom(linkage, plan, self.freedom)
         self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
+        self._error_line = StraightLine(self._list_errors, lambda: None)
         """Rods that may turn about themselves."""
         self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
         self.ratio_turns = plan.ratio_turns
@@ -152,7 +156,7 @@ class SpaceClosure(StepwiseClosure):
                 known = [link for link in carriers if link in self._plan.frames]
                 if not known:
                     continue  # No link carries it.
-                place = self._carried_place(position, known[0], point)
+                place = self._carried_place(position.state, known[0], point)
             places[name] = scale(self.scale, place)
         return places
 
@@ -219,49 +223,54 @@ class SpaceClosure(StepwiseClosure):
         length, a joint between known links another axis, or a joint is off its ratio (times the
         size): of all equations, redundant or not.
         """
-        return max(self._errors(position), default=0.0) * self.scale
+        errors = self._error_line(position.state) or self._list_errors(position.state)
+        return max(map(abs, errors), default=0.0) * self.scale
 
-    def _errors(self, position: Position) -> Iterator[float]:
-        """Yield the error of each equation, in the unit of the steps."""
-        plan, linkage, state = self._plan, self.linkage, position.state
+    def _list_errors(self, state: LinkState) -> list[float]:
+        """Return the error of each equation, in the unit of the steps, with a sign or without."""
+        return [*self._errors(state)]
+
+    def _errors(self, state: LinkState) -> Iterator[float]:
+        plan, linkage = self._plan, self.linkage
         known = {name: state.pins[index] for name, index in plan.points.items()}
         for point, links in plan.carriers.items():
             carrying = [link for link in links if link in plan.frames]
-            places = [self._carried_place(position, link, point) for link in carrying]
+            places = [self._carried_place(state, link, point) for link in carrying]
             places += [known[point]] if point in known else []
             for place in places:
-                yield dist(known.setdefault(point, places[0]), place)
+                yield length(minus(known.setdefault(point, places[0]), place))
         for link in plan.idle:
             for one, other in pairwise(plan.carried[link]):
                 size = dist(plan.places[one], plan.places[other])
-                yield abs(dist(known[one], known[other]) - size)
+                yield length(minus(known[one], known[other])) - size
         for joint in linkage.slides.values():
             if joint.parent in plan.frames and joint.child in plan.frames:
-                yield self._slide_error(position, joint)
+                yield from self._slide_errors(state, joint)
         values = {name: state.coordinates[index] for name, index in plan.coordinates.items()}
         for name in values.keys() & linkage.struts.keys():
             start, end = (plan.same[point] for point in linkage.struts[name])
             if start in known and end in known:
-                yield abs(dist(known[start], known[end]) - values[name])
+                yield length(minus(known[start], known[end])) - values[name]
         for name, ratio in linkage.ratios.items():
             own, of = (
                 1.0 if joint in linkage.hinges else self.scale for joint in (name, ratio.of)
             )
             off = values[name] * own - ratio.ratio * values[ratio.of] * of - ratio.offset
-            yield abs(remainder(off, tau)) if name in linkage.hinges else abs(off) / self.scale
+            yield remainder(off, tau) if name in linkage.hinges else off / self.scale
 
-    def _slide_error(self, position: Position, joint: SpatialJoint) -> float:
-        """Return by how much a link turns, or leaves the axis, of which it may only slide."""
+    def _slide_errors(self, state: LinkState, joint: SpatialJoint) -> Iterator[float]:
+        """Yield by how much a link turns, and leaves the axis, of which it may only slide."""
         plan, ends = self._plan, (joint.parent, joint.child)
-        parent, child = (position.state.pins[plan.frames[link]] for link in ends)
+        parent, child = (state.pins[plan.frames[link]] for link in ends)
         on, of = (plan.pose_frames[link] for link in ends)
-        turned = [dist(parent.resolve(child[axis]), on.resolve(of[axis])) for axis in range(3)]
+        for axis in range(3):
+            yield length(minus(parent.resolve(child[axis]), on.resolve(of[axis])))
         moved = minus(parent.locate(child.origin), on.locate(of.origin))
         way = on.resolve(scale(1.0 / length(joint.axis), joint.axis))
-        return max(*turned, length(cross(way, moved)))
+        yield length(cross(way, moved))
 
-    def _carried_place(self, position: Position, link: str, point: str) -> Vector:
-        frame: SpaceFrame = position.state.pins[self._plan.frames[link]]
+    def _carried_place(self, state: LinkState, link: str, point: str) -> Vector:
+        frame: SpaceFrame = state.pins[self._plan.frames[link]]
         return frame.place(self._plan.pose_frames[link].locate(self._plan.places[point]))
 
     def _check_pose(self, what: str, position: Position) -> None:

@@ -186,4 +186,6 @@ class Knot:
         )
         import numpy as np  # local import: few states need it
 
-        return reciprocal_condition(np.array(self._equations.evaluate(known, unknowns)[1]))
+        found = self._matrix_line(known, LinkState([*unknowns], []))
+        columns = np.array(found).reshape(-1, len(unknowns))[1:]
+        return reciprocal_condition(columns.T)
