@@ -26,7 +26,7 @@ from linkage_ros.description import (
     TABLE_KINDS,
     Units,
 )
-from linkage_ros.errors import decimal_comma, LinkageError, list_names, quote
+from linkage_ros.errors import decimal_comma, FileError, LinkageError, list_names, quote
 from linkage_ros.kinematics import Linkage
 
 PICTURES = ('.png', '.svg', '.pdf')
@@ -310,6 +310,20 @@ class DisplayUnits(NamedTuple):
     def to_radians(self, typed: float) -> float:
         """Return a typed angle in [rad]."""
         return radians(typed) if self.in_degrees else typed
+
+    def convert_error(self, error: LinkageError) -> LinkageError:
+        """
+        Return an error about a linkage whose quantities, such as ``0.2 m``, are in these units.
+
+        An error about a key of a file, a `FileError`, names them in the units of that file.
+        """
+        if isinstance(error, FileError):
+            return error
+        shown = Units(self.length, 'degrees' if self.in_degrees else 'radians')
+        parts = (error.where, error.reason, error.remedy)
+        return LinkageError(
+            *(shown.convert_quantities(part).replace(' deg', '°') for part in parts)
+        )
 
     def convert_text(self, text: str) -> str:
         """Return a text whose angles, such as ``-1.5°``, are in this unit."""

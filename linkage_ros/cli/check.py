@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     closure = read_any_closure(content, file.stem)
     for note in linkage_notes(closure.linkage, content.units):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
-    units = arguments.angles.of_file(content.units)
+    units = arguments.angles = arguments.angles.of_file(content.units)
     with show_progress('parts examined') as advance:
         if isinstance(closure, Closure):
             described, tables = describe_linkage(closure, advance)

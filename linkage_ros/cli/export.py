@@ -10,9 +10,9 @@
 Write the joints of a bag to a CSV, xlsx or Parquet file, a row for each tick.
 
 A row has the joint states and, where they were recorded, the accelerations of ~/motion and the
-forces of ~/pin_forces. The crank's samples have other times: --topic writes them to a separate
-table, as any other topic of joint states, trajectories of one point, or wrenches. From a foreign
-bag the only topic of joint states is written.
+forces of ~/pin_forces, in the units of the scene's file. The crank's samples have other times:
+--topic writes them to a separate table, as any other topic of joint states, trajectories of one
+point, or wrenches. From a foreign bag the only topic of joint states is written, in SI units.
 """
 
 from __future__ import annotations
@@ -30,7 +30,14 @@ from linkage_ros.bag import Bag, layout_of, REPORT_EVERY
 from linkage_ros.cli.arguments import add_bag, add_output
 from linkage_ros.cli.bag_reading import open_bag, run_or_blank, unfinished_text
 from linkage_ros.cli.terminal import show_progress
-from linkage_ros.description import block_rows, check_kind, Scene, table_file, TABLE_KINDS
+from linkage_ros.description import (
+    block_rows,
+    check_kind,
+    Scene,
+    table_file,
+    TABLE_KINDS,
+    Units,
+)
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import (
     FORCE_X,
@@ -41,7 +48,7 @@ from linkage_ros.messages import (
     POSITION,
     QUANTITIES,
     TYPES,
-    UNITS,
+    unit_in_si,
 )
 from linkage_ros.replay import own_joint_states, recorded_scene, turning_joints
 from linkage_ros.signals import StoppedError
@@ -245,6 +252,7 @@ def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Ex
     scene = _scene_or_none(bag)
     source = _choose_topics(bag, scene, topic)
     turning = turning_joints(scene) if scene is not None else {}
+    units = scene.units if scene is not None else Units()
 
     def bounded_progress(advance: Callable[[int, int], None], of: int) -> Callable[[int], None]:
         def report_read(read: int) -> None:
@@ -261,21 +269,39 @@ def export_bag(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Ex
         )
     if not found.rows:
         raise _nothing_error(source, found)
+    columns = [shown_unit(units, unit_in_si(key, turning)) for key in found.keys]
     heads = [
         TIME,
         STAMP,
         PUBLISHED,
         LOGGED,
-        *(_column_heading(key, turning) for key in found.keys),
+        *(_column_heading(key, unit) for key, (unit, _) in zip(found.keys, columns, strict=True)),
     ]
+    converted = [(place, one) for place, (_, one) in enumerate(columns, 4) if one != 1.0]
     with (
         table_file(file, heads, (STAMP, PUBLISHED, LOGGED)) as write,
         show_progress('written [MiB]') as advance,
     ):
         rows = rows_of(source, found.keys, bounded_progress(advance, size))
         while block := list(islice(rows, block_rows(len(heads)))):
+            for row in block if converted else ():
+                for place, one in converted:
+                    value = row[place]
+                    if value is not None:
+                        row[place] = value / one
             write(block)
     return found
+
+
+def shown_unit(units: Units, unit: str) -> tuple[str, float]:
+    """
+    Return the unit of a column for a unit in SI, and how many in SI are one of it.
+
+    Of a joint that the scene does not know, 'rad or m', the unit stays.
+    """
+    if ' or ' in unit:
+        return unit, 1.0
+    return units.file_unit(unit), units.si_per_unit(unit)
 
 
 def _scene_or_none(bag: Bag) -> Scene | None:
@@ -347,11 +373,7 @@ def _nothing_error(source: ExportSource, result: ExportResult) -> BagError:
     )
 
 
-def _column_heading(key: Key, turning: Mapping[str, bool]) -> str:
+def _column_heading(key: Key, unit: str) -> str:
     """Return the heading of a column: joint, quantity and unit."""
     name, quantity = key
-    angular, linear = UNITS[quantity]
-    heading = name if quantity == POSITION else f'{name} {quantity}'
-    if name in turning:
-        return f'{heading} [{angular if turning[name] else linear}]'
-    return f'{heading} [{angular}]' if angular == linear else f'{heading} [{angular} or {linear}]'
+    return f'{name if quantity == POSITION else f"{name} {quantity}"} [{unit}]'

@@ -201,18 +201,21 @@ def _said_by(arguments: Sequence[str]) -> str:
 
 def _run_command(arguments: Sequence[str], stop: Event) -> int:
     name = top_parser().parse_args(arguments[:1]).command
+    typed = argparse.Namespace()
     try:
         with missing_packages_reported():
             module = find_command(name)
             parser = parser_of(name, module)
-            typed = parser.parse_args(arguments[1:])
+            parser.parse_args(arguments[1:], typed)
             # A local import: signals are to be handled before anything large is imported.
             from linkage_ros.cli.arguments import refuse_existing
 
             refuse_existing(typed)
             return int(module.run(typed, stop))
     except LinkageError as error:
-        print(f'linkage {name}: {error}', file=sys.stderr)
+        # A command that reads a linkage sets the units in which it shows values.
+        told = typed.angles.convert_error(error) if 'angles' in typed else error
+        print(f'linkage {name}: {told}', file=sys.stderr)
         return 2
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import monotonic
 
 from linkage_ros.bag import BagMessage, read_bag
+from linkage_ros.cli.arguments import DEGREES
 from linkage_ros.cli.bag_reading import describe_gaps
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.errors import LinkageError
@@ -76,7 +77,8 @@ def proof_of(folder: Path, ticks: int, longest: float) -> str:
     notes = [beginning_text(proof)] if proof.missing_start else []
     if proof.verdict == DIFFERENT:
         notes += describe_gaps(bag)
-    notes.append(f'worst loop residual {worst:.1e} m')
+    worst_text = DEGREES.of_file(scene.units).format_length(worst, '.1e')
+    notes.append(f'worst loop residual {worst_text}')
     part = (
         f'a sample, its first {sample.seconds:.1f} s: --prove proves all' if sample.cut else 'all'
     )

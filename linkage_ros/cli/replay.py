@@ -60,7 +60,7 @@ from linkage_ros.cli.bag_reading import (
 from linkage_ros.cli.new_bag import names_for, ReplayBag, ReplaySource
 from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import attributes_json, Column, Table, table_of_rows
-from linkage_ros.description import load_scene, remove_bag, Scene
+from linkage_ros.description import load_scene, remove_bag, Scene, Units
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, UNITS
 from linkage_ros.replay import (
@@ -251,7 +251,7 @@ def _number_text(value: float | None, _units: DisplayUnits = DEGREES) -> str:
     return 'not a number' if value is None else f'{value:.3g}'
 
 
-def _greatest_table(account: Mapping[str, Any], begin: int) -> Table:
+def _greatest_table(account: Mapping[str, Any], begin: int, units: Units) -> Table:
     def place(where: Mapping[str, Any] | None, _units: DisplayUnits) -> str:
         return f'{where["joint"]}, {_tick_text(where, begin)}' if where else ''
 
@@ -263,12 +263,12 @@ def _greatest_table(account: Mapping[str, Any], begin: int) -> Table:
         Column('where', 'ulp_at', form=place),
     )
     blank = {'difference_at': None, 'ulp_at': None}
-    rows = (blank | row | {'quantity': _quantity_text(row)} for row in account['greatest'])
+    rows = (blank | _in_units(row, units) for row in account['greatest'])
     return table_of_rows('Greatest differences', 'greatest', columns, rows)
 
 
-def joints_table(account: Mapping[str, Any], begin: int) -> Table:
-    """Return the table of differences joint by joint."""
+def joints_table(account: Mapping[str, Any], begin: int, units: Units) -> Table:
+    """Return the table of differences joint by joint, in the units of a file."""
     columns = (
         Column('joint', 'joint'),
         Column('', 'quantity'),
@@ -277,12 +277,19 @@ def joints_table(account: Mapping[str, Any], begin: int) -> Table:
         Column('>greatest', 'greatest', form=_number_text),
         Column('where', 'greatest_at', form=lambda at, _: _tick_text(at, begin) if at else ''),
     )
-    rows = ({**row, 'quantity': _quantity_text(row)} for row in account['joints'])
+    rows = (_in_units(row, units) for row in account['joints'])
     return table_of_rows('', 'joints', columns, rows)
 
 
-def _quantity_text(row: Mapping[str, Any]) -> str:
-    return f'{row["quantity"]} [{row["unit"]}]'
+def _in_units(row: Mapping[str, Any], units: Units) -> dict[str, Any]:
+    """Return a row of differences in the units of a file; its quantity names the unit."""
+    unit = row['unit']
+    numbers = {
+        name: units.to_file_unit(row[name], unit)
+        for name in ('difference', 'rms', 'greatest')
+        if row.get(name) is not None
+    }
+    return {**row, **numbers, 'quantity': f'{row["quantity"]} [{units.file_unit(unit)}]'}
 
 
 def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
@@ -480,7 +487,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     bag = open_bag(arguments.bag, stop)
     reading = BagReading(bag, stop)
     if not other:
-        account = replay_report(bag, reading, trust_effects=arguments.trust_effects)
+        scene = _own_scene(bag, arguments)
+        account = replay_report(bag, reading, scene)
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
         scene = _other_scene(bag, arguments)
@@ -496,7 +504,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             force=arguments.force,
         )
         code = 0
-    parts = (_counterfactual_parts if other else _proof_parts)(account)
+    parts = (_counterfactual_parts if other else _proof_parts)(account, scene.units)
     show_result(Result(account, [*parts]), arguments)
     for line in _find_shortcomings(account):
         print(f'linkage replay: {line}', file=sys.stderr)
@@ -512,17 +520,20 @@ def _other_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
     return scene_of(bag, trust_effects=arguments.trust_effects, settings=arguments.set)
 
 
-def replay_report(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
+def _own_scene(bag: Bag, arguments: argparse.Namespace) -> Scene:
+    """Return the scene of the bag."""
+    try:
+        return scene_of(bag, trust_effects=arguments.trust_effects)
+    except BagError as error:
+        raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
+
+
+def replay_report(bag: Bag, reading: BagReading, scene: Scene) -> dict[str, Any]:
     """
     Run a bag's own scene once more; return the comparison with the recorded run.
 
-    A LinkageError is raised if the bag carries no scene that can be run, or holds no joint states
-    to compare.
+    A LinkageError is raised if the bag holds no joint states to compare.
     """
-    try:
-        scene = scene_of(bag, trust_effects=trust_effects)
-    except BagError as error:
-        raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
     begin: list[int] = []
 
     def note_begin(tick: ReplayedTick) -> None:
@@ -542,7 +553,7 @@ def replay_report(bag: Bag, reading: BagReading, *, trust_effects: bool = False)
     return bag_account(bag, scene, reading, begin) | account
 
 
-def _proof_parts(account: dict[str, Any]) -> Iterator[Table | str]:
+def _proof_parts(account: dict[str, Any], units: Units) -> Iterator[Table | str]:
     begin = account['begin_ns'] or 0
     differ, ticks = account['different_ticks'], account['compared_ticks']
     verdict = account['verdict']
@@ -568,10 +579,10 @@ def _proof_parts(account: dict[str, Any]) -> Iterator[Table | str]:
     yield from versions_text(account['versions'])
     yield _topics_table(account)
     if account['greatest']:
-        yield _greatest_table(account, begin)
+        yield _greatest_table(account, begin, units)
 
 
-def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
+def _counterfactual_parts(account: dict[str, Any], units: Units) -> Iterator[Table | str]:
     unchanged = account['unchanged']
     if unchanged and unchanged['different_ticks']:
         yield escape_unprintable(_unchanged_text(account['bag'], unchanged))
@@ -585,7 +596,7 @@ def _counterfactual_parts(account: dict[str, Any]) -> Iterator[Table | str]:
     if account['topics']:
         yield _topics_table(account)
     if account['joints']:
-        yield joints_table(account, account['begin_ns'] or 0)
+        yield joints_table(account, account['begin_ns'] or 0, units)
     if account['new_bag']:
         yield ''
         counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())

@@ -113,7 +113,8 @@ class Display:
         ticks = node.loop.counts.ticks
         rate = (ticks - self._before[0]) / (now - self._before[1])
         self._before = (ticks, now)
-        age, joints = _current_state(node.loop, turning_joints(node.scene), self._angles)
+        units = self._angles.of_file(node.scene.units)
+        age, joints = _current_state(node.loop, turning_joints(node.scene), units)
         if self._live is None:
             print(_status_line(node.loop, rate, age, joints), flush=True)
             return
@@ -124,7 +125,7 @@ class Display:
 
 
 def _current_state(
-    loop: TickLoop, turning: Mapping[str, bool], angles: DisplayUnits
+    loop: TickLoop, turning: Mapping[str, bool], units: DisplayUnits
 ) -> tuple[str, list[JointRow]]:
     """Return the input's age as text, and the inputs and joints to show."""
     tick = loop.counts.last_tick
@@ -137,7 +138,7 @@ def _current_state(
         if not position.joints:
             age = position.status.value
             if position.status is Status.OPEN:
-                age += f', gap {position.gap:.3g} m'
+                age += f', gap {units.format_length(position.gap, ".3g")}'
             continue
         scene_linkage = linkage.scene_linkage
         age = f'{crank.age * 1e-6:.2f} ms'
@@ -146,18 +147,17 @@ def _current_state(
         if reading is not None:
             rates = reading.rates or [None] * len(reading.joints)
             values += zip(scene_linkage.joint_names, reading.joints, rates, strict=True)
-    return age, [_shown_joint(*each, turning[each[0]], angles) for each in values[:_MOST_SHOWN]]
+    return age, [_shown_joint(*each, turning[each[0]], units) for each in values[:_MOST_SHOWN]]
 
 
 def _shown_joint(
-    name: str, value: float, rate: float | None, turning: bool, angles: DisplayUnits
+    name: str, value: float, rate: float | None, turning: bool, units: DisplayUnits
 ) -> JointRow:
     rate_text = ''
     if rate is not None:
-        rate_text = (
-            f'{angles.convert(rate):.4f} {angles.angle}/s' if turning else f'{rate:.4f} m/s'
-        )
-    return JointRow(name, angles.value_text(value, turning), rate_text)
+        unit = 'rad/s' if turning else 'm/s'
+        rate_text = f'{units.convert(rate, unit):.4f} {units.name_unit(unit)}'
+    return JointRow(name, units.value_text(value, turning), rate_text)
 
 
 def _status_line(loop: TickLoop, rate: float, age: str, joints: Sequence[JointRow]) -> str:

@@ -10,14 +10,15 @@
 Run a scene as fast as possible, without ROS: once, to a bag or a table, or often, as a study.
 
 A study runs the scene with other seeds and other values of its keys. It writes a table with a row
-for each run, and a picture of the spread over time. A stopped study continues when it is called
-again with the same scene and options: OUTPUT.part holds its finished runs until then.
+for each run, and a picture of the spread over time. Tables have the units of the scene's file. A
+stopped study continues when it is called again with the same scene and options: OUTPUT.part holds
+its finished runs until then.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from math import nan
 from os import cpu_count
@@ -27,7 +28,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 
 from linkage_ros.cli.arguments import add_force, add_set, bounded_number, PICTURES, SCENE_HELP
-from linkage_ros.cli.export import export_bag
+from linkage_ros.cli.export import export_bag, shown_unit
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import (
     check_kind,
@@ -40,7 +41,7 @@ from linkage_ros.description import (
     TABLE_KINDS,
 )
 from linkage_ros.errors import escape_unprintable, LinkageError, name_instead
-from linkage_ros.messages import EFFORT, POSITION, RATE, UNITS
+from linkage_ros.messages import EFFORT, Key, POSITION, RATE, unit_in_si
 from linkage_ros.replay import (
     check_simulated,
     FinishedRuns,
@@ -297,29 +298,27 @@ def _runs_table(
     """Return headings and rows of the table of runs; a run that failed has no numbers."""
     keys = [key for key, _ in runs[0]]
     columns = list(dict.fromkeys(key for one in found.values() for key in one.statistics))
-    heads = ['run', *keys, 'ticks', 'messages', *_statistics_headings(scene, columns)]
+    turning = _revolute_joints(scene)
+    units = [shown_unit(scene.units, unit_in_si(_key_of(column), turning)) for column in columns]
+    heads = ['run', *keys, 'ticks', 'messages']
+    for column, (unit, _) in zip(columns, units, strict=True):
+        heads += [f'{column} {name} [{unit}]' for name in Statistics._fields]
     nothing = Statistics(nan, nan, nan, nan)
     rows: list[list[float | int | None]] = []
     for index, settings in enumerate(runs):
         outcome = found[index]
         row: list[float | int | None] = [index + 1, *(value for _, value in settings)]
         row += [outcome.ticks, outcome.messages]
-        for column in columns:
-            row += outcome.statistics.get(column, nothing)
+        for column, (_, one) in zip(columns, units, strict=True):
+            row += [value / one for value in outcome.statistics.get(column, nothing)]
         rows.append(row)
     return heads, rows
 
 
-def _statistics_headings(scene: Scene, columns: Sequence[str]) -> Iterator[str]:
-    """Yield the headings of the statistics, each with its unit."""
-    turning = _revolute_joints(scene)
-    for column in columns:
-        joint, _, quantity = column.partition(' ')
-        kind = {'': POSITION, 'rate': RATE, 'effort': EFFORT}[quantity]
-        angular, linear = UNITS[kind]
-        unit = angular if turning[joint] else linear
-        for name in Statistics._fields:
-            yield f'{column} {name} [{unit}]'
+def _key_of(column: str) -> Key:
+    """Return joint and quantity of a column of statistics."""
+    joint, _, quantity = column.partition(' ')
+    return joint, {'': POSITION, 'rate': RATE, 'effort': EFFORT}[quantity]
 
 
 def _draw_runs(scene: Scene, seconds: float, found: Mapping[int, Outcome], picture: Path) -> None:

@@ -17,6 +17,7 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.bag import COMPRESSIONS, Storage
 from linkage_ros.description.parameters import choice, number, Parts, whole_number
 from linkage_ros.description.section import Section
+from linkage_ros.description.units import Units
 from linkage_ros.dynamics import Loads
 from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint, SpaceLinkage
 
@@ -185,6 +186,9 @@ class Scene:
         Folder for the relative paths in the scene.
     robot_description
         Whether the node publishes the linkages as URDF.
+    units
+        Units of its tables: those of the scene file; if these are SI, those of its linkages'
+        files, where all have the same.
 
     """
 
@@ -198,6 +202,7 @@ class Scene:
     files: Mapping[str, bytes]
     folder: str = field(compare=False)
     robot_description: bool = False
+    units: Units = field(default=Units(), compare=False)
 
     def __repr__(self) -> str:
         linkages = 'linkage' if len(self.linkages) == 1 else 'linkages'

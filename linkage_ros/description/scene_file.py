@@ -298,6 +298,7 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         files={SCENE_FILE: data, **linkage_files},
         folder=source.folder,
         robot_description=read('robot_description'),
+        units=_table_units(content, members),
     )
     for key in OF_A_LINKAGE.entries:
         content.remove_key(key)
@@ -313,6 +314,12 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     if source.confinement is not None:
         source.confinement.refuse_scene(scene, content)
     return scene
+
+
+def _table_units(content: Section, members: Sequence[SceneLinkage]) -> Units:
+    """Return the units of a scene's tables: its own, or those that its linkages share."""
+    shared = {member.linkage_content.units for member in members}
+    return shared.pop() if content.units.is_si and len(shared) == 1 else content.units
 
 
 def _prefixed_parts(members: Sequence[SceneLinkage]) -> Parts:

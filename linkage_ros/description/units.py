@@ -89,9 +89,12 @@ class Units:
         return float(_EXACT.multiply(Decimal(repr(value)), factor))
 
     def to_file_unit(self, value: float, unit: str) -> float:
-        """Return a value in SI in the file's unit, for messages."""
-        factor = self._si_factor(self._unit_alternatives(unit)[0])
-        return value if factor == 1 or not isfinite(value) else value / float(factor)
+        """Return a value in SI in the file's unit, for messages and tables."""
+        return value / self.si_per_unit(unit) if isfinite(value) else value
+
+    def si_per_unit(self, unit: str) -> float:
+        """Return how many of a unit in SI are one of the file's unit."""
+        return float(self._si_factor(self._unit_alternatives(unit)[0]))
 
     def convert_brackets(self, text: str) -> str:
         """Return a text with the file's units in brackets: ``[mm]`` for ``[m]``."""
@@ -107,6 +110,8 @@ class Units:
 
     def _converted_quantity(self, found: re.Match[str]) -> str:
         numbers, unit = found.groups()
+        if self.si_per_unit(unit) == 1.0:
+            return found[0]
         # One digit less than the text has: 1.5708 rad are 90 deg.
         values = re.sub(
             _NUMBER, lambda one: f'{self.to_file_unit(float(one[0]), unit):.5g}', numbers

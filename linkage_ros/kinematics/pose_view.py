@@ -38,6 +38,7 @@ class LinkageView(NamedTuple):
     interval: InputRange  # Range of the first input around the pose, with the others held
     mark: float  # The first input, less the whole turns by which it lies outside of that range
     sweep: RangeSweep  # The motion through that range
+    length: str = 'm'  # Unit of lengths in texts; from metres a picture may go to millimetres
 
 
 def prepare_view(

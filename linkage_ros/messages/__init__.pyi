@@ -35,6 +35,7 @@ from linkage_ros.messages.joint_values import (
     RATE as RATE,
     TRAJECTORY as TRAJECTORY,
     TYPES as TYPES,
+    unit_in_si as unit_in_si,
     UNITS as UNITS,
     WRENCHES as WRENCHES,
 )

@@ -19,7 +19,7 @@ common_interfaces that have fields for accelerations, and for the wrenches of se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -56,6 +56,20 @@ UNITS = {
     TORQUE: ('N·m', 'N·m'),
 }
 """Unit of each quantity for a revolute joint, and for a sliding one."""
+
+
+def unit_in_si(key: Key, turning: Mapping[str, bool]) -> str:
+    """
+    Return the unit of a quantity of a joint: 'rad or m' where it is not known whether it turns.
+
+    ``turning`` says it of the known joints.
+    """
+    name, quantity = key
+    angular, linear = UNITS[quantity]
+    if name in turning:
+        return angular if turning[name] else linear
+    return angular if angular == linear else f'{angular} or {linear}'
+
 
 MALFORMED = Rejection.MALFORMED.value
 UNEQUAL = Rejection.UNEQUAL.value

@@ -15,7 +15,7 @@ import re
 from typing import Any
 
 from linkage_ros.cli.main import main
-from linkage_ros.description import find_assemblies, load
+from linkage_ros.description import find_assemblies, LENGTHS, load
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.resources import linkage_names, named_file
@@ -28,13 +28,13 @@ _APART = 3.5
 """Smallest distance between two names, in pixels."""
 
 
-def drawn(name: str, inputs: tuple[float, ...] = (), **options: Any) -> Any:
+def drawn(name: str, inputs: tuple[float, ...] = (), length: str = 'm', **options: Any) -> Any:
     """Draw a linkage with names; return the figure instead of storing it."""
     closure = load(name)
     kept = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drawing, 'save_picture', lambda figure, _file: kept.append(figure))
-        shown = prepare_view(closure, inputs or usual_inputs(closure))
+        shown = prepare_view(closure, inputs or usual_inputs(closure))._replace(length=length)
         paint_picture(shown, name, Path('never.png'), names=True, **options)
     (figure,) = kept
     figure.draw_without_rendering()
@@ -106,6 +106,24 @@ def test_lengths_below_a_metre_are_in_millimetres():
     slide = drawn('elliptic_trammel').axes[-1]
     assert slide.get_xlabel() == 'trammel_slide [mm]'
     assert slide.xaxis.get_major_formatter()(-0.1) == '−100'
+
+
+@pytest.mark.parametrize('length', LENGTHS)
+def test_lengths_of_a_file_are_in_its_unit_and_round(length):
+    shown = 'mm' if length == 'm' else length
+    per_metre = {'mm': 1000.0, 'cm': 100.0, 'in': 1.0 / 0.0254}[shown]
+    plane, *_, joints = drawn('elliptic_trammel', (0.05,), length).axes
+    if length != 'm':  # from metres only axes and bars go to millimetres
+        assert f'trammel_slide {0.05 * per_metre:.5g} {length}' in plane.get_title(loc='left')
+    assert joints.get_xlabel() == f'trammel_slide [{shown}]'
+    for axis in (plane.xaxis, plane.yaxis, joints.xaxis):
+        assert axis.get_label_text().endswith(f'[{shown}]')
+        ticks = [tick * per_metre for tick in axis.get_ticklocs()]
+        (step,) = {float(f'{b - a:.6g}') for a, b in pairwise(ticks)}
+        assert step in {k * 10.0**n for k in (1.0, 2.0, 2.5, 5.0) for n in (-1, 0, 1, 2)}
+    texts = [text.get_text() for text in drawn('wishbone', length=length).axes[0].texts]
+    (bar,) = (text for text in texts if re.fullmatch(rf'[\d.]+ {length}', text))
+    assert bar.strip(f' {length}0.') in {'1', '2', '5'}
 
 
 @pytest.mark.parametrize('name', ['jansen_leg', 'slider_crank'])

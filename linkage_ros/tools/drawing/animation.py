@@ -219,7 +219,7 @@ class _MovingPicture:
         grid = self.figure.add_gridspec(1, 2, width_ratios=(wide, 4.8 if compact else 3.4))
         self.plane = self.figure.add_subplot(grid[0])
         self.plane.set_title(picture_text(motion.title, 100), loc='left', fontsize=9)
-        set_plane(self.plane, low - margin, high + margin)
+        set_plane(self.plane, low - margin, high + margin, shown.length)
         if compact:
             self.plane.set_axis_off()
         colours = dict(zip(shown.sweep.paths, COLOURS, strict=False))
@@ -244,10 +244,14 @@ class _MovingPicture:
                 self.parts.append((link, dot))
         self.panels = joint_axes(grid[1], motion.joints)
         lines = plot_joints(
-            self.panels, motion.joints, degrees_x=motion.x_unit == '°', steps=round(8 * scale)
+            self.panels,
+            motion.joints,
+            degrees_x=motion.x_unit == '°',
+            steps=round(8 * scale),
+            length=shown.length,
         )
         last = list(self.panels.values())[-1]
-        label_across(last, motion.x_name, motion.x_unit)
+        label_across(last, motion.x_name, motion.x_unit, shown.length)
         self.marks = [
             axes.axvline(self.mark_x(0), color='0.55', linewidth=0.8, linestyle=':')
             for axes in self.panels.values()

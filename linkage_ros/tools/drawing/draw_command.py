@@ -57,7 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, (*PICTURES, '.dxf'), 'FILE.png in this folder')
     add_at(
         parser,
-        'pose to draw, in degrees, or metres for a slide; further ones are drawn in light grey',
+        'pose to draw: degrees, or the length of a slide in the unit of the file; further ones '
+        'are drawn in light grey',
     )
     parser.add_argument(
         '--names', action='store_true', help='write the names of points, joints and links'
@@ -109,12 +110,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     for option in ('width', 'hole'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
-    units = DEGREES.of_file(content.units)
+    units = arguments.angles = DEGREES.of_file(content.units)
     typed = [read_inputs(closure.linkage, at, '--at', units) for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
-    shown = prepare_view(closure, pose, ghosts)
+    shown = prepare_view(closure, pose, ghosts)._replace(length=units.length)
     camera = [
         None if angle is None else radians(angle)
         for angle in (arguments.azimuth, arguments.elevation)
@@ -140,8 +141,8 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
     first = found[0]
     content, _ = read_yaml(named_file(arguments.file, 'linkages'))
     written_linkage(content)  # it sets the units
+    units = arguments.angles = DEGREES.of_file(content.units)
     if arguments.at:
-        units = DEGREES.of_file(content.units)
         pose = read_inputs(first.linkage, arguments.at[0], '--at', units)
         closed = [each for each in found if each.position(*pose).joints]
         # If it closes in no assembly there, `prepare_view` says so.
@@ -152,6 +153,7 @@ def _draw_assemblies(arguments: argparse.Namespace) -> int:
             prepare_view(each, pose if each.position(*pose).joints else usual_inputs(each))
             for each in found
         ]
+    views = [each._replace(length=units.length) for each in views]
     file = output_or(arguments, Path(f'{Path(arguments.file).stem}.png'))
     texts = [
         pose_text(one.closure.linkage, read_drawn_pose(one.closure, one.position), content.units)

@@ -31,10 +31,10 @@ def draw_linkage(
 ) -> DrawnLinkage:
     """Draw a linkage; a spatial one from a camera, as `SpaceDrawing.choose_camera` has it."""
     if isinstance(shown.closure.linkage, Linkage):
-        return _draw_planar(shown)
+        return _draw_planar(shown)._replace(length=shown.length)
     from linkage_ros.tools.drawing.space_drawing import draw_spatial  # local import: loads numpy
 
-    return draw_spatial(shown, camera)
+    return draw_spatial(shown, camera)._replace(length=shown.length)
 
 
 def _draw_planar(shown: LinkageView) -> DrawnLinkage:

@@ -16,6 +16,7 @@ from pathlib import Path
 from textwrap import fill, wrap
 from typing import Any
 
+from linkage_ros.description import Units
 from linkage_ros.kinematics import (
     all_places,
     bounding_corners,
@@ -48,6 +49,12 @@ from linkage_ros.tools.drawing.painting import (
     set_plane,
     show_lengths,
 )
+
+
+def _pose_text(shown: LinkageView) -> str:
+    """Return the pose: inputs, place on the axis, and which limit it exceeds."""
+    text = f'{pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}{_beyond_text(shown)}'
+    return Units(shown.length, 'degrees').convert_quantities(text).replace(' deg', '°')
 
 
 def _turns_text(shown: LinkageView) -> str:
@@ -89,7 +96,7 @@ def paint_picture(
         grid = figure.add_gridspec(1, 2, width_ratios=(wide, 4.7))
         left = figure.add_subplot(grid[0])
         panels = joint_axes(grid[1], joints)
-        pose = f'{pose_text(shown.closure, shown.inputs)}{_turns_text(shown)}{_beyond_text(shown)}'
+        pose = _pose_text(shown)
         heading, width = picture_text(f'{title}, {pose}', 120), max(40, round(12.0 * wide))
         if len(heading) > width:
             # A character that breaks no line stands for the spaces that are not between inputs.
@@ -103,13 +110,13 @@ def paint_picture(
         left.set_title(heading, loc='left', fontsize=9)
         paint_linkage(left, drawn, 3.0)
         turning_input = not shown.closure.linkage.inputs[0].slider
-        lines = plot_joints(panels, joints, degrees_x=turning_input)
+        lines = plot_joints(panels, joints, degrees_x=turning_input, length=shown.length)
         # A pose beyond the limits has no place on the axis.
         if shown.interval.lowest <= shown.mark <= shown.interval.highest:
             now = degrees(shown.mark) if turning_input else shown.mark
             for axes in panels.values():
                 axes.axvline(now, color='0.55', linewidth=0.8, linestyle=':')
-        label_across(list(panels.values())[-1], *moved_input(shown))
+        label_across(list(panels.values())[-1], *moved_input(shown), shown.length)
         figure.draw_without_rendering()  # only now axes and texts have a size
         label_joints(panels, joints, lines)
         if names:
@@ -123,14 +130,14 @@ def paint_linkage(axes: Any, drawn: DrawnLinkage, margin: float) -> None:
     low, high = drawn.corners(margin)
     if drawn.camera:
         low -= complex(0.0, 0.16 * abs(high - low))  # for the frame
-    set_plane(axes, low, high)
+    set_plane(axes, low, high, drawn.length)
     paint_background(axes, drawn)
     artists = paint_shapes(axes, drawn.shapes)
     for artist, strength in zip(artists, drawn.strengths, strict=False):
         make_faint(artist, strength)
     if drawn.camera:
         axes.set_axis_off()
-        paint_frame(axes, drawn.camera.axes, low, high, has_lengths=drawn.has_lengths)
+        paint_frame(axes, drawn, low, high)
 
 
 def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
@@ -158,7 +165,7 @@ def assemblies_picture(views: Mapping[str, LinkageView], file: Path) -> None:
             axes = figure.add_subplot(rows, columns, number)
             title = fill(picture_text(text, 200), round(15.0 * wide), subsequent_indent='  ')
             if shown.inputs != first.inputs:
-                title += f'\nat {picture_text(pose_text(shown.closure, shown.inputs))}'
+                title += f'\nat {picture_text(_pose_text(shown))}'
             axes.set_title(title, loc='left', fontsize=7.5, family='monospace')
             set_plane(axes, low - margin, high + margin)
             axes.set_axis_off()
@@ -205,7 +212,12 @@ def joint_axes(place: Any, joints: Sequence[Curve]) -> dict[bool, Any]:
 
 
 def plot_joints(
-    panels: Mapping[bool, Any], joints: Sequence[Curve], *, degrees_x: bool, steps: int = 8
+    panels: Mapping[bool, Any],
+    joints: Sequence[Curve],
+    *,
+    degrees_x: bool,
+    steps: int = 8,
+    length: str = 'm',
 ) -> dict[str, Any]:
     """Plot joints; return their lines by name. `label_joints` labels their ends."""
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
@@ -226,7 +238,7 @@ def plot_joints(
                 MultipleLocator(degree_step(axes.get_ylim(), steps // len(panels)))
             )
         else:
-            show_lengths(axes.yaxis, 'slide', max(map(abs, axes.get_ylim())))
+            show_lengths(axes.yaxis, 'slide', max(map(abs, axes.get_ylim())), length)
         axes.tick_params(labelsize=7, width=0.5)
         axes.margins(x=0.0)
         axes.grid(alpha=0.25, linewidth=0.5)
@@ -251,10 +263,10 @@ def moved_input(shown: LinkageView) -> tuple[str, str]:
     return f'{picture_text(given.joint)}{held}', 'm' if given.slider else '°'
 
 
-def label_across(axes: Any, name: str, unit: str) -> None:
-    """Label the axis of the abscissa; of a length, in the unit for its size."""
+def label_across(axes: Any, name: str, unit: str, length: str = 'm') -> None:
+    """Label the axis of the abscissa; of a length, as `unit_of_length` has it."""
     if unit == 'm':
-        show_lengths(axes.xaxis, name, max(map(abs, axes.get_xlim())))
+        show_lengths(axes.xaxis, name, max(map(abs, axes.get_xlim())), length)
     else:
         axes.set_xlabel(f'{name} [{unit}]')
 

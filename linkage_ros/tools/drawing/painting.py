@@ -21,7 +21,7 @@ from statistics import fmean
 from typing import Any, NamedTuple
 from warnings import catch_warnings, filterwarnings
 
-from linkage_ros.description import atomic_write
+from linkage_ros.description import atomic_write, LENGTHS
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics import (
     bounding_corners,
@@ -93,6 +93,7 @@ class DrawnLinkage(NamedTuple):
     strengths: Sequence[float] = ()  # How strong shapes are painted; those behind are fainter
     camera: Any = None  # The `Camera` of a spatial linkage
     has_lengths: bool = True
+    length: str = 'm'  # As `LinkageView.length`
 
     def corners(self, margin: float) -> tuple[complex, complex]:
         """Return lower left and upper right of all, with a margin in half widths of a bar."""
@@ -277,14 +278,29 @@ def label_ends(axes: Any, lines: Sequence[Any]) -> None:
         )  # fmt: skip
 
 
-def unit_of_length(size: float) -> tuple[str, float]:
-    """Return the unit in which people read lengths of a size, in [m], and how many make one m."""
-    return ('m', 1.0) if size >= 1.0 else ('mm', 1e3)
+def unit_of_length(size: float, length: str = 'm') -> tuple[str, float]:
+    """
+    Return the unit in which people read lengths, and how many make one m.
+
+    It is the unit of their file, ``length``; if that is the metre, it is chosen for the size, in
+    [m].
+    """
+    unit = 'mm' if length == 'm' and size < 1.0 else length
+    return unit, 1.0 / float(LENGTHS[unit])
 
 
-def show_lengths(axis: Any, name: str, size: float) -> None:
-    """Let an axis in [m] show a length in the unit for its size; name it."""
-    unit, factor = unit_of_length(size)
+def show_lengths(axis: Any, name: str, size: float, length: str = 'm') -> None:
+    """Let an axis in [m] show a length as `unit_of_length` has it; name it."""
+    from matplotlib.ticker import AutoLocator  # local import: an extra, and slow to load
+
+    class RoundInUnit(AutoLocator):
+        """Ticks at round numbers of the unit."""
+
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            return super().tick_values(vmin * factor, vmax * factor) / factor
+
+    unit, factor = unit_of_length(size, length)
+    axis.set_major_locator(RoundInUnit())
     axis.set_major_formatter(lambda value, _: f'{value * factor:.6g}'.replace('-', '−'))
     axis.axes.set(**{f'{axis.axis_name}label': f'{name} [{unit}]'})
 
@@ -296,14 +312,18 @@ def degree_step(ends: tuple[float, float], most: int = 8) -> float:
     return next((step for step in _STEPS if (high - low) / step <= most), turns)
 
 
-def set_plane(axes: Any, low: complex, high: complex) -> None:
-    """Let axes show a part of the plane between two corners, in [m], true to scale."""
+def set_plane(axes: Any, low: complex, high: complex, length: str = 'm') -> None:
+    """
+    Let axes show a part of the plane between two corners, in [m], true to scale.
+
+    ``length`` is the unit of the file, as for `unit_of_length`.
+    """
     axes.set_aspect('equal')
     axes.set_xlim(low.real, high.real)
     axes.set_ylim(low.imag, high.imag)
     size = max((high - low).real, (high - low).imag)
-    show_lengths(axes.xaxis, 'x', size)
-    show_lengths(axes.yaxis, 'y', size)
+    show_lengths(axes.xaxis, 'x', size, length)
+    show_lengths(axes.yaxis, 'y', size, length)
     axes.tick_params(labelsize=7, width=0.5)
     for side in ('top', 'right'):
         axes.spines[side].set_visible(False)
@@ -367,14 +387,9 @@ def make_faint(artist: Any, strength: float) -> None:
         getattr(artist, f'set_{part}')((*mixed, opacity))
 
 
-def paint_frame(
-    axes: Any, directions: Any, low: complex, high: complex, *, has_lengths: bool
-) -> None:
-    """
-    Paint the directions x, y and z in the lower left corner of a picture, and a bar to scale.
-
-    The first two rows of ``directions`` are what is right and up in the picture.
-    """
+def paint_frame(axes: Any, drawn: DrawnLinkage, low: complex, high: complex) -> None:
+    """Paint directions x, y and z in the lower left corner of a picture, and a bar to scale."""
+    directions = drawn.camera.axes  # the first two rows are what is right and up in the picture
     arm = 0.05 * abs(high - low)
     origin = low + arm * (1.5 + 2.0j)
     for name, right, up in zip('xyz', *directions[:2], strict=True):
@@ -385,17 +400,18 @@ def paint_frame(
             letter.real, letter.imag, name, ha='center', va='center', fontsize=_FONT_SIZE,
             color=INK,
         )  # fmt: skip
-    if not has_lengths:
+    if not drawn.has_lengths:
         return
-    unit, factor = unit_of_length(abs(high - low))
-    longest = 0.4 * (high - low).real
+    unit, factor = unit_of_length(abs(high - low), drawn.length)
+    longest = 0.4 * (high - low).real * factor
     power = 10.0 ** floor(log10(longest))
-    length = next(k * power for k in (5.0, 2.0, 1.0) if k * power <= longest)
+    shown = next(k * power for k in (5.0, 2.0, 1.0) if k * power <= longest)
+    length = shown / factor
     start = low + arm * (0.4 + 0.1j)
     ends = (start + 0.15j * arm, start, start + length, start + length + 0.15j * arm)
     plot_places(axes, ends, color=INK, linewidth=1.0)
     axes.text(
-        ends[-1].real + 0.2 * arm, start.imag, f'{length * factor:g} {unit}', va='bottom',
+        ends[-1].real + 0.2 * arm, start.imag, f'{shown:g} {unit}', va='bottom',
         fontsize=_FONT_SIZE, color=INK,
     )  # fmt: skip
 

@@ -18,11 +18,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 from linkage_ros.bag import is_bag_name, layout_of
 from linkage_ros.cli import add_output, open_bag, output_or, show_progress
-from linkage_ros.description import load
+from linkage_ros.description import linkage_content, read_any_closure
 from linkage_ros.kinematics import check_planar, prepare_view, usual_inputs
+from linkage_ros.resources import named_file
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.drawing import (
     animate,
@@ -81,8 +83,9 @@ def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Ani
         trusted = arguments.trust_effects
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
         return find_run_motion(found, scene.name if scene else given.name, arguments.seconds)
-    closure = load(arguments.file)
+    content = linkage_content(named_file(arguments.file, 'linkages'))
+    closure: Any = read_any_closure(content, given.stem)
     check_planar(closure.name, closure.linkage)
-    shown = prepare_view(closure, usual_inputs(closure))
+    shown = prepare_view(closure, usual_inputs(closure))._replace(length=content.units.length)
     seconds = _TURN if arguments.seconds is None else arguments.seconds
     return range_motion(shown, given.stem, seconds)

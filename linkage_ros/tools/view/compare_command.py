@@ -36,6 +36,7 @@ from linkage_ros.cli import (
     run_or_blank,
     show_result,
 )
+from linkage_ros.description import Units
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, MessageValues, POSITION
 from linkage_ros.replay import Deviation, recorded_scene, TickPlace, turning_joints
@@ -146,9 +147,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Compare; return 1 if it was stopped, or a bag is damaged."""
     bags = [open_bag(path, stop) for path in (arguments.bag, arguments.other)]
-    scenes = [_find_wrapping(bag) for bag in bags]
-    turning = scenes[0][0] | scenes[1][0]
-    differences = BagDifferences(turning, wrapped=scenes[0][1] or scenes[1][1])
+    scenes = [_read_conventions(bag) for bag in bags]
+    turning = scenes[0].turning | scenes[1].turning
+    differences = BagDifferences(turning, wrapped=scenes[0].wrapped or scenes[1].wrapped)
     readings = [BagReading(bag, stop) for bag in bags]
     with readings[0].with_progress() as first, readings[1].with_progress() as second:
         _compare_states(differences, _read_states(bags[0], first), _read_states(bags[1], second))
@@ -174,19 +175,26 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
         f'{account["seconds"]:.3f} s'
     )
-    show_result(Result(account, [head, joints_table(account, 0)]), arguments)
+    show_result(Result(account, [head, joints_table(account, 0, scenes[0].units)]), arguments)
     if picture and not arguments.json and not arguments.csv:
         print(arguments.output)
     return int(stop.is_set() or bool(account['damage']))
 
 
-def _find_wrapping(bag: Bag) -> tuple[dict[str, bool], bool]:
-    """Return which joints turn, and whether angles are wrapped; without a scene they may be."""
+class _Conventions(NamedTuple):
+    """What a run's scene says of its numbers."""
+
+    turning: Mapping[str, bool]  # Of each joint, whether it turns
+    wrapped: bool  # Whether angles are wrapped; without a scene they may be
+    units: Units  # Of its tables
+
+
+def _read_conventions(bag: Bag) -> _Conventions:
     try:
         scene = recorded_scene(bag)
     except LinkageError:
-        return {}, True
-    return turning_joints(scene), scene.wrapped
+        return _Conventions({}, wrapped=True, units=Units())
+    return _Conventions(turning_joints(scene), scene.wrapped, scene.units)
 
 
 def _read_states(bag: Bag, messages: Iterator[Any]) -> Iterator[TimedState]:
