@@ -120,10 +120,11 @@ demo: $(DEMO)
 # has its own ROS domain; it mostly waits, so the other tests run beside these, at the lowest
 # priority. Tests that measure nodes come after those with nodes, one at a time. Of these kinds only
 # files with such tests are collected.
-# Tests that fail there run again at the end, one at a time, as by `colcon test --retest-until-pass 1`:
-# on a busy machine a test may wait in vain. Both outcomes are printed.
+# Tests that fail run again at the end, one at a time, and are listed. Of those with nodes the second
+# outcome counts, as by `colcon test --retest-until-pass 1`: on a busy machine they may wait in vain.
 PYTEST := $(BIN)/python -m pytest --durations 25
-tests = { $(PYTEST) -o cache_dir=build/pytest_$(1) $(2) || { [ $$? = 1 ] && [ -n '$(RUN_AGAIN)' ]; }; }
+tests = $(PYTEST) -o cache_dir=build/pytest_$(1) $(2)
+node_tests = { $(call tests,$(1),$(2)) || { [ $$? = 1 ] && [ -n '$(RUN_AGAIN)' ]; }; }
 BY_FILE := --dist loadfile --no-loadscope-reorder
 marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
@@ -131,10 +132,7 @@ test: $(STAMP)
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory --keep-going --jobs 2 RUN_AGAIN=1 test_nodes lint test_rest || \
 	  status=$$?; \
-	for failed in $$(grep -ls true build/pytest_*/v/cache/lastfailed); do \
-	  echo 'make: tests that failed beside others run again, one at a time'; \
-	  $(PYTEST) -o cache_dir=$${failed%/v/cache/lastfailed} --last-failed || status=$$?; \
-	done; \
+	$(BIN)/python test/run_again.py build/pytest_* || status=$$?; \
 	exit $$status
 
 test_all:
@@ -143,9 +141,9 @@ test_all:
 # What it prints comes at its end, as a whole.
 test_nodes: $(STAMP)
 	@mkdir -p build; \
-	{ $(call tests,nodes,-m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node \
+	{ $(call node_tests,nodes,-m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node \
 	  $(call marked,ros)); status=$$?; \
-	$(call tests,alone,-m alone $(call marked,alone)) || status=$$?; \
+	$(call node_tests,alone,-m alone $(call marked,alone)) || status=$$?; \
 	} >build/test_nodes.log 2>&1; \
 	cat build/test_nodes.log; \
 	exit $$status

@@ -65,7 +65,12 @@ ODD = [
 
 NAMES = st.one_of(
     st.sampled_from(ODD),
-    st.text(st.characters(codec='utf-8').filter(str.isprintable), min_size=1, max_size=8),
+    # Printable: all but controls and separators, of which the space alone is.
+    st.text(
+        st.characters(codec='utf-8', exclude_categories=('C', 'Z'), include_characters=' '),
+        min_size=1,
+        max_size=8,
+    ),
 )
 NUMBERS = st.floats(-1e9, 1e9)
 NEAR = st.floats(-0.1, 0.1)
@@ -75,6 +80,19 @@ EXERTIONS = st.builds(Limits, velocity=MOST, effort=MOST)
 # Limits that do not affect any state: tests here need no others.
 FAR = st.sampled_from([(-inf, inf), (-1e9, inf), (-inf, 1e9), (-1e9, 1e9)])
 LIMITS = st.builds(lambda ends, of: replace(of, low=ends[0], high=ends[1]), FAR, EXERTIONS)
+
+
+@st.composite
+def fresh_names(draw: st.DrawFn, count: int) -> list[str]:
+    """Return names that differ from each other and from the ground's."""
+    found = ['ground']
+    for _ in range(count):
+        name = draw(NAMES)
+        # Made different: drawn until they differ, most draws would be thrown away.
+        while name in found:
+            name += str(len(found))
+        found.append(name)
+    return found[1:]
 
 
 @st.composite
@@ -90,14 +108,7 @@ def linkages(draw: st.DrawFn) -> Linkage:
         *(given.joint for given in linkage.inputs),
     }
     old -= {'ground'}
-    fresh = draw(
-        st.lists(
-            NAMES.filter('ground'.__ne__),
-            min_size=len(old) + 1,
-            max_size=len(old) + 1,
-            unique=True,
-        )
-    )
+    fresh = draw(fresh_names(len(old) + 1))
     new = dict(zip(sorted(old), fresh, strict=False)) | {'ground': 'ground', '': ''}
     times = draw(st.floats(1e-3, 1e3))
     links = {
