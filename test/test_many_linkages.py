@@ -11,7 +11,7 @@
 from linkage_ros.description import load_scene, parse_scene
 from linkage_ros.errors import FileError
 from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.tick import Pipeline
+from linkage_ros.tick import Pipeline, sample_router
 import pytest
 
 from .support.messages import read_joint_state as read, STORE
@@ -88,6 +88,22 @@ linkages:
         for look, beside in zip(one.states, other.states, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
     assert 0 < usual < 400
+
+
+def test_a_message_is_parsed_only_if_its_joint_names_are_new(monkeypatch):
+    parsed = []
+    head_of = sample_router.head_of
+    monkeypatch.setattr(
+        sample_router, 'head_of', lambda message: parsed.append(message) or head_of(message)
+    )
+    routes = sample_router.SampleRouter({'left': ['a'], 'right': ['b']})
+    wanted = {('a', 'b'): ('left', 'right'), ('b', 'c'): ('right',), ('b', 'a'): ('left', 'right')}
+    writers = {names: JointStateWriter(names) for names in wanted}
+    for stamp in range(1, 5):  # other stamps and values, the same names
+        for names, receivers in wanted.items():
+            message = writers[names].write(stamp, [0.1 * stamp, 7.0], [])
+            assert routes.find_receivers(message) == receivers
+    assert len(parsed) == len(wanted)
 
 
 def test_who_has_no_crank_is_left_out(load):

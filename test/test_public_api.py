@@ -54,6 +54,20 @@ def test_nothing_is_imported_that_is_not_used(program, absent):
     subprocess.run([sys.executable, '-c', program], check=True)
 
 
+# Said here once more: a name that goes, or comes, is a decision, which the stub alone would not
+# show.
+NAMES = {
+    *('Bag', 'BagError', 'BagMessage', 'read_bag', 'JointStateReader', 'Rejection'),
+    *('ArrayFunctions', 'Batch', 'Closure', 'InverseClosure', 'InputRange', 'Status'),
+    *('Acceleration', 'Position', 'Velocity', 'load', 'linkage_names', 'svg', 'LinkagePage'),
+    *('Input', 'Limits', 'Linkage', 'Mass', 'Ratio', 'RevoluteJoint', 'SlideJoint', 'Slider'),
+    *('Pipeline', 'Scene', 'Tick', 'load_scene', 'recorded_scene', 'scene_names'),
+    *('DefinitionError', 'FileError', 'LinkageError', 'SynthesisError'),
+    *('Assessment', 'Design', 'PathTask', 'Pose', 'assess', 'from_fixed_pivots'),
+    *('from_moving_pivots', 'generate_function', 'generate_path'),
+}
+
+
 def test_type_checkers_see_the_names_that_are_there():
     stub = ast.parse((PACKAGE / '__init__.pyi').read_text('utf-8'))
     homes = {
@@ -62,16 +76,16 @@ def test_type_checkers_see_the_names_that_are_there():
         if isinstance(node, ast.ImportFrom)
         for name in node.names
     }
-    assert {*homes} == {*lr.__all__}
+    assert {*homes} == {*lr.__all__} == NAMES
     for name, (module, original) in homes.items():
         assert getattr(lr, name) is getattr(sys.modules[module], original)
     assert (PACKAGE / 'py.typed').exists()
 
 
 def test_dir_and_help_show_every_name():
-    assert {*lr.__all__, '__version__'} <= {*dir(lr)}
+    assert {*NAMES, '__version__'} <= {*dir(lr)}
     text = pydoc.plain(pydoc.render_doc(lr))
-    assert [name for name in lr.__all__ if not re.search(rf'\b{name}\b', text)] == []
+    assert [name for name in sorted(NAMES) if not re.search(rf'\b{name}\b', text)] == []
     assert 'Close the loops.' in text
 
 

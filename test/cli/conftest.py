@@ -30,16 +30,16 @@ if find_spec('rclpy') is None:
     collect_ignore_glob = ['test_*.py']
 
 
-def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
-    """Return what ``linkage`` shows on a terminal, where it ends well."""
+def on_terminal(folder: Path, *arguments: str, columns: int = 120, progress: bool = False) -> str:
+    """Return what ``linkage`` shows on a terminal, where it ends well; or its progress instead."""
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
         cwd=folder,
         env=commands.environment(folder)
         | {'TERM': 'xterm-256color', 'COLUMNS': str(columns), 'LINES': '40'},
-        stdout=theirs,
-        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL if progress else theirs,
+        stderr=theirs if progress else subprocess.DEVNULL,
     )
     os.close(theirs)
     shown = b''

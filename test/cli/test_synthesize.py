@@ -253,5 +253,9 @@ def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
 
 def test_a_search_shows_how_far_it_is(tmp_path: Path) -> None:
     typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
-    shown = on_terminal(tmp_path, 'synthesize', *typed, '--candidates', '20000', '--best', '1')
-    assert 'transmission' in shown
+    typed += ['--candidates', '20000', '--best', '1']
+    shown = on_terminal(tmp_path, 'synthesize', *typed, progress=True)
+    shown = re.sub('\x1b\\[[0-9;]*m', '', shown)  # colours
+    counts = [int(count) for count in re.findall(r'candidates.*? (\d+)/20000', shown)]
+    assert counts == sorted(counts)
+    assert counts[-1] == 20000

@@ -10,8 +10,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+import pty
 import re
+import subprocess
+import sys
 
 from linkage_ros.cli import (
     FIRST_LINE,
@@ -100,6 +104,23 @@ def clock(monkeypatch) -> Clock:
     monkeypatch.setattr(terminal, 'monotonic', made)
     monkeypatch.setattr(terminal, 'FIRST_LINE', FIRST_LINE)
     return made
+
+
+def test_on_a_terminal_a_bar_goes_with_the_task_and_is_gone_after_it():
+    ours, theirs = pty.openpty()
+    program = (
+        'from linkage_ros.cli import show_progress\n'
+        'with show_progress("parts") as advance:\n    advance(1, 2)\n    advance(2, 2)\n'
+    )
+    subprocess.run(
+        [sys.executable, '-c', program], stderr=theirs, env={'TERM': 'xterm'}, check=True
+    )
+    os.close(theirs)
+    shown = os.read(ours, 65536).decode()
+    os.close(ours)
+    text = re.sub('\x1b\\[[0-9;?]*[a-zA-Z]', '', shown)
+    assert re.search('parts ━+ 2/2', text)
+    assert shown.endswith('\x1b[1A\x1b[2K')  # up, and the line is erased
 
 
 def test_a_short_task_tells_no_progress_in_a_pipe(capsys, clock):

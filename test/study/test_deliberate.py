@@ -64,15 +64,18 @@ def moments(apart: object) -> tuple[float, float]:
     return float(np.sqrt(np.mean(apart**2))), float(np.max(apart))
 
 
-def held(every: int) -> tuple[float, float]:
-    """Return the error of a listener who holds each so many-th state."""
-    return moments(rockers(TIMES) - rockers(TIMES[np.arange(TICKS) // every * every]))
+def couplers(times: np.ndarray) -> np.ndarray:
+    """Return the angle of the coupler against the crank, from A to B."""
+    cranks, angles = tau * times, rockers(times)
+    b = GROUND + ROCKER * np.exp(1j * angles)
+    return np.unwrap(np.angle((b - CRANK * np.exp(1j * cranks)) * np.exp(-1j * cranks)))
 
 
-def delayed(ticks: int) -> tuple[float, float]:
-    known = rockers(TIMES)
-    apart = np.concatenate([np.zeros(ticks), known[ticks:] - known[:-ticks]])
-    return moments(apart)
+def shown(ticks: object) -> tuple[float, float]:
+    """Return the error of a listener to whom each tick shows the state of another, the worst."""
+    seen = TIMES[np.asarray(ticks)]
+    apart = [tau * (TIMES - seen), *(of(TIMES) - of(seen) for of in (rockers, couplers))]
+    return moments(np.max(np.abs(apart), axis=0))
 
 
 QUANTUM = tau / 1000.0
@@ -97,24 +100,27 @@ def test_an_effect_alone(effect: str) -> None:
 def test_a_state_that_is_withheld_is_old_for_who_holds_it() -> None:
     one = scene_of('effects: {rate_limit: {rate: 100}}')
     (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
-    # The coupler moves, too: the worst joint is meant.
-    assert found.error.worst >= held(10)[1] * (1.0 - 1e-9)
-    assert found.error.worst < 3.0 * held(10)[1]
+    assert found.error == pytest.approx(shown(np.arange(TICKS) // 10 * 10), rel=1e-6)
 
 
 def test_lost_states_are_told() -> None:
     one = scene_of('effects: {dropout: {probability: 0.3}}')
     (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
-    assert found.silent == pytest.approx(0.3, abs=0.05)
-    assert found.error.worst > 0.0
+    news = [is_new for is_new, _ in published_states(one, turn_crank, TICKS)]
+    assert news.count(False) == pytest.approx(0.3 * TICKS, abs=0.05 * TICKS)
+    assert found.silent == news.count(False) / TICKS
+    first = news.index(True)
+    last = np.maximum.accumulate(np.where(news, np.arange(TICKS), first))
+    last[:first] = np.arange(first)  # nothing to hold yet
+    assert found.error == pytest.approx(shown(last), rel=1e-6)
 
 
 def test_a_delay_is_the_motion_within_it() -> None:
-    one = scene_of('publish_input: true\neffects: {delay: {seconds: 0.02}}')
-    (found,) = compare_runs(one, [scene_of('publish_input: true')], turn_crank, TICKS)
-    # The crank's own is exact, and any other joint's is no less than the rocker's.
-    assert found.error.worst >= tau * 0.02 * (1.0 - 1e-9)
-    assert found.error.worst >= delayed(20)[1] * (1.0 - 1e-9)
+    one = scene_of('effects: {delay: {seconds: 0.02}}')
+    (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
+    ticks = np.arange(TICKS)
+    late = np.where(ticks < 20, ticks, ticks - 20)  # nothing to see yet
+    assert found.error == pytest.approx(shown(late), rel=1e-6)
 
 
 def test_a_fault_shows_at_the_times_of_the_scene() -> None:

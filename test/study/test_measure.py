@@ -16,6 +16,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.messages import JOINT_STATE_TYPE, JointStateWriter
 from linkage_ros.tools.study import (
     compare_hard_cases,
+    drive_step,
     ERRORS,
     errors_in_use,
     IN_USE,
@@ -81,6 +82,7 @@ def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
         scene, like='sine', quick=True, parts=[ERRORS], horizon=2.0, progress=shares.append
     )
     assert [knob.name for knob in budget.knobs] == [IN_USE, OF_COMMAND, 'solving']
+    assert [each.partition(':')[0] for each in budget.left_out] == ['--quick']
     assert all(not (knob.own_setting.changes or knob.own_setting.advice) for knob in budget.knobs)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -127,6 +129,49 @@ def test_the_order_of_a_method_shows_in_its_steps(tmp_path):
     errors = {each.label: each.error.worst for each in knob.settings}
     assert errors['rk4, 16 ms'] / errors['rk4, 8 ms'] == pytest.approx(16.0, rel=0.25)
     assert errors['rk4, 8 ms'] / errors['rk4, 4 ms'] == pytest.approx(16.0, rel=0.25)
+
+
+EVALUATIONS = {'semi_implicit_euler': 1, 'rk4': 4, 'gauss_legendre': 14}
+
+
+@pytest.mark.parametrize('seconds', [0.0, 2.5, 5.0, inf])
+def test_of_the_settings_those_are_left_out_that_take_too_long(tmp_path, monkeypatch, seconds):
+    """A run of a clock of our own takes a second at the scene's own setting."""
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: four_bar\nrate: 100\nloads: {gravity: [0, -9.81], drive_inertia: 0.001}\n'
+        'drive: {torque: {start: 0.5, step: 0.008, timeout: 10}}\n'
+    )
+    (motion,) = motions_of(load_scene(tmp_path / 'scene.yaml'), None, 0.2)
+    now = 0.0
+    run = drive_step.cranks_at
+
+    def cost(method, step):
+        return EVALUATIONS[method] / EVALUATIONS['rk4'] * 0.008 / step
+
+    def timed_run(*arguments, method='rk4', step=0.008):
+        nonlocal now
+        now += cost(method, step)
+        return run(*arguments, method=method, step=step)
+
+    monkeypatch.setattr(drive_step, 'process_time', lambda: now)
+    monkeypatch.setattr(drive_step, 'cranks_at', timed_run)
+    monkeypatch.setattr(drive_step, '_measure_price', lambda *_: None)  # by a clock of its own
+    knob, left_out = measure_drive_step(motion, 100.0, 0.2, quick=True, seconds=seconds)
+    left, measured = seconds - 1.0, ['rk4, 8 ms']
+    wanted = [
+        ('rk4', 0.004),
+        ('rk4', 0.016),
+        ('semi_implicit_euler', 0.008),
+        ('gauss_legendre', 0.008),
+    ]
+    without = []
+    for method, step in wanted:
+        fits = cost(method, step) <= left
+        (measured if fits else without).append(f'{method}, {1e3 * step:g} ms')
+        left -= cost(method, step) * fits
+    assert {each.label for each in knob.settings} == {*measured}
+    told = '; '.join(without)
+    assert left_out == ([f'for lack of time: {told}'] if without else [])
 
 
 def test_comparisons_stand_in_their_order():
