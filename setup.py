@@ -138,7 +138,7 @@ COLCON = [
 setup(
     name=NAME,
     version=VERSION,
-    description='Planar linkages for ROS 2: crank angle in, joint states out, runs recorded.',
+    description='Linkages for ROS 2: crank angle in, joint states out, runs recorded.',
     author='The linkage_ros authors',
     author_email='maintainers@linkage-ros.example',
     maintainer='The linkage_ros authors',

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Planar linkages for ROS 2: crank angle in, dependent joints out, run logged.
+Linkages for ROS 2: crank angle in, dependent joints out, run logged.
 
 This is the public API. It does not need ROS.
 

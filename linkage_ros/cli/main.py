@@ -144,7 +144,8 @@ def top_parser() -> Parser:
     codes = '\n'.join(f'  {code}  {text}' for code, text in EXIT_CODES.items())
     parser = Parser(
         prog='linkage',
-        description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}\n\nexit codes:\n{codes}',
+        description='Linkages for ROS 2, in the plane and in space.\n\n'
+        f'commands:\n{commands}\n\nexit codes:\n{codes}',
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog='linkage COMMAND --help shows more.\n\nexample:\n  linkage check jansen_leg',
     )

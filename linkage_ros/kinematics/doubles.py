@@ -57,6 +57,12 @@ def to_double(what: str, value: Any, remedy: str = '') -> float:
     raise TypeError(f'{what}: {quote(value)} is not a number{remedy}')
 
 
+def columns_of(what: str, values: Any) -> list[Any] | None:
+    """Return the columns of an array (N, joints); None if it has another number of dimensions."""
+    array = to_doubles(what, values)
+    return [*array.T] if array.ndim == 2 else None
+
+
 def to_doubles(what: str, values: Any) -> Array:
     """Return an array of numbers, of any shape, as doubles; errors as `to_double`."""
     import numpy as np  # local import: a single number needs none

@@ -28,7 +28,7 @@ from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling import TracedMotion
 from linkage_ros.kinematics.crank_branches import CrankBranch, Inverse, Output
-from linkage_ros.kinematics.doubles import to_doubles
+from linkage_ros.kinematics.doubles import columns_of, to_doubles
 from linkage_ros.kinematics.limits import Bounds
 from linkage_ros.kinematics.linkage import AssemblyPose, Input
 from linkage_ros.kinematics.results import (
@@ -233,7 +233,8 @@ class InverseClosure(Closure):
         from linkage_ros.kinematics.batch import Batch, CODES  # local import: it loads numpy
         import numpy as np  # local import: the batch alone needs it
 
-        (given,) = self._single_input('inputs', inputs)
+        columns = columns_of('inputs', inputs[0]) if len(inputs) == 1 else None
+        (given,) = self._single_input('inputs', columns or inputs)
         values = to_doubles('inputs', given)
         speeds = np.broadcast_to(
             to_doubles('rates', 1.0 if rates is None else rates), values.shape

@@ -350,10 +350,11 @@ class StepwiseClosure:
         Parameters
         ----------
         *inputs
-            For each driven joint an array (N,) of its values, in [rad] or [m]. A state with a
-            value that is not finite is indeterminate.
+            For each driven joint an array (N,) of its values, in [rad] or [m]; or one array
+            (N, inputs). A state with a value that is not finite is indeterminate.
         rates, accelerations
             For each driven joint a number or an array (N,); with one driven joint, without a list.
+            Beside one array of inputs also one array (N, inputs).
             Without ``rates`` the rate of a single driven joint is 1; several driven joints need
             them. Without ``accelerations`` these are 0.
         derivatives

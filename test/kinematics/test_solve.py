@@ -21,6 +21,7 @@ import warnings
 
 from campaigns.topologies.families import FAMILIES
 from hypothesis import assume, given, settings, strategies as st
+from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     Batch,
@@ -38,6 +39,7 @@ from linkage_ros.kinematics import (
     Slider,
     Status,
     step,
+    usual_inputs,
 )
 from linkage_ros.kinematics.compiling import BLOCK, Compiled, CompiledAnswer
 import numpy as np
@@ -447,6 +449,37 @@ def test_an_input_may_be_one_number_for_all_states():
     other = closure.solve(phi, np.full(30, 0.5), rates=(np.ones(30), 0.0), accelerations=(0, 0))
     for mine, theirs in zip(one, other, strict=True):
         np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'ankle', 'ankle_motors', 'hexapod'])
+def test_one_array_of_all_inputs_stands_for_its_columns(name):
+    closure = load(name)
+    count = len(closure.linkage.inputs)
+    rng = np.random.default_rng(SEED)
+    start = np.array(usual_inputs(closure))
+    inputs, rates, accelerations = (
+        start + 0.01 * rng.random((5, count)),
+        *rng.random((2, 5, count)),
+    )
+    wanted = closure.solve(*inputs.T, rates=[*rates.T], accelerations=[*accelerations.T])
+    found = closure.solve(inputs, rates=rates, accelerations=accelerations)
+    for one, other in zip(found, wanted, strict=True):
+        assert one.tobytes() == other.tobytes()
+    for same in (2.0, [2.0]) if count == 1 else ([0.5 * n for n in range(count)],):
+        found = closure.solve(inputs.tolist(), rates=same)
+        wanted = closure.solve(*inputs.T, rates=same)
+        assert found.velocities.tobytes() == wanted.velocities.tobytes()
+    with pytest.raises(
+        ValueError, match=f'^inputs: {count + 1} given; give {count}, one for each'
+    ):
+        closure.solve(np.zeros((4, count + 1)), derivatives=0)
+
+
+def test_one_array_of_the_input_is_taken_by_an_inverse_too():
+    inverse = load('four_bar').driven_by('rocker_joint', near=1.0)
+    values = inverse.position(1.0).inputs[0] + np.linspace(0.0, 0.1, 4)
+    wanted = inverse.solve(values)
+    assert inverse.solve(values[:, None]).positions.tobytes() == wanted.positions.tobytes()
 
 
 def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same():

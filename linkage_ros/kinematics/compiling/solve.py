@@ -34,7 +34,7 @@ from linkage_ros.kinematics.compiling.trace import (
     published_joints,
     Tree,
 )
-from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_doubles
+from linkage_ros.kinematics.doubles import columns_of, HUGE, SHRINK, to_doubles
 from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -102,6 +102,10 @@ class SolverOutline:
         if derivatives not in (0, 1, 2):
             raise ValueError(f'derivatives: {derivatives!r} is not one of 0, 1, 2')
         driven = self._driven
+        # One array (N, inputs) stands for its columns; so do then rates and accelerations.
+        columns = columns_of('inputs', inputs[0]) if len(inputs) == 1 else None
+        if columns is not None:
+            inputs = columns
         if rates is None and derivatives and len(inputs) == driven:
             if driven > 1:
                 raise ValueError(f'rates: give one for each of the {driven} driven joints')
@@ -111,9 +115,13 @@ class SolverOutline:
         given = _broadcast_values('inputs', list(inputs), driven, None)
         count = len(given[0])
         for name, values in (('rates', rates), ('accelerations', accelerations))[:derivatives]:
+            each: Any = values
+            if columns is not None and isinstance(values, np.ndarray):
+                each = columns_of(name, values) or values
+            elif driven == 1:
+                each = to_doubles(name, values)
             # The values of a single driven joint need no list.
-            each: Any = to_doubles(name, values) if driven == 1 else values
-            alone = each.ndim < 2 if driven == 1 else not np.iterable(each)
+            alone = np.ndim(each) < 2 if driven == 1 else not np.iterable(each)
             given += _broadcast_values(name, [each] if alone else list(each), driven, count)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
         with np.errstate(all='ignore'):
