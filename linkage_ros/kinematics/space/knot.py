@@ -45,6 +45,7 @@ class KnotPose(NamedTuple):
     gap: float
     unknowns: Sequence[float]
     solved: LinkState  # The state that they were appended to
+    before: int  # Number of its coordinates then
 
 
 class Knot:
@@ -84,9 +85,10 @@ class Knot:
 
     def close(self, solved: LinkState) -> KnotPose:
         """Append the unknown joints, and the frames of the links."""
+        before = len(solved.coordinates)
         missing = missing_length([rod.rod for rod in self._equations.rods], solved)
         if missing is not None:
-            return KnotPose(Status.OPEN, missing, self._start, solved)
+            return KnotPose(Status.OPEN, missing, self._start, solved, before)
         values = self._group.solution(solved)
         if values is None:
             return self._close_slowly(solved)
@@ -143,13 +145,19 @@ class Knot:
 
     def conditioning(self, pose: KnotPose) -> float:
         """Return the ratio of the Jacobian's smallest singular value to its largest."""
-        return self._conditioning_at(pose.solved, pose.unknowns)
+        # Later steps have appended to the state.
+        before = pose.before
+        known = LinkState(
+            pose.solved.coordinates[:before], pose.solved.pins[: self._equations.first]
+        )
+        return self._conditioning_at(known, pose.unknowns)
 
     def _append(self, status: Status, solved: LinkState, unknowns: Sequence[float]) -> KnotPose:
+        before = len(solved.coordinates)
         moved = self._equations.place_links(solved, unknowns)
         solved.coordinates.extend(unknowns)
         solved.pins.extend(islice(moved.pins, self._equations.first, None))
-        return KnotPose(status, 0.0, unknowns, solved)
+        return KnotPose(status, 0.0, unknowns, solved, before)
 
     def _close_slowly(self, solved: LinkState) -> KnotPose:
         """Close the links where no cell is proven: next to a singularity, or beyond it."""
@@ -173,7 +181,8 @@ class Knot:
         unknowns, gap = descend(system, begin)
         if status is Status.TOGGLE:
             return self._append(status, solved, unknowns.tolist())
-        return KnotPose(status, gap if gap > _MOVED * first else first, found, solved)
+        gap = gap if gap > _MOVED * first else first
+        return KnotPose(status, gap, found, solved, len(solved.coordinates))
 
     def _list_matrix(self, known: LinkState, pose: LinkState) -> list[float]:
         """Return the errors, and the matrix of their derivatives by columns."""
