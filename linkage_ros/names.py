@@ -16,6 +16,7 @@ for a terminal.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import json
 import re
 
@@ -62,6 +63,15 @@ def csv_text(text: str) -> str:
 def dxf_text(name: str) -> str:
     """Return a name for a TEXT of a DXF file; blanks break what would be a code."""
     return shorten(_DXF_CODES.sub(' ', escape_unprintable(name)), _LONGEST_IN_DXF)
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken: this one, or one with a number appended."""
+    free, number = name, 1
+    while free in taken:
+        number += 1
+        free = f'{name}_{number}'
+    return free
 
 
 def picture_text(name: str, most: int = 60) -> str:

@@ -161,6 +161,7 @@ from linkage_ros.kinematics.space.linkage import (
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
 )
+from linkage_ros.kinematics.space.rod_joints import with_rod_joints as with_rod_joints
 from linkage_ros.kinematics.space.vectors import (
     cross as cross,
     direction_of as direction_of,

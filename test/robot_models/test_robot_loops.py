@@ -20,8 +20,7 @@ from linkage_ros.description import linkage_content, parse_yaml
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure
 from linkage_ros.resources import spatial_linkage_names
-from linkage_ros.tools.models import model_of, urdf_model
-from linkage_ros.tools.models.space_urdf import space_urdf
+from linkage_ros.tools.models import model_of, ModelPart, urdf_model
 import numpy as np
 import pytest
 import yaml
@@ -386,7 +385,7 @@ def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name):
     values = {joint: TURNS.uniform(-3.0, 3.0) for joint in linkage.hinges}
     hinges = {k: replace(hinge, value=values[k]) for k, hinge in linkage.hinges.items()}
     written = SpaceClosure(replace(linkage, hinges=hinges))
-    (tmp_path / 'robot.urdf').write_bytes(space_urdf(name, written.linkage))
+    (tmp_path / 'robot.urdf').write_bytes(urdf_model(name, [ModelPart(written)]))
     robot = load(tmp_path / 'robot.urdf')
     assert robot.linkage.turned_by < 1e-12
     for inputs in written.linkage.pose.inputs + TURNS.uniform(-0.3, 0.3, (5, 1)):

@@ -25,9 +25,9 @@ from xml.etree import ElementTree as ET
 from linkage_ros.description import MOVING, UrdfFile
 from linkage_ros.errors import FileError, list_names, quote
 from linkage_ros.kinematics import GROUND, links_by_point, NO_LIMITS, SlideJoint
+from linkage_ros.names import free_name
 from linkage_ros.tools.models.orientation import joint_spans, named_joints
 from linkage_ros.tools.models.part import (
-    free_name,
     ModelNames,
     ModelPart,
     prefix_names,

@@ -10,12 +10,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
+from linkage_ros.names import free_name
 from linkage_ros.tools.models.orientation import named_joints
 
 
@@ -56,16 +57,18 @@ class ModelNames:
         self._joints: set[str] = set()
         self._count = 0
 
-    def add_linkage(self, prefix: str, linkage: Linkage) -> PrefixedNames:
+    def add_linkage(self, prefix: str, linkage: Linkage | SpaceLinkage) -> PrefixedNames:
         """
         Return the names of one of its linkages; call it for all linkages before using any.
 
         A PartError says that two linkages lead to the same name.
         """
-        for kind, taken, found in (
-            ('link', self._frames, linkage.links),
-            ('joint', self._joints, named_joints(linkage)),
-        ):
+        links, joints = (
+            (linkage.link_names, linkage.pair_joints)
+            if isinstance(linkage, SpaceLinkage)
+            else (linkage.links, named_joints(linkage))
+        )
+        for kind, taken, found in (('link', self._frames, links), ('joint', self._joints, joints)):
             for name in found:
                 if prefix + name in taken:
                     raise PartError(
@@ -117,20 +120,11 @@ class PrefixedNames:
 
 
 def prefix_names(
-    linkages: Sequence[tuple[str, Linkage]],
+    linkages: Sequence[tuple[str, Linkage | SpaceLinkage]],
 ) -> tuple[ModelNames, list[PrefixedNames]]:
     """Return the names of a model and of each of its linkages, given with their prefixes."""
     names = ModelNames()
     return names, [names.add_linkage(prefix, linkage) for prefix, linkage in linkages]
-
-
-def free_name(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken: this one, or one with a number appended."""
-    free, number = name, 1
-    while free in taken:
-        number += 1
-        free = f'{name}_{number}'
-    return free
 
 
 def _take_name(name: str, taken: set[str]) -> str:

@@ -24,21 +24,18 @@ from threading import Event
 from linkage_ros.cli import add_output, SCENE_HELP
 from linkage_ros.description import (
     atomic_write,
-    is_spatial,
     kind_of,
+    read_any_closure,
     read_closure,
-    read_space_closure,
     read_urdf,
     read_urdf_file,
     read_yaml,
 )
-from linkage_ros.errors import DefinitionError
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.onto import urdf_onto
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.scene_model import make_scene_model, Write
-from linkage_ros.tools.models.space_urdf import space_urdf
 from linkage_ros.tools.models.urdf import urdf_model
 
 WRITERS: dict[str, Write] = {'urdf': urdf_model, 'mjcf': mujoco_model}
@@ -102,13 +99,9 @@ def model_of(named: str, write: Write) -> bytes:
 
         scene = load_scene(file)
         return make_scene_model(scene, Pipeline(scene).closures, write)
-    if write is urdf_model and is_spatial(content):
-        try:
-            return space_urdf(file.stem, read_space_closure(content).linkage)
-        except DefinitionError as error:
-            raise content.locate_error(error) from None
+    read = read_any_closure if write is urdf_model else read_closure
     try:
-        return write(file.stem, [ModelPart(read_closure(content))])
+        return write(file.stem, [ModelPart(read(content))])
     except PartError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 

@@ -33,7 +33,7 @@ def make_scene_model(scene: Scene, closures: Sequence[Closure], write: Write) ->
     The closures have the deviations of their parts; ``write`` is `urdf_model` or the writer of
     MJCF. A FileError with a remedy is raised if a linkage cannot be a robot model.
     """
-    for each in scene.linkages:
+    for each in scene.linkages if write is not urdf_model else ():
         check_planar(scene.name, each.linkage)
     parts = [
         ModelPart(closure, scene_linkage.prefix, scene_linkage.loads, scene.wrapped)

@@ -9,10 +9,9 @@
 A spatial linkage as URDF: a tree of its joints, and loop joints, which close it.
 
 Each joint keeps its name, sign and zero. A joint that closes a loop moves a frame of its own,
-which a fixed loop joint welds to the link. A link that only balls hold hangs by one of them: on
-two hinges if it is a rod, which then cannot spin, else on three. The other balls are loop joints,
-in the form of Isaac Sim, which robot_state_publisher passes over and `linkage check` reads.
-A strut is a rod that slides in a tube, on two hinges at its first point, a ball at its second.
+which a fixed loop joint welds to the link. Balls are loop joints too, in the form of Isaac Sim,
+which robot_state_publisher passes over and `linkage check` reads. Links that no joint leads to
+hang on joints of their own, see `with_rod_joints`.
 """
 
 from __future__ import annotations
@@ -22,11 +21,9 @@ from math import atan2, hypot, isfinite
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics import (
-    cross,
     direction_of,
     GROUND,
     GROUND_FRAME,
-    length,
     minus,
     Ratio,
     scale,
@@ -35,87 +32,54 @@ from linkage_ros.kinematics import (
     SpatialJoint,
     turn_about,
     Vector,
+    with_rod_joints,
 )
-from linkage_ros.tools.models.part import free_name
-from linkage_ros.tools.models.urdf import FARTHEST, write_limits
-from linkage_ros.tools.models.xml import format_number, format_numbers, xml_comment, xml_document
+from linkage_ros.names import free_name
+from linkage_ros.tools.models.joint_limits import FARTHEST, write_limits
+from linkage_ros.tools.models.orientation import AngleSpan
+from linkage_ros.tools.models.part import PrefixedNames
+from linkage_ros.tools.models.xml import format_number, format_numbers
 
-_HEAD = """\
+SPACE_HEAD = """\
 A spatial linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
 published joint states. Lengths in [m], angles in [rad]. Limits that the linkage does not give are
 made up. Each loop_joint says where two links meet."""
 
-_FLAT = 1e-3
-"""Sine of an angle below which directions are one."""
+_UPRIGHT = 1e-3
+"""Cosine of the pitch below which roll and yaw are one angle."""
 
 
-def space_urdf(name: str, linkage: SpaceLinkage) -> bytes:
-    """Return a robot model of a spatial linkage."""
-    return _SpaceTree(name, _with_slides(linkage)).write()
+class SpaceTree:
+    """A spatial linkage, to be written as URDF; its names are as in `PrefixedNames`."""
 
-
-def _with_slides(linkage: SpaceLinkage) -> SpaceLinkage:
-    """Return the linkage with a tube and a rod for each strut, between which it is a slide."""
-    hinges, slides = dict(linkage.hinges), dict(linkage.slides)
-    links, names = dict(linkage.links), {*linkage.link_names}
-    for strut, (start, end) in linkage.struts.items():
-        at, on = linkage.points[start], next(link for link in links if start in links[link])
-        way = direction_of(minus(linkage.points[end], at))
-        across = _direction_across(way)
-        cross_link, tube, rod = (
-            free_name(f'{strut}_{part}', names) for part in ('cross', 'tube', 'rod')
-        )
-        names |= {cross_link, tube, rod}
-        taken = {*hinges, *slides, *linkage.struts}
-        for axis, letter, ends in (
-            (across, 'x', (on, cross_link)), (cross(way, across), 'y', (cross_link, tube)),
-        ):  # fmt: skip
-            hinges[free_name(f'{strut}_{letter}', taken)] = SpatialJoint(*ends, axis, at)
-        slides[strut] = SpatialJoint(tube, rod, way, value=linkage.pose_value(strut))
-        links[rod] = (end,)
-    return replace(linkage, hinges=hinges, slides=slides, links=links, struts={})
-
-
-def _direction_across(way: Vector) -> Vector:
-    return direction_of(max((cross(way, one) for one in GROUND_FRAME[:3]), key=length))
-
-
-class _SpaceTree:
-    def __init__(self, name: str, linkage: SpaceLinkage) -> None:
-        self._linkage = linkage
-        self._robot = ET.Element('robot', name=name)
-        self._robot.append(xml_comment(_HEAD.splitlines()))
+    def __init__(self, linkage: SpaceLinkage, names: PrefixedNames, wrapped: bool) -> None:
+        self.names = names
+        self._linkage = with_rod_joints(linkage)
+        self._wrapped = wrapped
         self._starts: dict[str, ET.Element] = {}
         self._frames = {GROUND: GROUND_FRAME}
         """Frames in the pose of the links that are written."""
-        self._hung: set[tuple[str, str]] = set()
-        """Points with the links that hang by them."""
-        ET.SubElement(self._robot, 'link', name=GROUND)
 
-    def write(self) -> bytes:
+    def write(self, robot: ET.Element) -> None:
+        """Add the tree and the loop joints to a robot."""
+        self._robot = robot
+        ET.SubElement(robot, 'link', name=self.names.own_name(GROUND))
         links, names = self._linkage.links, self._linkage.link_names
         left = dict(self._linkage.pair_joints)
-        while any(self._grow(name, joint, left) for name, joint in [*left.items()]) or any(
-            map(self._hang, links)
-        ):
+        while any(self._grow(name, joint, left) for name, joint in [*left.items()]):
             pass
         for name, joint in left.items():
             frame = free_name(f'{name}_frame', {*names, *self._frames})
             self._add_joint(name, joint, joint.parent, frame)
             self._add_loop(name, 'fixed', (frame, joint.child), self._frames[frame].origin)
         for point, place in self._linkage.points.items():
-            on = [
-                link
-                for link, points in links.items()
-                if point in points and (point, link) not in self._hung
-            ]
+            on = [link for link, points in links.items() if point in points]
             for number, link in enumerate(on[1:]):
                 name = f'{point}_{number + 1}' if number else point
                 self._add_loop(name, 'spherical', (on[0], link), place)
-        start = ET.SubElement(self._robot, 'linkage_start')
+        start = ET.SubElement(robot, 'linkage_start')
         order = dict.fromkeys((*self._linkage.driven, *self._starts))
         start.extend(map(self._starts.__getitem__, order))
-        return xml_document(self._robot)
 
     def _grow(self, name: str, joint: SpatialJoint, left: dict[str, SpatialJoint]) -> bool:
         """Write a joint that leads from the tree to another link."""
@@ -125,29 +89,6 @@ class _SpaceTree:
         del left[name]
         self._add_joint(name, joint, *ends)
         return True
-
-    def _hang(self, link: str) -> bool:
-        """Hang a link by a ball on the tree."""
-        links, places = self._linkage.links, self._linkage.points
-        for point in links[link] if link not in self._frames else ():
-            on = [one for one, points in links.items() if point in points and one in self._frames]
-            arms = [minus(places[other], places[point]) for other in links[link] if other != point]
-            if not on:
-                continue
-            way = direction_of(arms[0])
-            across = _direction_across(way)
-            axes = [across, cross(way, across)]
-            if any(length(cross(way, arm)) > _FLAT * length(arm) for arm in arms):
-                axes.append(way)
-            self._hung.add((point, link))
-            chain = [
-                free_name(f'{link}_{n}', self._linkage.link_names) for n in range(1, len(axes))
-            ]
-            for number, ends in enumerate(zip((on[0], *chain), (*chain, link), strict=True)):
-                name = free_name(f'{link}_joint{number + 1}', self._linkage.pair_joints)
-                self._add_joint(name, SpatialJoint(*ends, axes[number], places[point]), *ends)
-            return True
-        return False
 
     def _add_joint(self, name: str, joint: SpatialJoint, parent: str, child: str) -> None:
         linkage, on = self._linkage, self._frames[parent]
@@ -161,40 +102,47 @@ class _SpaceTree:
         else:
             x, y, z = (turn_about(axis, joint.value, way) for way in on[:3])
             self._frames[child] = SpaceFrame(x, y, z, at)
-        ET.SubElement(self._robot, 'link', name=child)
-        kind = 'revolute' if isfinite(joint.limits.low) else 'continuous'
+        own_name = self.names.own_name
+        ET.SubElement(self._robot, 'link', name=own_name(child))
+        low, high = joint.limits.low, joint.limits.high
+        # A wrapped angle that passes π is on both sides.
+        passing = self._wrapped and AngleSpan(low, high).passes_pi
+        kind = 'revolute' if isfinite(low) and not passing else 'continuous'
         element = ET.SubElement(
-            self._robot, 'joint', name=name, type='prismatic' if slides else kind
+            self._robot, 'joint', name=own_name(name), type='prismatic' if slides else kind
         )
         ET.SubElement(element, 'origin', xyz=format_numbers(*on.locate(at)), rpy='0 0 0')
-        ET.SubElement(element, 'parent', link=parent)
-        ET.SubElement(element, 'child', link=child)
+        ET.SubElement(element, 'parent', link=own_name(parent))
+        ET.SubElement(element, 'child', link=own_name(child))
         ET.SubElement(element, 'axis', xyz=format_numbers(*on.resolve(axis)))
         mimic = linkage.ratios.get(name)
         while mimic and (before := linkage.ratios.get(mimic.of)):
             # A joint mimics one that mimics none.
             offset = mimic.offset + mimic.ratio * before.offset
             mimic = Ratio(before.of, mimic.ratio * before.ratio, offset)
+        mimic = mimic and replace(mimic, of=own_name(mimic.of))
         computed = write_limits(element, joint.limits, -FARTHEST, FARTHEST, mimic)
         told = 'input' if name in linkage.driven else 'joint'
-        self._starts[name] = ET.Element(told, name=name, value=format_number(joint.value))
+        value = format_number(joint.value)
+        self._starts[name] = ET.Element(told, name=own_name(name), value=value)
         ET.SubElement(self._starts[name], 'computed', computed)
 
     def _add_loop(self, name: str, kind: str, links: tuple[str, str], place: Vector) -> None:
         """Write that two links meet at a place, which is given in the pose."""
-        loop = ET.SubElement(self._robot, 'loop_joint', name=name, type=kind)
+        own_name = self.names.own_name
+        loop = ET.SubElement(self._robot, 'loop_joint', name=own_name(name), type=kind)
         one = self._frames[links[0]]
         for tag, link in zip(('link1', 'link2'), links, strict=True):
             frame = self._frames[link]
             rpy = format_numbers(*_roll_pitch_yaw(*map(frame.resolve, one[:3])))
             xyz = format_numbers(*frame.locate(place))
-            ET.SubElement(loop, tag, link=link, xyz=xyz, rpy=rpy)
+            ET.SubElement(loop, tag, link=own_name(link), xyz=xyz, rpy=rpy)
 
 
 def _roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:
     """Return the angles about fixed axes that turn the ground's axes to these."""
     cosine = hypot(x[0], x[1])
     pitch = atan2(-x[2], cosine)
-    if cosine < _FLAT:  # Roll and yaw turn about one axis.
+    if cosine < _UPRIGHT:  # Roll and yaw turn about one axis.
         return atan2(-z[1], y[1]), pitch, 0.0
     return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])

@@ -25,8 +25,9 @@ from typing import Literal, NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.names import free_name
 from linkage_ros.tools.models.orientation import named_joints, Orientations, Turn
-from linkage_ros.tools.models.part import free_name, ModelNames, PrefixedNames
+from linkage_ros.tools.models.part import ModelNames, PrefixedNames
 
 Kind = Literal['revolute', 'prismatic', 'fixed']
 

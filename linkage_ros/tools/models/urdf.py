@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite
 import re
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -33,11 +32,14 @@ from linkage_ros.kinematics import (
     NO_LIMITS,
     Ratio,
     RevoluteJoint,
+    SpaceLinkage,
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import link_bodies, LinkBody
+from linkage_ros.tools.models.joint_limits import EFFORT, FARTHEST, VELOCITY, write_limits
 from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
+from linkage_ros.tools.models.space_urdf import SPACE_HEAD, SpaceTree
 from linkage_ros.tools.models.tree import grow_tree, Tree, TreeJoint
 from linkage_ros.tools.models.xml import (
     format_number,
@@ -46,12 +48,6 @@ from linkage_ros.tools.models.xml import (
     xml_comment,
     xml_document,
 )
-
-EFFORT, VELOCITY = 1000.0, 100.0
-"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
-
-FARTHEST = 1e9
-"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
 
 _ROOT = 'world'
 
@@ -197,11 +193,15 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     xacro would evaluate one of its names.
     """
     names, own = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
-    models = []
+    models: list[_Model | SpaceTree] = []
     layers = 0
     for count, (part, its) in enumerate(zip(parts, own, strict=True)):
+        linkage = part.closure.linkage
+        if isinstance(linkage, SpaceLinkage):
+            models.append(SpaceTree(linkage, its, part.wrapped))
+            continue
         try:
-            tree = grow_tree(part.closure.linkage, its)
+            tree = grow_tree(linkage, its)
         except DefinitionError as error:
             raise PartError(count, error.where, error.reason, error.remedy) from None
         cuts = add_frames(tree, its)
@@ -209,7 +209,7 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
         models.append(
             _Model(part, its, tree, cuts, ranges, link_bodies(part.closure, ranges, layers))
         )
-        layers += len(part.closure.linkage.links)
+        layers += len(linkage.links)
     robot = ET.Element('robot', name=name)
     robot.append(xml_comment(list(_head_lines(models))))
     if len(models) > 1:
@@ -223,7 +223,10 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     _refuse_expressions(0, robot, of_linkage=False)
     for count, model in enumerate(models):
         before = len(robot)
-        _write_linkage(robot, model)
+        if isinstance(model, SpaceTree):
+            model.write(robot)
+        else:
+            _write_linkage(robot, model)
         for element in robot[before:]:
             _refuse_expressions(count, element)
     return xml_document(robot)
@@ -248,14 +251,18 @@ def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = 
                 )
 
 
-def _head_lines(models: Sequence[_Model]) -> Iterator[str]:
-    yield from _HEAD.splitlines()
+def _head_lines(models: Sequence[_Model | SpaceTree]) -> Iterator[str]:
+    planar = [model for model in models if isinstance(model, _Model)]
+    if planar:
+        yield from _HEAD.splitlines()
+    if len(planar) < len(models):
+        yield from SPACE_HEAD.splitlines()
     if len(models) > 1:
         yield 'A scene does not say where its linkages stand. Change the origin of NAME_mount.'
-    if any(joint.mimics for model in models for joint in model.tree.joints):
+    if any(joint.mimics for model in planar for joint in model.tree.joints):
         yield 'Frames without a body between joints at one pin turn with joints that they mimic,'
         yield 'so that a published joint starts from the link that it is measured from.'
-    for model in models:
+    for model in planar:
         yield ''
         if not model.cuts:
             yield 'Nothing is cut.'
@@ -370,29 +377,6 @@ def add_joint(
     # A continuous angle that is limited on one side only gets a far limit on the other.
     lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
     return write_limits(element, limits, lowest, highest, mimic)
-
-
-def write_limits(
-    joint: ET.Element, limits: Limits, lowest: float, highest: float, mimic: Ratio | None
-) -> dict[str, str]:
-    """Write limits, with others where there are none, and a mimic; return what is made up."""
-    known = {
-        'lower': (limits.low, lowest),
-        'upper': (limits.high, highest),
-        'effort': (limits.effort, EFFORT),
-        'velocity': (limits.velocity, VELOCITY),
-    }
-    if joint.get('type') == 'continuous':
-        del known['lower'], known['upper']
-    written = {
-        key: format_number(given if isfinite(given) else ours)
-        for key, (given, ours) in known.items()
-    }
-    ET.SubElement(joint, 'limit', written)
-    if mimic:
-        multiplier, offset = format_number(mimic.ratio), format_number(mimic.offset)
-        ET.SubElement(joint, 'mimic', joint=mimic.of, multiplier=multiplier, offset=offset)
-    return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
 
 
 def _write_origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:

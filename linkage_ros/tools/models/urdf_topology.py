@@ -18,7 +18,7 @@ from typing import NamedTuple
 from linkage_ros.description import UrdfFile
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import GROUND, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.tools.models.part import free_name
+from linkage_ros.names import free_name
 from linkage_ros.tools.models.planar import Closing, Frame, Planar, PlanarJoint
 
 # The connections of two bodies of a URDF: joints between them, through frames without a body.
