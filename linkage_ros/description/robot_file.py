@@ -167,8 +167,8 @@ class _Robot:
         self._urdf, self._told = urdf, {**urdf.start, **told}
         self._loops: list[UrdfLoop] = []
         taken = {*urdf.joints, *urdf.links}
-        for loop in (*urdf.loops, *map(self._read_close, close)):
-            name = loop.name
+        for number, loop in enumerate((*urdf.loops, *map(self._read_close, close)), 1):
+            name = f'{loop.name}_{number}' if loop.name in taken else loop.name
             while name in taken:
                 name += '_'
             taken.add(name)

@@ -73,6 +73,7 @@ PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
 
 _LARGEST_FILE = 10_000_000
 _MOST_JOINTS = 2000
+_MOST_LOOPS = 200
 
 
 class Inertial(NamedTuple):
@@ -249,7 +250,11 @@ class _Reader:
     def _read_loops(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[UrdfLoop]:
         """Yield what closes loops; of two at one place the first."""
         there = set()
-        for number, element in enumerate(each for each in root if each.tag in _LOOP_TAGS):
+        found = [each for each in root if each.tag in _LOOP_TAGS]
+        if len(found) > _MOST_LOOPS:
+            reason = f'has {len(found)} loops'
+            raise self._file_error('', reason, f'keep those that are needed: {_MOST_LOOPS}')
+        for number, element in enumerate(found):
             name = element.get('name') or f'{element.tag}{number + 1}'
             where, kind = f'{element.tag} {name}', element.get('type', '').removesuffix('_joint')
             ends = self._read_loop_ends(element, where, links)

@@ -438,7 +438,14 @@ def test_the_bag_of_a_robot_replays_without_its_urdf(tmp_path, monkeypatch, caps
 
 
 BAD = yaml.safe_load((ROBOTS / 'refused.yaml').read_text('utf-8'))
+MANY = [
+    f'<loop_joint name="a" type="spherical"><link1 link="bar1" xyz="{n} 0 0"/>'
+    f'<link2 link="foot" xyz="{n} 1 0"/></loop_joint>'
+    for n in range(3000)
+]
 LARGE = {
+    'LOOPS': ''.join(MANY),
+    'FEWER': ''.join(MANY[:198]),
     'PADDING': ' ' * 10_000_000,
     'JOINTS': ''.join(
         f'<joint name="j{n}" type="fixed"><parent link="foot"/><child link="k{n}"/></joint>'
