@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -22,6 +23,7 @@ from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
     closure_in_pose,
+    GROUND,
     GROUND_FRAME,
     SpaceClosure,
     SpaceLinkage,
@@ -65,6 +67,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     values = read_parameters(content, SPACE, {'slide': sliding})
     points = values['points']
     links = {link: tuple(names) for link, names in values.get('links', {}).items()}
+    _refuse_single_ends(content, values)
     joints: dict[str, dict[str, SpatialJoint]] = {}
     for kind in ('hinges', 'slides'):
         joints[kind] = {}
@@ -106,6 +109,25 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         },
         traced=values.get('traced', ()),
     )
+
+
+def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:
+    """Refuse a link that one joint alone names, almost as another is: a typo, but of gears."""
+    ratios = values.get('ratios', {})
+    geared = {*ratios, *(ratio.of for ratio in ratios.values())}
+    ends = [
+        (kind, joint, end, given[end])
+        for kind in ('hinges', 'slides', 'balls')
+        for joint, given in values.get(kind, {}).items()
+        for end in ('parent', 'child')
+    ]
+    named = Counter(link for *_, link in ends)
+    known = [GROUND, *values.get('links', {}), *(link for link in named if named[link] > 1)]
+    for kind, joint, end, link in ends:
+        is_single = link not in known and joint not in geared
+        if is_single and (remedy := did_you_mean(link, known, '')):
+            reason = f'{quote(link)} has no points and no other joint'
+            raise content.error(f'{kind}.{joint}.{end}', reason, remedy)
 
 
 def _hinges_of_ball(name: str, parent: str, child: str, at: Any) -> dict[str, SpatialJoint]:

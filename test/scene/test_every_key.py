@@ -241,3 +241,47 @@ def test_a_spatial_file_without_input_says_what_is_missing():
     del content['input']
     with pytest.raises(FileError, match=r"^rssr: the key 'input' is missing; add input: "):
         read_any_closure(parse_yaml(flow(content).encode(), 'rssr'))
+
+
+SPATIAL = [name for name, text in LINKAGES.items() if 'points' in yaml.safe_load(text)]
+
+
+@pytest.mark.parametrize('name', SPATIAL)
+def test_a_misspelt_link_of_a_joint_is_told_by_its_right_name(name):
+    content, random = yaml.safe_load(LINKAGES[name]), Random(name)
+    links = {'ground', *content.get('links', {})}
+    ends = [path for path in damaged_places(content) if path[-1] in ('parent', 'child')]
+    geared = {*content.get('ratios', {}), *(of['of'] for of in content.get('ratios', {}).values())}
+    for path in ends:
+        link = at(content, path)
+        if link not in links or len(link) < 4 or path[1] in geared:
+            continue
+        changed, place = deepcopy(content), random.randrange(len(link))
+        typo = link[:place] + link[place + 1 :]
+        if typo in links:
+            continue
+        at(changed, path[:-1])[path[-1]] = typo
+        error = refusal(lambda: read_any_closure(parse_yaml(flow(changed).encode(), 'x')))  # noqa: B023
+        assert error.key == '.'.join(path)
+        assert error.remedy.startswith('did you mean '), error
+
+
+STEWART = """
+points: {A: [0, 0, 0], B: [1, 0, 0], C: [0, 1, 0], P: [0, 0, 1], Q: [1, 0, 1], R: [0, 1, 1]}
+links: {base: [A, B, C], top: [P, Q, R]}
+struts: {a: [A, P], b: [B, P], c: [B, Q], d: [C, Q], e: [C, R], f: [A, R]}
+input: [a, b, c, d, e, f]
+"""
+
+
+@pytest.mark.parametrize(
+    ('base', 'reason', 'remedy'),
+    [
+        ('base', 'no link is called ground', 'call the one that stands still ground'),
+        ('ground', 'is held by one ball at most, and free', 'hang it on three slides and a ball'),
+    ],
+)
+def test_a_platform_on_struts_alone_is_told_what_carries_it(base, reason, remedy):
+    text = STEWART.replace('base', base)
+    with pytest.raises(FileError, match=f'{reason}; .*{remedy}'):
+        read_any_closure(parse_yaml(text.encode(), 'x'))

@@ -205,6 +205,10 @@ def _check_held(linkage: SpaceLinkage) -> None:
     """Refuse a link that a single ball holds, and a point that nothing carries."""
     carried = Counter(point for points in linkage.links.values() for point in points)
     ends = {end for joint in linkage.pair_joints.values() for end in (joint.parent, joint.child)}
+    if GROUND not in {*ends, *linkage.links}:
+        reason = f'no link is called {GROUND}'
+        raise DefinitionError('links', reason, f'call the one that stands still {GROUND}')
+    moved = {point for pair in linkage.struts.values() for point in pair}
     for link, points in linkage.links.items():
         if link in ends or link == GROUND:
             continue
@@ -215,11 +219,15 @@ def _check_held(linkage: SpaceLinkage) -> None:
                 reason = f'{quote(one)} and {quote(other)} are in one place'
                 raise DefinitionError(f'links.{link}', reason, 'name points apart')
         if sum(carried[point] > 1 for point in points) < 2:
-            raise DefinitionError(
-                f'links.{link}',
-                'is held by one ball at most, and free',
-                f'add the hinge of {quote(link)}, or name its points on the links that hold it',
+            remedy = (
+                f'add the hinge of {quote(link)}, or name its points on the links that hold it'
             )
+            if not moved.isdisjoint(points):
+                remedy = (
+                    'struts move it and hold nothing: hang it on three slides and a ball, as '
+                    'linkage gallery hexapod does'
+                )
+            raise DefinitionError(f'links.{link}', 'is held by one ball at most, and free', remedy)
     for name, (one, other) in linkage.struts.items():
         for point in (one, other):
             if not carried[point]:
