@@ -65,8 +65,9 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         unit = 'angle' if turns else f'length [{units.length}]'
         yield 'input', f'{given["joint"]}: {unit}'
     if account['redundant_equations']:
-        met = 'equations, met within the worst residual'
-        yield 'redundant', f'{account["redundant_equations"]} {met}'
+        count = account['redundant_equations']
+        equations = f'{count} equation{"s" * (count != 1)}'
+        yield 'redundant', f'{equations}, met within the worst residual'
     if account['robot_open_by_m'] is not None:
         open_by = units.format_length(account['robot_open_by_m'], '.2g')
         if turned_by := account['robot_turned_by_rad']:

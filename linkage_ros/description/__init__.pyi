@@ -122,6 +122,7 @@ from linkage_ros.description.tables import (
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.urdf_file import (
     MOVING as MOVING,
+    pin_frames as pin_frames,
     PLACE as PLACE,
     read_urdf as read_urdf,
     read_urdf_file as read_urdf_file,

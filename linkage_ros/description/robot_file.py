@@ -42,6 +42,7 @@ from linkage_ros.description.urdf_file import (
     LOOP_KINDS,
     LoopEnd,
     MOVING,
+    pin_frames,
     PLACE,
     read_urdf,
     UrdfFile,
@@ -165,20 +166,24 @@ class _Robot:
 
     def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
         self._urdf, self._told = urdf, {**urdf.start, **told}
+        self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
+        for joint in urdf.joints.values():
+            self._above[joint.child] = (joint, *self._above[joint.parent])
+        self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
         self._loops: list[UrdfLoop] = []
-        taken = {*urdf.joints, *urdf.links}
-        for number, loop in enumerate((*urdf.loops, *map(self._read_close, close)), 1):
+        taken, said = {*urdf.joints, *urdf.links}, [*urdf.loops, *map(self._read_close, close)]
+        there = {self._places_of(loop) for loop in said}
+        pins = [loop for loop in self._read_pins() if self._places_of(loop) not in there]
+        for number, loop in enumerate((*said, *pins), 1):
             name = f'{loop.name}_{number}' if loop.name in taken else loop.name
             while name in taken:
                 name += '_'
             taken.add(name)
             self._loops.append(loop._replace(name=name))
-        self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
-        for joint in urdf.joints.values():
-            self._above[joint.child] = (joint, *self._above[joint.parent])
         self._driven = tuple(driven) or urdf.inputs
         self._ratios = dict(self._find_ratios())
-        groups = [group for group in self._find_groups() if group[1]]
+        groups = self._find_groups()
+        groups = [group for group in groups if group[1]] or groups
         # The other leg of a robot, which another linkage may move, is left out.
         chosen = [group for group in groups if not self._driven or group[0] & {*self._driven}]
         self._loops = [loop for _, loops in chosen for loop in loops]
@@ -191,7 +196,6 @@ class _Robot:
         kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
         self._check(moving, known, kept, told)
-        self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
         frames = self._place_links({})
         places = [frames[urdf.joints[name].child].origin for name in self._moving]
         places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
@@ -268,6 +272,35 @@ class _Robot:
         if len(ends) != 2:
             raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
         return UrdfLoop(pair, kind, (ends[0], ends[1]))
+
+    def _read_pins(self) -> Iterator[UrdfLoop]:
+        """Yield the pins that frames called PIN_on_LINK say, and joints that Gazebo closes."""
+        for pin, (first, *others) in pin_frames(self._urdf).items():
+            for number, other in enumerate(others):
+                ends = LoopEnd(first, ZERO), LoopEnd(other, ZERO)
+                yield UrdfLoop(f'{pin}_{number}' if number else pin, 'ball', ends)
+        frames = self._place_links({}) if self._urdf.pinned else {}
+        for end, parent in self._urdf.pinned:
+            found = PLACE.fullmatch(end)
+            assert found
+            child, *place = found.groups()
+            x, y, z = map(float, place)
+            on_parent = frames[parent].locate(frames[child].place((x, y, z)))
+            ends = LoopEnd(child, (x, y, z)), LoopEnd(parent, on_parent)
+            yield UrdfLoop(f'{child}_on_{parent}', 'ball', ends)
+
+    def _places_of(self, loop: UrdfLoop) -> frozenset[tuple[str, Vector]]:
+        """Return the ends of a loop as places on links that move."""
+        found = set()
+        for end in loop.ends:
+            link, place = end.link, end.xyz
+            for joint in self._above[link]:
+                if joint.kind != 'fixed':
+                    break
+                link, place = joint.parent, self._bases[joint.name].place(place)
+            x, y, z = (round(one, 9) for one in place)
+            found.add((link, (x, y, z)))
+        return frozenset(found)
 
     def _ways(self, one: str, other: str) -> list[list[UrdfJoint]]:
         """Return the joints from two links up to their common ancestor."""

@@ -37,7 +37,7 @@ from xml.parsers.expat import ErrorString
 
 from linkage_ros.description.file_access import read_regular
 from linkage_ros.description.file_kinds import kind_of_bytes, kind_of_folder
-from linkage_ros.errors import FileError, LinkageError, list_names, quote
+from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names, quote
 from linkage_ros.kinematics import Limits, NO_LIMITS
 
 # The content of a URDF: links and joints by name.
@@ -158,6 +158,16 @@ class UrdfFile(NamedTuple):
         return [(_place_text(one), _place_text(other)) for one, other in pins]
 
 
+def pin_frames(urdf: UrdfFile) -> dict[str, list[str]]:
+    """Return the links that are called PIN_on_LINK and hang on LINK, by pin."""
+    found: dict[str, list[str]] = {}
+    for joint in urdf.joints.values():
+        name, on, parent = joint.child.rpartition(f'_on_{joint.parent}')
+        if on and name and not parent:
+            found.setdefault(name, []).append(joint.child)
+    return found
+
+
 def _place_text(end: LoopEnd) -> str:
     return f'{end.link}.{",".join(map(repr, end.xyz))}'
 
@@ -244,7 +254,7 @@ class _Reader:
             tuple(self._read_loops(root, links)),
             tuple(self._read_couplings(root, links)),
             tuple(self._pinned_places(root, links)),
-            tuple(_unread_tags(root)),
+            tuple(dict.fromkeys(_unread_tags(root))),
         )
 
     def _read_loops(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[UrdfLoop]:
@@ -445,7 +455,8 @@ class _Reader:
 
     def _checked_link(self, link: str, end: str, where: str, links: Mapping[str, UrdfLink]) -> str:
         if link not in links:
-            raise self._file_error(where, f'its {end} {quote(link)} is not a link', 'name a link')
+            remedy = did_you_mean(link, links, 'name a link')
+            raise self._file_error(where, f'its {end} {quote(link)} is not a link', remedy)
         return link
 
     def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
@@ -513,12 +524,16 @@ def _unread_tags(root: ET.Element) -> Iterator[str]:
             continue
         ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
+    others: dict[str, list[str]] = {}
     for element in root:
         kind = LOOP_KINDS.get(element.get('type', '').removesuffix('_joint'))
         if element.tag in _LOOP_TAGS and kind not in ('ball', 'hinge'):
-            yield f'<{element.tag}> {element.get("name", "")}, which is not a pin'
+            others.setdefault(element.tag, []).append(element.get('name', ''))
         elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
             yield f'<{element.tag}>'
+    for tag, names in others.items():
+        which = 'which are not pins' if names[1:] else 'which is not a pin'
+        yield f'<{tag}> {list_names(names)}, {which}'
 
 
 def _joints_below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:

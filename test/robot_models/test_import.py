@@ -11,6 +11,7 @@
 from cmath import phase, rect
 from math import cos, hypot, remainder, sin, tau
 
+from linkage_ros import load
 from linkage_ros.cli.main import main
 from linkage_ros.description import linkage_text, parse_yaml, read_linkage, read_urdf
 from linkage_ros.errors import FileError
@@ -270,6 +271,27 @@ def test_loop_tags_close_as_places_do(tags):
         assert joints['rocker_joint'] == pytest.approx(closed_values(crank)['rocker_joint'])
 
 
+@pytest.mark.parametrize('tags', [LOOP_CONSTRAINT, SDF_JOINT])
+def test_a_robot_that_import_takes_is_solved_as_it_is(tmp_path, tags):
+    """Its pins of Gazebo are where they are with all joints at 0: its frames are turned so."""
+    at = closed_values(0.5)
+    turned = ''.join(map(LINK, ('base', 'crank', 'coupler', 'rocker')))
+    turned += ''.join(
+        joint(f'{child}_joint', parent, child, f'{x} 0 0', f'0 0 {at[child + "_joint"]}',
+              axis='0 0 1')
+        for parent, child, x in (
+            ('base', 'crank', 0), ('crank', 'coupler', 0.1), ('base', 'rocker', 0.15),
+        )
+    )  # fmt: skip
+    file = tmp_path / 'robot.urdf'
+    file.write_text(robot(turned, tags))
+    closure = load(file, {'input': 'crank_joint'})
+    for crank in (0.5, 1.1, 2.0):
+        found = closure.position(crank - 0.5)
+        for name in ('coupler_joint', 'rocker_joint'):
+            assert found[name] == pytest.approx(closed_values(crank)[name] - at[name], abs=1e-12)
+
+
 def test_a_pin_of_gazebo_is_where_it_is_with_all_joints_at_0():
     """Frames are turned so that the loop is closed there, and its plane is tilted."""
     at = closed_values(0.5)
@@ -294,7 +316,10 @@ UNREAD = {
         '<pose>', '<pose relative_to="base">'
     ): 'joint pin of <gazebo>, between rocker and coupler',
     LOOP_JOINT.format('prismatic'): '<loop_joint> pin, which is not a pin',
-    '<closure type="ball"/>': '<closure>',
+    ''.join(
+        LOOP_JOINT.replace('"pin"', f'"{name}"').format('screw') for name in 'ab'
+    ): '<loop_joint> a, b, which are not pins',
+    50 * '<closure type="ball"/>': '<closure>',
 }
 
 
@@ -322,6 +347,10 @@ BAD = {
     'a loop tag of no link': (
         robot(TREE, LOOP_CONSTRAINT.replace('"coupler"', '"rod"')),
         "x.urdf: loop_constraint pin: its child 'rod' is not a link; name a link",
+    ),
+    'a loop tag of a link that is misspelt': (
+        robot(TREE, LOOP_CONSTRAINT.replace('"coupler"', '"couple"')),
+        "x.urdf: loop_constraint pin: its child 'couple' is not a link; did you mean 'coupler'?",
     ),
     'a loop tag without a place': (
         robot(TREE, LOOP_CONSTRAINT.replace('0.2 0 0', '0.2')),
@@ -415,6 +444,21 @@ def test_what_is_no_linkage(name):
         linkage_from_urdf(read_urdf(text.encode(), 'x.urdf'), *(close or [CLOSED]), ['j'])
     assert '\n' not in str(caught.value)
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ('inputs', 'line'),
+    [
+        ([], 'x.urdf: does not say which joint drives it; write --input JOINT, one of j'),
+        (['k'], 'x.urdf: --input k: drives no loop, and no joint that mimics it; write .*, one of j'),
+    ],
+)  # fmt: skip
+def test_what_joints_that_mimic_follow_has_to_be_said(inputs, line):
+    gear = joint('k', 'base', 'b', '1 0 0', axis='0 0 1', more='<mimic joint="j"/>')
+    urdf = read_urdf(robot(A_B, FLAT, gear).encode(), 'x.urdf')
+    with pytest.raises(FileError, match=f'^{line}$'):
+        linkage_from_urdf(urdf, (), inputs)
+    assert linkage_from_urdf(urdf, (), ['j']).linkage.ratios.keys() == {'k'}
 
 
 def test_what_drives_it_has_to_be_said():

@@ -42,16 +42,6 @@ def with_noise(text, random, size):
     return ET.tostring(robot, 'unicode')
 
 
-def cut_pins(text):
-    """Return the pairs of frames PIN_on_LINK that meet, which a planar model has."""
-    frames = {}
-    for joint in ET.fromstring(text).findall('joint'):
-        child, parent = (joint.find(end).get('link') for end in ('child', 'parent'))
-        if child.endswith(f'_on_{parent}'):
-            frames.setdefault(child.removesuffix(f'_on_{parent}'), []).append(child)
-    return [f'{first}={other}' for first, *others in frames.values() for other in others]
-
-
 @pytest.fixture(scope='module')
 def models():
     """Return models that have been written, by linkage."""
@@ -67,10 +57,10 @@ def test_noise_of_cad_and_the_order_of_joints_change_no_pose(tmp_path, models, n
     size = 10.0 ** random.uniform(*powers)
     file = tmp_path / 'robot.urdf'
     file.write_text(with_noise(models[name], random, size))
-    flat = name in linkage_names()
-    robot = load(file, {'close': cut_pins(models[name])} if flat else {})
+    robot = load(file)
     inputs = linkage.linkage.inputs
-    pose = usual_inputs(linkage) if flat else linkage.linkage.pose.inputs
+    is_flat = name in linkage_names()
+    pose = usual_inputs(linkage) if is_flat else linkage.linkage.pose.inputs
     closed = 0
     for _ in range(5):
         at = [
@@ -126,7 +116,7 @@ def ankle_urdf():
     yield '</robot>'
 
 
-def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_path, capsys):
+def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_path):
     file = tmp_path / 'ankle.urdf'
     file.write_text(''.join(ankle_urdf()))
     ankle = load(file, {'input': ['m1', 'm2']})
@@ -134,8 +124,15 @@ def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_pat
         found = ankle.position(*map(radians, at))
         for name, value in zip(ankle.joint_names, found.joints, strict=True):
             assert abs(value - radians(joints[name])) < 1e-8
-    assert main(['check', str(file), '--input', 'm1', '--input', 'm2']) == 0
-    assert 'places of the pose that are up to 7.8e-18 m apart' in capsys.readouterr().out
+    assert 6.9e-18 < ankle.linkage.merged_by < 8e-18
+
+
+def test_check_says_the_largest_distance_that_was_merged(tmp_path, capsys):
+    text = model_of('hooke_joint', urdf_model).decode()
+    text = text.replace('<origin xyz="0 0 0"', '<origin xyz="0 3e-10 4e-10"', 1)
+    (tmp_path / 'robot.urdf').write_text(text)
+    assert main(['check', str(tmp_path / 'robot.urdf')]) == 0
+    assert 'places of the pose that are up to 5e-10 m apart' in capsys.readouterr().out
 
 
 def test_hinges_a_hundred_thousandth_of_the_size_apart_are_two(tmp_path):

@@ -209,8 +209,16 @@ class _Import:
                     )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
-        followed = [joint.mimics for joint in urdf.joints.values() if joint.mimics]
-        if not self._loops.joints or not (self._closings or {*followed} & {*self._inputs}):
+        followed = dict.fromkeys(joint.mimics for joint in urdf.joints.values() if joint.mimics)
+        if followed and not self._closings and followed.keys().isdisjoint(self._inputs):
+            raise self._file_error(
+                f'--input {self._inputs[0]}' if self._inputs else '',
+                'drives no loop, and no joint that mimics it'
+                if self._inputs
+                else 'does not say which joint drives it',
+                f'write --input JOINT, one of {list_names(followed)}',
+            )
+        if not self._loops.joints or not (self._closings or followed):
             raise self._file_error(
                 '',
                 'closes no loop'

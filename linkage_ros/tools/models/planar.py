@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from math import cos, sin
 from typing import Any, NamedTuple
 
-from linkage_ros.description import MOVING, PLACE, UrdfFile, UrdfJoint, UrdfLink
+from linkage_ros.description import MOVING, pin_frames, PLACE, UrdfFile, UrdfJoint, UrdfLink
 from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Mass, NO_LIMITS
 import numpy as np
@@ -56,11 +56,7 @@ def find_closings(
 
     The origins of each pair of asked links coincide; a FileError if one of the two does not exist.
     """
-    found: dict[str, list[str]] = {}
-    for joint in urdf.joints.values():
-        name, on, parent = joint.child.rpartition(f'_on_{joint.parent}')
-        if on and name and not parent:
-            found.setdefault(name, []).append(joint.child)
+    found = pin_frames(urdf)
     closings = []
     for name in list(found):
         slider = name.removesuffix(_LINE)
@@ -71,11 +67,13 @@ def find_closings(
     for pair in asked:
         for link in pair:
             if link not in urdf.links:
+                place = PLACE.fullmatch(link)
+                named = place[1] if place else link
                 raise FileError(
                     urdf.file,
                     f'--close {"=".join(pair)}',
-                    f'there is no link {quote(link)}',
-                    did_you_mean(link, urdf.links, f'name two of {list_names(urdf.links)}'),
+                    f'there is no link {quote(named)}',
+                    did_you_mean(named, urdf.links, f'name two of {list_names(urdf.links)}'),
                 )
         if pair[0] == pair[1]:
             raise FileError(
