@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     file = named_file(arguments.file, 'linkages')
     content = linkage_content(file, robot_of(arguments))
     closure = read_any_closure(content, file.stem)
-    for note in linkage_notes(closure.linkage, content.units):
+    for note in linkage_notes(closure.linkage, content):
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
     units = arguments.angles = arguments.angles.of_file(content.units)
     with show_progress('parts examined') as advance:

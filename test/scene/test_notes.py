@@ -60,11 +60,51 @@ NOTES = {
     'lengths in millimetres': (
         'four_bar: {a: 40, b: 120, c: 80, d: 100}\n',
         'rate: 1000\n',
-        [('linkage.yaml: links.coupler: is 120 m long; if it is in millimetres, write units: mm')],
+        [
+            (
+                'linkage.yaml: links.coupler: is 120 m long; '
+                'if it is in millimetres, write units: mm; if in metres, units: m'
+            )
+        ],
     ),
     'lengths in millimetres that are named': (
         'units: mm\nfour_bar: {a: 40, b: 12000, c: 12000, d: 100}\n',
         'rate: 1000\n',
+        [],
+    ),
+    'lengths in metres that are named': (
+        'units: m\nfour_bar: {a: 40, b: 120, c: 80, d: 100}\n',
+        'rate: 1000\n',
+        [],
+    ),
+    'limits in radians where degrees are named': (
+        LIMITED.format('[-1.57, 0.5]') + 'angles: degrees\n',
+        '',
+        [
+            (
+                'linkage.yaml:6: angles: no limit is wider than 1.57 deg; '
+                'if limits are in radians, leave out angles: degrees'
+            )
+        ],
+    ),
+    'noise in degrees': (
+        FOUR_BAR,
+        'effects: {noise: {joints: {rocker_joint: {white: 4}, coupler_joint: {white: 5}}}}',
+        [
+            (
+                'scene.yaml:2: effects.noise.joints.rocker_joint.white: 4 rad is more than half a '
+                'turn; if it is in degrees, write angles: degrees'
+            )
+        ],
+    ),
+    'noise in degrees that are named': (
+        FOUR_BAR,
+        'angles: degrees\neffects: {noise: {joints: {rocker_joint: {white: 4}}}}',
+        [],
+    ),
+    'noise of a slide': (
+        (CONFIG / 'linkages' / 'slider_crank.yaml').read_text(),
+        'effects: {noise: {joints: {piston_slide: {white: 4}}}}',
         [],
     ),
     'a slide of many metres': (
@@ -126,3 +166,48 @@ def test_no_shipped_file_is_noted(kind):
     assert files
     for file in files:
         assert not list(scene_notes(load_scene(file)))
+
+
+SPATIAL = """
+points: {{A: [{0}, 0, 0], B: [{1}, {2}, {3}]}}
+links: {{crank: [A], rod: [A, B], rocker: [B]}}
+hinges:
+  crank_joint: {{parent: ground, child: crank, at: [0, 0, 0], axis: [0, 0, 1]}}
+  rocker_joint: {{parent: ground, child: rocker, at: [{4}, {5}, {6}], axis: [0, 1, 0.3]}}
+input: crank_joint
+"""
+FINGER = """
+links: {ground: {A: [0, 0], D: [9, 0]}, a: {A: [0, 0], B: [4, 0]},
+  b: {B: [0, 0], C: [9, 0]}, c: {D: [0, 0], C: [8, 0]}}
+input: {joint: crank_joint, parent: ground, child: a}
+assembly: {C: left}
+joints: {rocker_joint: {parent: ground, child: c}}
+masses: {b: {mass: 0.003, center: [4, 0], inertia: 0}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('text', 'note'),
+    [
+        (SPATIAL.format(40, 100, 20, 120, 150, 50, 30), 'links.ground: is 150 m long; '),
+        (SPATIAL.format(0.04, 0.1, 0.02, 0.12, 0.15, 0.05, 0.03), ''),
+        (FINGER, 'links.ground: is 9 m long; '),  # Nine metres of three grams
+        (FINGER.replace('0.003', '3'), ''),
+        (FINGER + 'units: mm', ''),
+    ],
+)
+def test_check_notes_lengths_in_metres_of_what_is_small(tmp_path, capsys, text, note):
+    file = tmp_path / 'linkage.yaml'
+    file.write_text(text)
+    assert main(['check', str(file)]) == 0
+    said = capsys.readouterr().err
+    assert said.count('note: ') == bool(note)
+    assert note in said
+
+
+@pytest.mark.parametrize(('ground', 'count'), [('100', 1), ('0.1', 0), ('5', 0)])
+def test_a_design_notes_a_ground_in_millimetres(ground, count, capsys):
+    pairs = ['--pair', '30', '60', '--pair', '60', '70', '--pair', '90', '85']
+    assert main(['synthesize', *pairs, '--ground', ground]) == 0
+    note = f'note: --ground: {ground} m is long; if it is in millimetres, divide by 1000\n'
+    assert capsys.readouterr().err.count(note) == count

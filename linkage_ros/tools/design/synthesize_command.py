@@ -61,6 +61,9 @@ _NOT_MET = 1
 _LISTED = 3
 """Default number of solutions that a search lists."""
 
+_LONG_GROUND = 10.0
+"""Length above which metres were probably mistaken for millimetres, in [m]."""
+
 EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
 
 
@@ -349,6 +352,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _run_design(arguments: argparse.Namespace) -> int:
+    if arguments.ground > _LONG_GROUND:
+        told = f'--ground: {arguments.ground:g} m is long; if it is in millimetres, divide by 1000'
+        print(f'linkage synthesize: note: {told}', file=sys.stderr)
     with show_progress('candidates') as advance:
         found, meeting = find_solutions(arguments, advance)
     needs, units = needs_of(arguments), arguments.angles

@@ -97,7 +97,7 @@ def build_model(
         found = _model_json(closure, name, text, content.units, inputs, drawn)
         if whole:
             found['others'] = _other_assemblies(closure, content)
-            found |= _analyse_linkage(closure, content.units)
+            found |= _analyse_linkage(closure, content)
     except DefinitionError as error:
         raise content.locate_error(error) from None
     return found
@@ -109,7 +109,7 @@ def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
     drawn = drawn_in_frames(prepare_view(closure, inputs))
     return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {
         'others': [],
-        **_analyse_linkage(closure, Units()),
+        **_analyse_linkage(closure, Section('', '', {'units': 'm'})),
     }
 
 
@@ -235,7 +235,7 @@ def _other_assemblies(closure: Closure, content: Section) -> list[dict[str, Any]
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 
 
-def _analyse_linkage(closure: Closure, units: Units) -> dict[str, Any]:
+def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
     """Return ranges, toggles, quality over the first input, and warnings."""
     sweep = InputSweep(closure, usual_inputs(closure))
     values: list[float] = []
@@ -253,7 +253,7 @@ def _analyse_linkage(closure: Closure, units: Units) -> dict[str, Any]:
         ],
         'quality': {'input': values, 'transmission_angle': angles, 'margin': conditioning},
         'warnings': list(
-            _linkage_warnings(closure, units, [each for each in angles if each is not None])
+            _linkage_warnings(closure, content, [each for each in angles if each is not None])
         ),
     }
 
@@ -269,8 +269,8 @@ def _quality_at(closure: Closure, sweep: InputSweep, value: float) -> tuple[floa
     return margin.transmission_angle, margin.conditioning
 
 
-def _linkage_warnings(closure: Closure, units: Units, angles: list[float]) -> Iterator[str]:
-    for note in linkage_notes(closure.linkage, units):
+def _linkage_warnings(closure: Closure, content: Section, angles: list[float]) -> Iterator[str]:
+    for note in linkage_notes(closure.linkage, content):
         yield str(note)
     if angles and min(angles) < _POOR:
         yield f'transmission angle down to {round(degrees(min(angles)), 2):g}°'
