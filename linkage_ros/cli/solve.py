@@ -47,6 +47,7 @@ from linkage_ros.kinematics import (
     InputSweep,
     Iterated,
     Position,
+    Status,
     StepwiseClosure,
 )
 from linkage_ros.resources import named_file
@@ -185,7 +186,26 @@ def _exchanged_table(
     if links:
         text = f'{list_names(links)} are solved by iteration, from the pose of the file'
         print(f'linkage solve: note: with {list_names(names)} as inputs {text}', file=sys.stderr)
+    _check_reached(inverse, arguments)
     return _forward_table(inverse, argparse.Namespace(**vars(arguments) | {'at': [typed]}))
+
+
+def _check_reached(inverse: StepwiseClosure, arguments: argparse.Namespace) -> None:
+    """Refuse values of joints that are not reached, as those of a single joint in the plane."""
+    typed = [value for _, value in arguments.joint]
+    given = read_inputs(inverse.linkage, typed, '--joint', arguments.angles)
+    position = inverse.position(*given)
+    option = ' '.join(f'--joint {name}={value:g}' for name, value in arguments.joint)
+    if position.status is Status.LIMITED:
+        reason = f'is reached only beyond limits: {inverse.limit_exceeded(position)}'
+        raise LinkageError(option, reason, 'ask for another value, or widen the limits')
+    if position.status.has_pose:
+        return
+    reason = f'is not reached: the loops are {position.status.value}'
+    if position.gap:
+        reason += f' by {arguments.angles.format_length(position.gap, ".3g")}'
+    ranges = _reach_text(inverse, given, arguments.angles)
+    raise LinkageError(option, reason, ranges or 'ask for other values')
 
 
 def _inverse_table(
@@ -243,16 +263,20 @@ def _show_reach(
 ) -> None:
     """Say once where the linkage closes, if it does not at an input that was typed."""
     for given in typed:
-        ranges = () if closure.position(*given).joints else InputSweep(closure, given).ranges
-        if ranges:
-            ends = [
-                [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
-                for one in ranges
-            ]
-            text = ' and '.join(f'from {low} to {high}' for low, high in ends)
-            name = closure.linkage.inputs[0].joint
-            print(f'linkage solve: note: {name} closes {text}', file=sys.stderr)
+        reach = '' if closure.position(*given).joints else _reach_text(closure, given, angles)
+        if reach:
+            print(f'linkage solve: note: {reach}', file=sys.stderr)
             return
+
+
+def _reach_text(closure: StepwiseClosure, given: tuple[float, ...], angles: DisplayUnits) -> str:
+    """Return where a linkage closes by its first input; '' if nowhere."""
+    ends = [
+        [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
+        for one in InputSweep(closure, given).ranges
+    ]
+    text = ' and '.join(f'from {low} to {high}' for low, high in ends)
+    return f'{closure.linkage.inputs[0].joint} closes {text}' if ends else ''
 
 
 class Question(NamedTuple):

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import repeat
+from itertools import pairwise, repeat
 from math import inf, isfinite, isnan
 from re import fullmatch
 from typing import Any, cast
@@ -186,9 +186,11 @@ class Section:
         if not _is_pair(value) or not all(map(isfinite, value)):
             remedy = 'write two finite numbers: [x, y]'
             if isinstance(value, list) and len(value) > 2 and all(map(_is_number, value)):
-                whole = all(float(part).is_integer() for part in value)
-                comma = '; a decimal has a point, not a comma: [0.040, 0]'
-                remedy += comma if whole else '; a planar linkage has no z'
+                remedy += (
+                    '; a decimal has a point, not a comma: [0.040, 0]'
+                    if _has_decimal_comma(value)
+                    else '; a planar linkage has no z'
+                )
             raise self.error(key, f'{quote(value)} is not a point', remedy)
         x, y = (self._to_si(key, part, unit) for part in value)
         self._check_most(key, value, (x, y), most, unit)
@@ -353,6 +355,13 @@ class Section:
                 raise self.error('', f'the key {key!r} is missing', f'add {key}: {expected}')
             return default
         return self._content[key]
+
+
+def _has_decimal_comma(numbers: Sequence[float]) -> bool:
+    """Return whether two numbers with commas, such as 0,040 and 0, may have been typed."""
+    if not all(float(part).is_integer() for part in numbers):
+        return False
+    return len(numbers) > 3 or any(one == 0 < other for one, other in pairwise(numbers))
 
 
 def _is_number(value: Any) -> bool:

@@ -15,8 +15,10 @@ import csv
 import io
 from math import acos, radians, remainder, tau
 from pathlib import Path
+from random import Random
 
 from linkage_ros import load
+from linkage_ros.cli.main import main
 import pytest
 
 from .conftest import Run
@@ -63,6 +65,35 @@ def test_as_many_joints_as_inputs_become_inputs(linkage: Run) -> None:
     )
     assert position['right_elbow'] == pytest.approx(1.4, abs=1e-14)
     assert position['left_elbow'] == pytest.approx(-1.2, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ('name', 'joints'),
+    [
+        ('four_bar', ['rocker_joint']), ('rssr', ['rocker_joint']), ('five_bar', ['left_elbow',
+         'right_elbow']), ('wishbone', ['upper_joint', 'rack']),
+        ('spherical_four_bar', ['rocker']),
+    ],
+)  # fmt: skip
+def test_values_that_are_not_reached_are_refused_in_plane_and_space(
+    name: str, joints: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    random, seen = Random(48), set()
+    for _ in range(12):
+        typed = [f'{joint}={random.uniform(-3.0, 3.0):.3f}' for joint in joints]
+        asked = [word for value in typed for word in ('--joint', value)]
+        code = main(['solve', name, *asked, '--radians', '--csv'])
+        said = capsys.readouterr()
+        seen.add(code)
+        rows = list(csv.DictReader(io.StringIO(said.out)))
+        if code == 0:
+            assert {row['status'] for row in rows} <= {'closed', 'toggle', 'change point'}
+        else:
+            assert (code, rows) == (2, [])
+            (line,) = [one for one in said.err.splitlines() if 'note: ' not in one]
+            assert line.startswith(f'linkage solve: --joint {joints[0]}=')
+            assert ': is not reached' in line
+    assert 2 in seen
 
 
 def three_arms() -> str:

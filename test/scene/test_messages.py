@@ -73,6 +73,14 @@ LINKAGES = {
             'a decimal has a point, not a comma: [0.040, 0]'
         ),
     ),
+    'three numbers': (
+        LINKAGE,
+        ('A: [0.040, 0]', 'A: [40, 0, 0]'),
+        (
+            ':4: links.crank.A: [40, 0, 0] is not a point; write two finite numbers: [x, y]; '
+            'a planar linkage has no z'
+        ),
+    ),
     'a slip in the name of a pin': (
         LINKAGE,
         ('lever:   {E: [0, 0], D:', 'lever:   {E: [0, 0], C:'),
