@@ -262,3 +262,12 @@ def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
     loaded = run_python('import sys, linkage_ros.node.node; print(*sys.modules)').split()
     assert 'linkage_ros.node.node' in loaded
     assert 'tools' not in packages(loaded)
+
+
+def test_a_motor_without_play_imports_no_second_mass(tmp_path):
+    for drive, is_there in (
+        ('torque: {motor: {torque_constant: 0.02, resistance: 1}}', False),
+        ('torque: {play: {width: 0.01, inertia: 1.0e-4}}', True),
+    ):
+        look = Look(tmp_path, f'rate: 100\ndrive: {{{drive}}}')
+        assert ('linkage_ros.dynamics.two_masses' in look.modules) == is_there

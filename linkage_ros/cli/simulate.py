@@ -23,6 +23,7 @@ from contextlib import closing
 from math import nan
 from os import cpu_count
 from pathlib import Path
+import re
 import sys
 from tempfile import TemporaryDirectory
 from threading import Event
@@ -62,7 +63,12 @@ from linkage_ros.workbench import find_tool
 EXAMPLE = 'linkage simulate torque_crank --seconds 1 -o my_run.csv'
 
 _MOST_NAMED = 3
-"""Runs that failed and are named."""
+"""Reasons of runs that failed and are named."""
+
+_NUMBER = re.compile(r'[-+.\d]+(?:e[-+]?\d+)?')
+
+_Failure = tuple[Settings, str]
+"""The settings of a run that failed, and why."""
 
 _WHOLE = ('run', 'seed', 'ticks', 'messages')
 
@@ -253,8 +259,10 @@ def _write_results(
     output, found = arguments.output, finished.outcomes
     failed = [(runs[number], found[number].failure) for number in sorted(found)
               if found[number].failure]  # fmt: skip
-    for given, failure in failed[:_MOST_NAMED]:
-        _print_note(f'{_settings_text(given)}: {failure}')
+    for alike in _group_by_reason(failed)[:_MOST_NAMED]:
+        given, failure = alike[0]
+        others = f'; likewise {len(alike) - 1} other runs' if alike[1:] else ''
+        _print_note(f'{_settings_text(given)}: {failure}{others}')
     if failed:
         _print_note(f'{len(failed)} of {len(runs)} runs failed')
     if len(failed) == len(runs):
@@ -270,6 +278,14 @@ def _write_results(
         print(picture)
     finished.remove_file()
     return 0
+
+
+def _group_by_reason(failed: Sequence[_Failure]) -> list[list[_Failure]]:
+    """Return the failed runs by their reason, whatever the numbers in it."""
+    alike: dict[str, list[_Failure]] = {}
+    for one in failed:
+        alike.setdefault(_NUMBER.sub('', one[1]), []).append(one)
+    return [*alike.values()]
 
 
 def _print_note(text: str) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 from linkage_ros.description.parameters import (
     choice,
     declare,
+    example_of,
     Keys,
     Kind,
     named_mapping,
@@ -57,7 +58,8 @@ class Named(Kind):
     names: Schema | None = None
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        named, values = content.section(key), {}
+        named = content.section(key, example=lambda name: self._example_for(name, parts))
+        values = {}
         if self.most is not None and len(named.mapping) > self.most:
             count = len(named.mapping)
             raise content.error(key, f'there are {count}', f'write at most {self.most}')
@@ -68,6 +70,13 @@ class Named(Kind):
                 named.units = replace(named.units, slides=name in parts['slide'])
             values[name] = self.of.read(named, name, parts, folder)
         return values
+
+    def example(self, parts: Parts) -> str:
+        return self._example_for('', parts)
+
+    def _example_for(self, name: str, parts: Parts) -> str:
+        of_one = self.of.example(parts)
+        return of_one if name else f'{{name: {of_one}}}'
 
     def json_schema(self) -> Schema:
         schema = named_mapping(self.meaning, self.of.json_schema())
@@ -83,7 +92,11 @@ class OneOrMore(Kind):
     of: Keys
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> list[Any]:
-        return [read_parameters(one, self.of, parts, folder) for one in content.sections(key)]
+        found = content.sections(key, example=lambda _: self.example(parts))
+        return [read_parameters(one, self.of, parts, folder) for one in found]
+
+    def example(self, parts: Parts) -> str:
+        return example_of(self.of, parts)
 
     def json_schema(self) -> Schema:
         return one_or_more(self.meaning, parameters_schema(self.of))

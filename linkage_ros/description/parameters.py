@@ -20,6 +20,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING, replace
+from functools import partial
 from math import inf
 from os.path import join
 from re import fullmatch
@@ -68,6 +69,10 @@ class Kind(ABC):
     @abstractmethod
     def json_schema(self) -> Schema:
         """Return the JSON Schema of the value."""
+
+    def example(self, _parts: Parts) -> str:
+        """Return a value as it is written; '…' if only a user knows one."""
+        return '…'
 
     def values_text(self) -> str:
         """Return the allowed values, for a table of parameters; '' for what no parameter is."""
@@ -162,6 +167,12 @@ class Number(Kind):
             schema |= {'if': {'exclusiveMinimum': 0}, 'then': least}
         return schema
 
+    def example(self, _parts: Parts) -> str:
+        least = max(self.least, self.unless_zero)
+        fit = (n for n in (1, 0.1, 0.01, 1e-3, 1e-4) if least <= n <= self.most and n > self.above)
+        bound = self.least if self.least > -inf else self.most
+        return number_text(1 if self.whole and least <= 1 <= self.most else next(fit, bound))
+
     def values_text(self) -> str:
         least, most, above = map(number_text, (self.least, self.most, self.above))
         if self.above > -inf:
@@ -189,6 +200,9 @@ class NumberList(Kind):
     def json_schema(self) -> Schema:
         items = {'type': 'number', **_bounds_schema(-self.most, self.most, unit=self.unit)}
         return self._described_schema(type='array', items=items)
+
+    def example(self, _parts: Parts) -> str:
+        return '[0.1, 0.2]'
 
     def values_text(self) -> str:
         return f'a list of numbers{_each_at_most(self.most)}'
@@ -232,6 +246,10 @@ class RowsOf(Kind):
         description = f'{self.meaning}: rows of {row}'
         return {'description': description, 'type': 'array', 'minItems': 1, 'items': items}
 
+    def example(self, _parts: Parts) -> str:
+        rows = (', '.join([str(number)] * len(self.columns)) for number in (0, 1))
+        return f'[{", ".join(f"[{row}]" for row in rows)}]'
+
     def values_text(self) -> str:
         return f'rows of [{", ".join(self.columns)}]{_each_at_most(self.most)}'
 
@@ -245,6 +263,9 @@ class Flag(Kind):
 
     def json_schema(self) -> Schema:
         return self._described_schema(type='boolean')
+
+    def example(self, _parts: Parts) -> str:
+        return 'true'
 
     def values_text(self) -> str:
         return 'true or false'
@@ -264,6 +285,9 @@ class ChoiceOf(Kind):
 
     def json_schema(self) -> Schema:
         return self._described_schema(enum=list(self.words))
+
+    def example(self, _parts: Parts) -> str:
+        return self.words[0]
 
     def values_text(self) -> str:
         return ' or '.join(self.words)
@@ -294,6 +318,9 @@ class File(TextOf):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
         return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
 
+    def example(self, _parts: Parts) -> str:
+        return 'my_bag'
+
     def values_text(self) -> str:
         return 'a file'
 
@@ -310,6 +337,9 @@ class Name(Kind):
     def json_schema(self) -> Schema:
         # It cannot know the existing names.
         return TextOf(f'{self.meaning} (name of a {KINDS[self.kind]})').json_schema()
+
+    def example(self, parts: Parts) -> str:
+        return next(iter(parts.get(self.kind, ())), '…')
 
     def values_text(self) -> str:
         return f'a {KINDS[self.kind]}'
@@ -341,6 +371,9 @@ class NamesOf(Name):
             'items': TextOf('a name').json_schema(),
         }
 
+    def example(self, parts: Parts) -> str:
+        return f'[{Name.example(self, parts)}]'
+
     def values_text(self) -> str:
         return f'names, each of a {KINDS[self.kind]}'
 
@@ -359,7 +392,7 @@ class Each(Name):
         return ParameterGroup('', self.of) if isinstance(self.of, type) else self.of
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        inner, values = content.section(key), {}
+        inner, values = content.section(key, example=partial(self._example_for, parts)), {}
         for name in inner:
             part = self._known_name(inner, name, name, parts)
             if sliding := _SLIDING.get(self.kind):
@@ -370,6 +403,15 @@ class Each(Name):
     def json_schema(self) -> Schema:
         of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.json_schema()
         return named_mapping(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
+
+    def example(self, parts: Parts) -> str:
+        return self._example_for(parts, '')
+
+    def _example_for(self, parts: Parts, name: str) -> str:
+        of_one = self._value_kind.example(parts)
+        if name:
+            return of_one if name in parts.get(self.kind, ()) else ''
+        return f'{{{Name.example(self, parts)}: {of_one}}}'
 
     @property
     def part_keys(self) -> tuple[str, ...]:
@@ -400,7 +442,11 @@ class ParameterGroup(Kind):
     of: Any
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        return read_parameters(content.section(key), self.of, parts, folder)
+        inner = content.section(key, example=lambda _: self.example(parts))
+        return read_parameters(inner, self.of, parts, folder)
+
+    def example(self, parts: Parts) -> str:
+        return example_of(self.of, parts)
 
     def json_schema(self) -> Schema:
         return {**parameters_schema(self.of), 'description': self.meaning}
@@ -537,6 +583,12 @@ def default_of(entry: Field[Any]) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     return list(value) if isinstance(value, tuple) else value
+
+
+def example_of(of: Any, parts: Parts) -> str:
+    """Return a section of a parameter type as it is written: with the keys that it must have."""
+    must = [(entry.name, kind) for entry, kind in declared_fields(of) if is_required(entry)]
+    return f'{{{", ".join(f"{name}: {kind.example(parts)}" for name, kind in must)}}}'
 
 
 def first_docstring_line(parameters: Any) -> str:

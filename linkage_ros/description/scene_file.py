@@ -29,8 +29,10 @@ from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
 from linkage_ros.description.scene_grammar import (
     DRIVE,
     drive_name,
+    drive_section,
     effect_types,
     EFFECTS_BY_NAME,
+    effects_section,
     OF_A_LINKAGE,
     SCENE,
 )
@@ -384,8 +386,10 @@ def _read_scene_linkage(
     def section_with(key: str) -> Section:
         return own if key in own else scene
 
-    drive = drive_name(section_with('drive').section('drive', required=False))
-    effects = section_with('effects').section('effects', required=False)
+    drive = drive_name(drive_section(section_with('drive')))
+    effects = effects_section(
+        section_with('effects'), lambda: parts_of(read_any_closure(linkage_content).linkage)
+    )
     published = OF_A_LINKAGE.read_key(section_with('publish_input'), 'publish_input', {})
     not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     types = effect_types(effects, not_imported)
@@ -445,7 +449,7 @@ def _refuse_in_space(
     drives = section_with('drive')
     if drive == 'torque':
         raise drives.error('drive.torque', reason, 'drive it by topic or at a given motion')
-    topic = drives.section('drive', required=False)
+    topic = drive_section(drives)
     if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
     for key in ('loads', 'robot_description'):

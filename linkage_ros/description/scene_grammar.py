@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 import json
 from pathlib import Path
@@ -30,6 +30,7 @@ from linkage_ros.description.parameters import (
     choice,
     declare,
     declared_fields,
+    example_of,
     flag,
     is_required,
     Keys,
@@ -92,9 +93,11 @@ class _DriveChoice(Kind):
     """One drive, read as its name and parameters."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, Any]:
-        drives = content.section(key, required=False)
+        drives = drive_section(content, key)
         name = drive_name(drives)
-        driven = drives.section(name, required=False)
+        driven = drives.section(
+            name, required=False, example=lambda _: example_of(drive_class(name), parts)
+        )
         return name, read_parameters(driven, drive_class(name), parts, folder)
 
     def json_schema(self) -> Schema:
@@ -106,11 +109,12 @@ class _Effects(Kind):
     """Effects, read as their parameters by name; the part 'left_out' has those not imported."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        effects = content.section(key, required=False)
+        effects = effects_section(content, lambda: parts, key)
         types = effect_types(effects, parts['left_out'])
-        values = {
-            name: read_parameters(effects.section(name), of, parts) for name, of in types.items()
-        }
+        values = {}
+        for name, of in types.items():
+            named = effects.section(name, example=lambda _, of=of: example_of(of, parts))
+            values[name] = read_parameters(named, of, parts)
         effects.finish(tuple(EFFECTS))
         return values
 
@@ -123,6 +127,28 @@ class _Effects(Kind):
             'additionalProperties': True,
         }
         return {**mapping_schema(self.meaning, effects), 'patternProperties': {_DOTTED: own}}
+
+
+def drive_section(content: Section, key: str = 'drive') -> Section:
+    """Return the mapping with the drive; an error shows an example."""
+
+    def example(name: str) -> str:
+        if not name:
+            return '{topic: {}}'
+        return example_of(drive_class(name), {}) if name in DRIVES else ''
+
+    return content.section(key, required=False, example=example)
+
+
+def effects_section(content: Section, parts: Callable[[], Parts], key: str = 'effects') -> Section:
+    """Return the mapping of effects; an error shows an example, with names from ``parts``."""
+
+    def example(name: str) -> str:
+        if not name:
+            return '{velocity: {}}'
+        return example_of(effect_class(name), parts()) if name in EFFECTS else ''
+
+    return content.section(key, required=False, example=example)
 
 
 def effect_types(effects: Section, left_out: Sequence[str]) -> dict[str, Any]:
@@ -139,6 +165,9 @@ def effect_types(effects: Section, left_out: Sequence[str]) -> dict[str, Any]:
 
 class _SpringEnd(TextOf):
     """A point of a link, read as the names of both."""
+
+    def example(self, parts: Parts) -> str:
+        return next(iter(parts.get('point', ())), '…')
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
         link, dot, point_name = content.text(key).rpartition('.')
@@ -269,14 +298,16 @@ class _FaultKind(Kind):
         from linkage_ros.stages.faults import FaultEntry, FAULTS  # local import: for few scenes
 
         name = content.ros_name(key)
-        content = content.section(key)
+        content = content.section(key, example=lambda kind: self._example_for(kind, parts))
         kinds = [kind for kind in content if kind in FAULTS]
         for stranger in () if kinds else content:
             if remedy := did_you_mean(stranger, FAULTS, ''):
                 raise content.error(stranger, 'unknown key', remedy)
         if len(kinds) != 1:
             raise content.error('', *kinds_of_fault(name, kinds))
-        parameters = read_parameters(content.section(kinds[0]), FAULTS[kinds[0]], parts)
+        of = FAULTS[kinds[0]]
+        injected = content.section(kinds[0], example=lambda _: example_of(of, parts))
+        parameters = read_parameters(injected, of, parts)
         at = _WHEN.read_key(content, 'at', parts) or ()
         if any(time < 0.0 for time in at):
             raise content.error(
@@ -285,6 +316,16 @@ class _FaultKind(Kind):
         seconds = _WHEN.read_key(content, 'seconds', parts) if at else 0.0
         content.finish(tuple(_WHEN.entries))
         return FaultEntry(kinds[0], parameters, at, seconds)
+
+    def example(self, parts: Parts) -> str:
+        return self._example_for('', parts)
+
+    def _example_for(self, kind: str, parts: Parts) -> str:
+        from linkage_ros.stages.faults import FAULTS  # local import: as above
+
+        if kind:
+            return example_of(FAULTS[kind], parts) if kind in FAULTS else ''
+        return f'{{silence: {example_of(FAULTS["silence"], parts)}}}'
 
     def json_schema(self) -> Schema:
         from linkage_ros.stages.faults import FAULTS  # local import: as above

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, repeat
 from math import inf, isfinite, isnan
 from re import fullmatch
@@ -226,27 +226,36 @@ class Section:
         self._check_most(key, value, filter(isfinite, (low, high)), most, unit)
         return low, high
 
-    def section(self, key: str, *, required: bool = True) -> Section:
-        """Return a nested mapping; an empty one if it is absent and not required."""
+    def section(
+        self, key: str, *, required: bool = True, example: Callable[[str], str] | None = None
+    ) -> Section:
+        """
+        Return a nested mapping; an empty one if it is absent and not required.
+
+        Where something else stands, the error shows an ``example``: of what belongs to a name that
+        stands there, or of the mapping for the name ''.
+        """
         value = self._take_value(key, None if required else {}, 'a mapping')
         line = self._line_of(key)
         if not isinstance(value, dict):
-            remedy = f'write {key}: {_as_mapping(value)}'
+            remedy = f'write {key}: {_as_mapping(value, example)}'
             reason = 'is empty' if value is None else f'{quote(value)} is not a mapping'
             raise self.error(key, reason, remedy)
         path = '.'.join(filter(None, (self._path, key)))
         return Section(self.file, path, value, line, self.units)
 
-    def sections(self, key: str) -> list[Section]:
-        """Return one mapping, or a list of them."""
+    def sections(self, key: str, *, example: Callable[[str], str] | None = None) -> list[Section]:
+        """Return one mapping, or a list of them; ``example`` is as for `section`."""
         value = self._take_value(key, None, 'a mapping')
         if not isinstance(value, list):
-            return [self.section(key)]
+            return [self.section(key, example=example)]
         found = []
         for i, item in enumerate(value, 1):
             path = '.'.join(filter(None, (self._path, f'{key}[{i}]')))
             if not isinstance(item, dict):
-                raise self.error(key, f'{quote(item)} is not a mapping', 'write {…}')
+                raise self.error(
+                    key, f'{quote(item)} is not a mapping', f'write {_as_mapping(item, example)}'
+                )
             found.append(Section(self.file, path, item, self._line_of(key), self.units))
         if not found:
             raise self.error(key, 'the list is empty', 'name at least one')
@@ -376,12 +385,15 @@ def _is_pair(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
 
 
-def _as_mapping(value: Any) -> str:
-    """Return how a mapping of names is written, for names that stand there without one."""
+def _as_mapping(value: Any, example: Callable[[str], str] | None) -> str:
+    """Return how a mapping is written, with the names that stand there without one."""
+    example = example or (lambda name: '{}' if name else '{…}')
     names = value if isinstance(value, list) else [value]
-    if not names or not all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names):
-        return '{…}'
-    return f'{{{list_names(f"{name}: {{}}" for name in names)}}}'
+    named = names and all(isinstance(name, str) and fullmatch(r'\w+', name) for name in names)
+    found = {name: example(name) for name in names} if named else {}
+    if not all(found.values()) or not found:
+        return example('')
+    return f'{{{list_names(f"{name}: {of}" for name, of in found.items())}}}'
 
 
 def _unit_text(unit: str) -> str:

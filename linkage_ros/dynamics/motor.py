@@ -34,15 +34,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import copysign, inf
-from typing import Any, TypeVar
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.dynamics.laws import LawTerm
 from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
-from linkage_ros.dynamics.two_masses import TwoMasses
 
-Driven = TypeVar('Driven', SingleDofMechanism, TwoMasses)
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.two_masses import TwoMasses
+
+Driven = TypeVar('Driven', SingleDofMechanism, 'TwoMasses')
 
 _AT_INPUT = LawTerm(1.0, 0.0, 1.0)
 _RESTING = -1

@@ -31,7 +31,6 @@ from linkage_ros.replay.replay import (
     replay_all as replay_all,
     replay_ticks as replay_ticks,
     ReplayedTick as ReplayedTick,
-    Rerun as Rerun,
     turn_fault as turn_fault,
     user_effects_here as user_effects_here,
     versions_here as versions_here,

@@ -145,6 +145,17 @@ def test_a_run_that_fails_is_named_and_loses_no_other(noisy, capsys):
     assert not Path('y.csv').exists()
 
 
+def test_runs_that_fail_for_one_reason_name_it_once(noisy, capsys):
+    # The numbers in the reason are those of the runs.
+    values = ','.join(f'-{value}' for value in range(1, 6))
+    assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--sweep', f'rate={values}',
+                 '--workers', '1', '-o', 'x.csv']) == 1  # fmt: skip
+    named, counted = capsys.readouterr().err.splitlines()
+    assert named.startswith('linkage simulate: rate=-1: ')
+    assert named.endswith('; likewise 4 other runs')
+    assert counted == 'linkage simulate: 5 of 5 runs failed'
+
+
 def test_the_spread_is_drawn(noisy):
     assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--seeds', '3', '--workers', '1',
                  '-o', 'x.parquet', '--picture', 'x.svg']) == 0  # fmt: skip

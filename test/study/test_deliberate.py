@@ -165,6 +165,15 @@ def test_rows_of_a_scene() -> None:
     assert by_name['encoder'].after is None
 
 
+def test_few_lost_states_are_not_told_as_none() -> None:
+    # One of 1,000 ticks publishes nothing.
+    knobs = measure_deliberate(
+        scene_of('faults: {f: {silence: {}, at: [0.5], seconds: 0.001}}'), quick=True, horizon=1.0
+    )
+    (note,) = [knob.note for knob in knobs if knob.name == 'fault f']
+    assert note == 'nothing is published at 0.1 % of the ticks'
+
+
 def test_a_torque_scene_says_after_which_time() -> None:
     scene = scene_of(
         'effects: {friction: {joints: {O2: {viscous: 1.0e-4}}}}\nloads: {gravity: [0, -9.81]}\n',

@@ -8,6 +8,7 @@
 
 """What cannot be measured is one line; what can has knobs whose own settings are the scene's."""
 
+from importlib import import_module
 from math import cos, inf, sin
 
 from linkage_ros.bag import BagWriter, Topic
@@ -230,3 +231,28 @@ def test_a_bag_gives_motion_rate_and_delay(tmp_path):
 
 
 PENDULUM_SCENE = 'linkage: pendulum.yaml\nrate: 1000\n'
+
+
+@pytest.mark.parametrize(('seconds', 'finest'), [(1e9, 16), (0.0, 4)])
+def test_of_a_winding_the_step_is_divided_as_the_note_says(tmp_path, monkeypatch, seconds, finest):
+    # A winding has no exact motion, and the time decides how short a step stands in for it.
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: four_bar\nrate: 200\nloads: {gravity: [0, -9.81], drive_inertia: 1.0e-3}\n'
+        'drive: {torque: {start: 1.0, step: 0.002, motor: {torque_constant: 0.02, '
+        'resistance: 1.5, ratio: 10, inductance: 0.02, command: voltage, voltage: 12}}}\n'
+    )
+    scene = load_scene(tmp_path / 'scene.yaml')
+    (motion,) = motions_of(scene, None, 0.5)
+    steps, module = [], import_module('linkage_ros.tools.study.drive_step')
+    cranks_at = module.cranks_at
+
+    def spied(motion, times, **changes):
+        steps.append(changes.get('step', 0.002))
+        return cranks_at(motion, times, **changes)
+
+    monkeypatch.setattr(module, 'cranks_at', spied)
+    knob, _ = measure_drive_step(motion, scene.rate, 0.5, quick=True, seconds=seconds)
+    assert f'the drive at 1/{finest} of its step' in knob.note
+    assert min(steps) == pytest.approx(0.002 / finest)
+    assert steps.count(min(steps)) == 1
+    assert steps.count(2.0 * min(steps)) == 1

@@ -28,6 +28,12 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
 
     Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
+    if (count := len(closure.linkage.inputs)) > 1:
+        raise DefinitionError(
+            'drive.topic.joint',
+            f'one joint does not determine {count} inputs',
+            'leave it out, and send the inputs; or name other joints as inputs of the linkage',
+        )
     try:
         return closure.driven_by(joint, branch=number or None)
     except DefinitionError as error:

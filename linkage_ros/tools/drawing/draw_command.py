@@ -97,8 +97,11 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     content = linkage_content(named)
     is_dxf = arguments.output and arguments.output.suffix.lower() == '.dxf'
     if 'points' in content and (arguments.assemblies or is_dxf):
-        remedy = 'leave --assemblies out, and name an SVG, PNG or PDF'
-        raise LinkageError(arguments.file, 'is a spatial linkage', remedy)
+        remedies = [
+            *(['leave --assemblies out'] if arguments.assemblies else []),
+            *([f'write -o {arguments.output.with_suffix(".svg")}'] if is_dxf else []),
+        ]
+        raise LinkageError(arguments.file, 'is a spatial linkage', ', and '.join(remedies))
     for option in () if 'points' in content else ('azimuth', 'elevation'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')

@@ -61,7 +61,7 @@ def time_text(time: Spread) -> str:
 
 
 def share_text(share: float) -> str:
-    """Return a share of a core: 0.6 %."""
+    """Return a share, as of a core: 0.6 %."""
     percent = 100.0 * abs(share)
     sign = '−' if share < 0.0 else ''
     if percent < 0.005:

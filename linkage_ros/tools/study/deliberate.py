@@ -30,7 +30,7 @@ from linkage_ros.replay import turning_joints
 from linkage_ros.stages.effects import effects_requiring, ForceEffect, in_order
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.budget import JointError, Knob, Setting
-from linkage_ros.tools.study.budget_text import ALL_TOGETHER
+from linkage_ros.tools.study.budget_text import ALL_TOGETHER, share_text
 from linkage_ros.tools.study.measuring import Progress
 from linkage_ros.tools.study.prices import Feed, price_scenes, turn_crank, USUAL_RATE
 
@@ -241,6 +241,6 @@ def measure_deliberate(
 def _variant_note(variant: _Variant, found: Difference) -> str:
     parts = [
         variant.note,
-        f'nothing is published at {found.silent:.0%} of the ticks' if found.silent else '',
+        f'nothing is published at {share_text(found.silent)} of the ticks' if found.silent else '',
     ]
     return '; '.join(filter(None, parts))

@@ -142,12 +142,13 @@ def exact_cranks(
     """
     Return the exact motion at some times, in [ns], and its own error.
 
-    Where the drive itself stands in for it, its step is divided by up to ``finest``. A
+    Where the drive itself stands in for it, its step is divided by ``finest``. A
     LinkageError is raised if the motion ends before the last time.
     """
     use: TorqueDrive = motion.scene_linkage.drive[1]
     if _stands_in(use):
-        one, other = (cranks_at(motion, times, step=max(_SHORTEST, use.step / n)) for n in (16, 8))
+        steps = (max(_SHORTEST, use.step / finest), max(2.0 * _SHORTEST, 2.0 * use.step / finest))
+        one, other = (cranks_at(motion, times, step=step) for step in steps)
         part = 3.0
     else:
         one, other = (_integrate_exactly(motion, times, factor) for factor in (1.0, 10.0))
