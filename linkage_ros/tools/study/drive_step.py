@@ -84,7 +84,9 @@ def measure_drive_step(
     ticks = draw_ticks(rate, horizon, _TICKS)
     own = cranks_at(motion, ticks)
     taken = process_time() - begun
-    price = _measure_price(motion, rate, horizon, 0.3 if quick else 2.0)
+    # However little time it has, it repeats some runs.
+    span, time = (0.2, 0.3) if quick else (1.0, 2.0)
+    price = _measure_price(motion, rate, min(horizon, span), time)
     finest = next((n for n in (16, 8) if 1.5 * n * taken <= seconds), 4)
     exact, doubt = exact_cranks(motion, ticks, finest)
     joints, _ = joints_at(motion.closure, exact)
@@ -127,7 +129,7 @@ def measure_drive_step(
 def _measure_price(motion: LinkageMotion, rate: float, horizon: float, seconds: float) -> Price:
     """Return what the drive takes of a tick, with its commands."""
     period = NANOSECONDS / rate
-    ticks = [round(index * period) for index in range(1, max(2, int(min(horizon, 1.0) * rate)))]
+    ticks = [round(index * period) for index in range(1, max(2, int(horizon * rate)))]
 
     def run() -> None:
         cranks_at(motion, ticks)

@@ -37,7 +37,7 @@ _SHARES = {ERRORS: 0.7, EFFECTS: 0.2, RECORDING: 0.1}
 
 _QUICK_LEFT_OUT = '--quick: steps of a drive beyond its half and double, some rates, repetitions'
 
-_QUICK_RUN = 0.6
+_QUICK_RUN = 0.9
 """Longest time that one run of the torque drives may take in a quick measurement, in [s]."""
 
 
