@@ -291,11 +291,21 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
     }
 
 
+_FIRST_DATE = 946_684_800
+"""Begin of the year 2000, in [s]: nothing was recorded before."""
+
+
 def local_time_text(time: int | None) -> str | None:
-    """Return a time in [ns] as local date and time, to the nanosecond."""
+    """
+    Return a time in [ns] as local date and time, to the nanosecond.
+
+    A simulated clock begins near 0: its times have no date.
+    """
     if time is None:
         return None
     seconds, rest = divmod(time, 1_000_000_000)
+    if 0 <= seconds < _FIRST_DATE:
+        return f'{seconds}.{rest:09d} s of a simulated clock'
     there = datetime.fromtimestamp(seconds).astimezone()
     return f'{there:%Y-%m-%d %H:%M:%S}.{rest:09d}{there:%z}'
 

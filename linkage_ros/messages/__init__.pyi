@@ -20,6 +20,7 @@ from linkage_ros.messages.joint_state import (
     with_every_number as with_every_number,
 )
 from linkage_ros.messages.joint_values import (
+    ACCELERATION as ACCELERATION,
     EFFORT as EFFORT,
     FORCE_X as FORCE_X,
     JOINT_STATE_TYPE as JOINT_STATE_TYPE,

@@ -23,8 +23,11 @@ from linkage_ros.tools.drawing.drawn_linkage import draw_linkage as draw_linkage
 from linkage_ros.tools.drawing.dxf import links_dxf as links_dxf
 from linkage_ros.tools.drawing.figure import (
     assemblies_picture as assemblies_picture,
+    label_joints as label_joints,
     paint_linkage as paint_linkage,
     paint_picture as paint_picture,
+    plot_joints as plot_joints,
+    stacked_axes as stacked_axes,
 )
 from linkage_ros.tools.drawing.painting import (
     degree_step as degree_step,

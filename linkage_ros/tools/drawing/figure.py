@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil, degrees, sqrt
 from pathlib import Path
 from textwrap import fill, wrap
@@ -49,6 +49,9 @@ from linkage_ros.tools.drawing.painting import (
     set_plane,
     show_lengths,
 )
+
+_DASHES: tuple[Any, ...] = ('-', (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
+"""Whole, dashed, dotted, and both: four times as many curves as colours are told apart."""
 
 
 def _pose_text(shown: LinkageView) -> str:
@@ -206,9 +209,24 @@ def paint_background(axes: Any, drawn: DrawnLinkage) -> None:
 
 def joint_axes(place: Any, joints: Sequence[Curve]) -> dict[bool, Any]:
     """Return the axes for angles (key True) and for slides (False), above each other."""
-    kinds = sorted({joint.turning for joint in joints}, reverse=True)
-    panels = place.subgridspec(len(kinds), 1).subplots(sharex=True, squeeze=False)[:, 0]
-    return dict(zip(kinds, panels, strict=True))
+    return stacked_axes(place.subgridspec, [joints])[0]
+
+
+def stacked_axes(
+    add_grid: Callable[..., Any], parts: Sequence[Sequence[Curve]]
+) -> list[dict[bool, Any]]:
+    """Return the axes of each part, as `joint_axes`, all above each other with one left edge."""
+    kinds = [sorted({joint.turning for joint in part}, reverse=True) for part in parts]
+    panels = iter(add_grid(sum(map(len, kinds)), 1).subplots(sharex=True, squeeze=False)[:, 0])
+    return [{kind: next(panels) for kind in of_part} for of_part in kinds]
+
+
+def curve_look(index: int) -> dict[str, Any]:
+    """Return colour and dashes of a curve: after the last colour they begin anew, in dashes."""
+    return {
+        'color': COLOURS[index % len(COLOURS)],
+        'linestyle': _DASHES[index // len(COLOURS) % len(_DASHES)],
+    }
 
 
 def plot_joints(
@@ -227,7 +245,7 @@ def plot_joints(
         (lines[joint.name],) = panels[joint.turning].plot(
             [degrees(x) for x in joint.x] if degrees_x else joint.x,
             [degrees(y) for y in joint.y] if joint.turning else joint.y,
-            color=COLOURS[index % len(COLOURS)],
+            **curve_look(index),
             linewidth=1.3,
             label=picture_text(joint.name, 40),
         )

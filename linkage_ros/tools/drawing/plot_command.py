@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-Draw the joints of a bag, and their rates, over its crank or over time.
+Draw the joints of a bag, their rates and accelerations, over its crank or over time.
 
 Of several linkages the first is drawn. A curve breaks at lost ticks, and where none was published.
 """
@@ -15,7 +15,8 @@ Of several linkages the first is drawn. A curve breaks at lost ticks, and where 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import nan, pi, tau
 from pathlib import Path
 from threading import Event
@@ -30,6 +31,7 @@ from linkage_ros.cli import (
     PICTURES,
     scene_of,
 )
+from linkage_ros.description import Scene
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics import (
     Closure,
@@ -42,11 +44,18 @@ from linkage_ros.kinematics import (
     SpaceClosure,
     sweep_range,
 )
-from linkage_ros.messages import JointStateReader, NANOSECONDS, Rejection
+from linkage_ros.messages import (
+    ACCELERATION,
+    JointStateReader,
+    MessageValues,
+    NANOSECONDS,
+    Rejection,
+)
 from linkage_ros.names import picture_text
 from linkage_ros.replay import replay_ticks
 from linkage_ros.signals import StoppedError
-from linkage_ros.tools.drawing.figure import joint_axes, label_joints, plot_joints
+from linkage_ros.tick import Pipeline
+from linkage_ros.tools.drawing.figure import label_joints, plot_joints, stacked_axes
 from linkage_ros.tools.drawing.painting import picture_settings, save_picture, show_lengths
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +67,9 @@ Values = tuple[float, ...]
 
 _STEADY, _UNSTEADY = 1.5, 5.0
 """Usual steps that make a gap, of ticks at a rate and of ticks that come with samples."""
+
+_PER = {'rate': 's', 'acceleration': 's²'}
+"""What the unit of a derivative has below it."""
 
 EXAMPLE = 'linkage plot my_bag -o my_bag.png'
 
@@ -95,7 +107,7 @@ def draw_bag(
     trust_effects: bool = False,
 ) -> None:
     """
-    Draw a bag: each published joint, and its rate if recorded, over the crank or over time.
+    Draw a bag: each published joint, and its rate and acceleration if they were recorded.
 
     Angles are continuous over the range of the crank, as in `linkage draw`, in whichever turn they
     were recorded. A LinkageError is raised if matplotlib is not installed, or the bag holds
@@ -111,7 +123,9 @@ def draw_bag(
     cranks: list[Values] = []
     positions: list[Values] = []
     rates: list[Values] = []
-    for at, recorded, _, tick in replay_ticks(bag, scene):
+    accelerations: list[Values] = []
+    read_accelerations = _acceleration_reader(scene)
+    for at, recorded, extras, tick in replay_ticks(bag, scene):
         if stop.is_set():
             raise StoppedError
         crank_state = tick.states[0].crank
@@ -126,22 +140,44 @@ def draw_bag(
         cranks.append(tuple(crank_state.angles))
         positions.append(sample.angles)
         rates.append(sample.rates or ())
+        accelerations.append(read_accelerations(extras))
     if not positions:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
     seconds = (np.array(times) - times[0]) / NANOSECONDS
     gaps = is_after_gap(seconds, steady=scene.rate > 0.0)
-    if over_time:
-        recorded_joints = cranks, positions, rates
-        joints, joint_rates = curves_over_time(
-            scene_linkage.linkage, seconds, *recorded_joints, gaps
-        )
-    else:
-        joints, joint_rates = crank_curves(scene_linkage.linkage, cranks, positions, rates, gaps)
+    curves = partial(curves_over_time, scene_linkage.linkage, seconds)
+    if not over_time:
+        curves = partial(crank_curves, scene_linkage.linkage)
+    joints, joint_rates = curves(cranks, positions, rates, gaps)
+    joint_accelerations = (
+        curves(cranks, positions, accelerations, gaps)[1] if any(accelerations) else []
+    )
     if not joints:
         raise BagError(bag_path, 'holds no joint but its crank', 'name another bag')
     title = f'{scene.name}: {len(positions)} joint states'
     driven = None if over_time else scene_linkage.linkage.inputs[0]
-    _paint_curves(title, driven, joints, joint_rates, picture)
+    derivatives = {'rate': joint_rates, 'acceleration': joint_accelerations}
+    _paint_curves(title, driven, joints, derivatives, picture)
+
+
+def _acceleration_reader(scene: Scene) -> Callable[[Sequence[bytes]], Values]:
+    """Return a function that reads the first linkage's accelerations from a tick's messages."""
+    linkage = Pipeline(scene).linkages[0]
+    types = [extra.message for extra in linkage.extras]
+    if 'acceleration' not in linkage.scene_linkage.effects:
+        return lambda _: ()
+    place = [extra.effect for extra in linkage.extras].index('acceleration')
+    read = MessageValues(types[place]).read
+    keys = [(name, ACCELERATION) for name in linkage.scene_linkage.joint_names]
+
+    def read_accelerations(extras: Sequence[bytes]) -> Values:
+        values = read(extras[place]) if place < len(extras) and extras[place] else ''
+        if isinstance(values, str):
+            return ()
+        numbers = dict(zip(values.keys, values.numbers, strict=True))
+        return tuple(numbers[key] for key in keys) if numbers.keys() >= {*keys} else ()
+
+    return read_accelerations
 
 
 def is_after_gap(times: Floats, *, steady: bool) -> Bools:
@@ -263,29 +299,29 @@ def _paint_curves(
     title: str,
     driven: Input | None,
     joints: Sequence[Curve],
-    rates: Sequence[Curve],
+    derivatives: Mapping[str, Sequence[Curve]],
     picture: Path,
 ) -> None:
-    """Paint curves over the crank; over time, if none is driven."""
+    """Paint joints and their derivatives over the crank; over time, if none is driven."""
     context = picture_settings()
     from matplotlib.figure import Figure  # local import: an extra, and slow to load
     from matplotlib.ticker import AutoLocator
 
-    parts = [part for part in (joints, rates) if part]
+    parts = {'': joints} | {name: part for name, part in derivatives.items() if part}
     panels_each = len({joint.turning for joint in joints})
     with context:
         figure = Figure(
             figsize=(8.0, 0.8 + 2.6 * panels_each * len(parts)), dpi=120, layout='constrained'
         )
-        grid = figure.add_gridspec(len(parts), 1)
+        stacked = stacked_axes(figure.add_gridspec, [*parts.values()])
         drawn = []
         in_degrees = driven is not None and not driven.slider
-        for index, part in enumerate(parts):
-            panels = joint_axes(grid[index], part)
+        for panels, (name, part) in zip(stacked, parts.items(), strict=True):
             drawn.append((panels, part, plot_joints(panels, part, degrees_x=in_degrees)))
-            for axes in panels.values() if part is rates else ():
+            for axes in panels.values() if name else ():
                 axes.yaxis.set_major_locator(AutoLocator())
-                axes.set_ylabel(f'rate of {axes.get_ylabel()[:-1]}/s]')
+                quantity = axes.get_ylabel()[:-1]
+                axes.set_ylabel(f'{name} of {quantity}/{_PER[name]}]')
         lowest = list(drawn[-1][0].values())[-1]
         if driven is None:
             lowest.set_xlabel('time since the first joint state [s]')
@@ -296,6 +332,7 @@ def _paint_curves(
         else:
             lowest.set_xlabel(f'{picture_text(driven.joint)} [°]')
         figure.suptitle(picture_text(title, 160))
+        figure.align_ylabels()
         figure.draw_without_rendering()  # only now axes and texts have a size
         for panels, part, lines in drawn:
             label_joints(panels, part, lines)

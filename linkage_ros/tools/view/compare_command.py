@@ -38,8 +38,18 @@ from linkage_ros.cli import (
 )
 from linkage_ros.description import Units
 from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
+from linkage_ros.kinematics import Curve
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, MessageValues, POSITION
+from linkage_ros.names import picture_text
 from linkage_ros.replay import Deviation, recorded_scene, TickPlace, turning_joints
+from linkage_ros.tools.drawing import (
+    is_after_gap,
+    label_joints,
+    picture_settings,
+    plot_joints,
+    save_picture,
+    stacked_axes,
+)
 from linkage_ros.tools.view.report import DecimatedCurves
 import numpy as np
 
@@ -170,7 +180,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     }
     picture = arguments.output is not None and arguments.output.suffix.lower() in PICTURES
     if picture:
-        _draw_differences(differences, turning, arguments.output)
+        title = f'{arguments.other.name} against {arguments.bag.name}'
+        _draw_differences(differences, turning, title, arguments.output)
     head = (
         f'{account["other"]} against {account["bag"]}: {account["compared"]} joint states, '
         f'{account["seconds"]:.3f} s'
@@ -235,36 +246,47 @@ def _compare_states(
 
 
 def _draw_differences(
-    differences: BagDifferences, turning: Mapping[str, bool], file: Path
+    differences: BagDifferences, turning: Mapping[str, bool], title: str, file: Path
 ) -> None:
-    from linkage_ros.tools.drawing import picture_settings, save_picture
-
+    """Draw the least and the greatest difference of each joint over the time."""
     context = picture_settings()
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
+    from matplotlib.ticker import AutoLocator
 
-    times, lows, highs = differences.difference_curves()
-    kinds = [(True, '°', 180.0 / pi), (False, 'mm', 1e3)]
-    panels = [
-        (unit, scale, columns)
-        for turns, unit, scale in kinds
-        if (
-            columns := [
-                index
-                for index, name in enumerate(differences.positions)
-                if turning.get(name, True) == turns
-            ]
+    times, *ends = differences.difference_curves()
+    # A curve begins anew where states are missing.
+    gaps = np.flatnonzero(is_after_gap(times, steady=True))
+    times, lows, highs = (np.insert(each, gaps, np.nan, axis=0) for each in (times, *ends))
+    curves = [
+        Curve(
+            name,
+            turning.get(name, True),
+            tuple(times.tolist()),
+            tuple((0.5 * (lows + highs))[:, column].tolist()),
         )
+        for column, name in enumerate(differences.positions)
     ]
+    panels = len({curve.turning for curve in curves})
     with context:
-        figure = Figure(figsize=(8.0, 0.8 + 2.8 * len(panels)), dpi=120, layout='constrained')
-        for place, (unit, scale, columns) in enumerate(panels, 1):
-            axes = figure.add_subplot(len(panels), 1, place)
-            for column in columns:
-                name = escape_unprintable(differences.positions[column]).replace('$', r'\$')
-                low, high = lows[:, column] * scale, highs[:, column] * scale
-                (line,) = axes.plot(times, (low + high) / 2.0, label=name, linewidth=0.8)
-                axes.fill_between(times, low, high, color=line.get_color(), alpha=0.4, linewidth=0)
-            axes.set_ylabel(f'difference [{unit}]')
-            axes.legend(loc='upper right', fontsize=7)
-        axes.set_xlabel('time [s]')
+        figure = Figure(figsize=(8.0, 0.8 + 2.6 * panels), dpi=120, layout='constrained')
+        (axes_of,) = stacked_axes(figure.add_gridspec, [curves])
+        lines = plot_joints(axes_of, curves, degrees_x=False)
+        for column, curve in enumerate(curves):
+            low, high = (np.degrees(each) if curve.turning else each for each in (lows, highs))
+            axes_of[curve.turning].fill_between(
+                times,
+                low[:, column],
+                high[:, column],
+                color=lines[curve.name].get_color(),
+                alpha=0.3,
+                linewidth=0,
+            )
+        for axes in axes_of.values():
+            axes.yaxis.set_major_locator(AutoLocator())
+            axes.set_ylabel(f'difference of {axes.get_ylabel()}')
+        axes.set_xlabel('time since the first joint state [s]')
+        figure.suptitle(picture_text(title, 160))
+        figure.align_ylabels()
+        figure.draw_without_rendering()  # only now axes and texts have a size
+        label_joints(axes_of, curves, lines)
         save_picture(figure, file)
