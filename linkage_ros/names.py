@@ -10,8 +10,8 @@ r"""
 Names in generated text, where they are data whatever they hold: one function for each target.
 
 Links, points, joints, files and scenes are named by whoever wrote them. A library that writes a
-whole format (XML, HTML, JSON, Parquet) needs no help from here, and `errors.clean` writes a name
-for a terminal.
+whole format (XML, HTML, JSON, Parquet) needs no help from here, and `errors.escape_unprintable`
+writes a name for a terminal.
 """
 
 from __future__ import annotations

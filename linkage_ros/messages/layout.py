@@ -108,9 +108,9 @@ def parse_message(data: bytes, fields: Iterable[Field], most: int = 2**32) -> di
     """
     Return the declared fields of a message by name; bytes after its end are ignored.
 
-    A string is returned as bytes, numbers as their places: `Numbers`. A MalformedError says that
-    it is not of this type, incomplete, or has more than ``most`` elements in a sequence of strings
-    or nests.
+    A string is returned as bytes, numbers as their places: `NumberArray`. A MalformedError says
+    that it is not of this type, incomplete, or has more than ``most`` elements in a sequence of
+    strings or nests.
     """
     byte_order(data)
     try:

@@ -116,7 +116,9 @@ class RunState:
     counts: Counts  # Counts of the loop, as read at this instant
     clock: int  # Time of the node's clock, in [ns]
     recording: RunRecording
-    limits: Mapping[str, float]  # Warning threshold for each attribute of `Nearness`; 0: never
+    limits: Mapping[
+        str, float
+    ]  # Warning threshold for each attribute of `SingularityMargin`; 0: never
     is_simulated: bool = False  # Whether a simulation's clock decides when to tick
     start: int = 0  # Time of the activation, in [ns] of the steady clock
     crank_topic: str = ''  # Resolved name of the drives' topic; '' for none

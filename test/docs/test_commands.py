@@ -31,13 +31,13 @@ WITH_COMMANDS = [
 
 NOT_RUN = {
     'builds .venv, and runs all tests': 1,
-    'installs from a package index': 4,
+    'installs from a package index': 5,
     'needs Gazebo': 1,
     'needs PlotJuggler': 1,
     'needs RViz': 1,
     'needs a ROS installation with ros2_control': 1,
     'needs a ROS installation': 19,
-    'needs a second machine': 1,
+    'needs a second machine': 3,
     'needs a demo that runs in another terminal': 1,
     'needs the ros2 command line': 2,
     'opens a browser': 3,

@@ -157,7 +157,7 @@ class MechanismEffect(Effect):
         by itself.
     is_compiled
         Whether its stage is compiled with the linkage: it takes functions from
-        `kinematics.arithmetic`, and calls those that know numbers alone by its `called`.
+        `kinematics.arithmetic`.
     gives
         Field of the reading that it fills; '' for none.
 

@@ -9,7 +9,7 @@
 """
 What a hand on the page changes: a pin that is dragged, a length that is typed, another input.
 
-Each edit makes a new linkage of the old one; `files.linkage_rewriting` writes it into the text.
+Each edit makes a new linkage of the old one; `view.linkage_rewriting` writes it into the text.
 A link whose first point is the origin of its frame, and whose second lies on its x axis, keeps
 that form: when one of the two is moved, its frame turns with them, and its centre of mass keeps
 its share of the length. A pin in a slot moves along the slot.
