@@ -2,6 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 DEMO := .venv/.demo_installed
 STAMP := .venv/.installed
+BENCH := .venv/.bench_installed
 LOG := .venv/install.log
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 # A lock file lists every package, so nothing is resolved. Python compiles a module at its first
@@ -10,6 +11,8 @@ PIP_INSTALL := $(PIP) install --no-deps --no-compile
 UV_INSTALL := $(BIN)/python -m uv pip install --quiet --python $(BIN)/python --no-deps
 LOCK := uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes \
   --no-header --no-annotate setup.py
+# What fmpy and trimesh use to compile models and to trace rays; nothing here does (0.1 GB).
+UNUSED := --no-emit-package cmake --no-emit-package embreex
 
 # Another ROS may be sourced in this shell. Its libraries, packages and settings stay out.
 unexport PYTHONPATH PYTHONHOME PYTHONUSERBASE PYTHONSAFEPATH PYTHONSTARTUP LD_LIBRARY_PATH
@@ -106,8 +109,14 @@ $(DEMO): setup.py requirements/demo.txt
 	@touch $@
 
 $(STAMP): $(DEMO) requirements/dev.txt
-	@echo '.venv: installing what tests, measurements and documentation need (some 2 GB more)'
+	@echo '.venv: installing what tests and documentation need (some 1.5 GB more)'
 	@$(call install_by,requirements/dev.txt)
+	@$(say_size)
+	@touch $@
+
+$(BENCH): $(STAMP) requirements/bench.txt
+	@echo '.venv: installing what is compared with (some 0.8 GB more)'
+	@$(call install_by,requirements/bench.txt)
 	@$(say_size)
 	@touch $@
 
@@ -151,7 +160,7 @@ test_nodes: $(STAMP)
 test_rest: $(STAMP)
 	@renice -n 19 $$$$ >/dev/null; $(call tests,rest,-m 'not ros' --numprocesses auto $(BY_FILE))
 
-bench: $(STAMP)
+bench: $(BENCH)
 	@$(BIN)/python -m bench
 
 timing: $(STAMP)
@@ -235,8 +244,9 @@ docs: $(STAMP)
 	@echo 'build/docs/index.html'
 
 lock: $(STAMP)
-	$(BIN)/$(LOCK) --extra dev --output-file requirements/dev.txt
+	$(BIN)/$(LOCK) $(UNUSED) --extra dev --output-file requirements/dev.txt
 	$(BIN)/$(LOCK) --constraint requirements/dev.txt --extra demo --output-file requirements/demo.txt
+	$(BIN)/$(LOCK) --constraint requirements/dev.txt --extra bench --output-file requirements/bench.txt
 	$(BIN)/$(LOCK) --constraint requirements/dev.txt --output-file requirements/run.txt
 
 # What the wheel needs in an environment of its own, since .venv has much more.

@@ -105,8 +105,9 @@ TEST = [
     *FMU,
     *VIEW,
 ]
-# Other implementations, to compare the speed. Pinocchio (pin) also checks robot models.
-BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'casadi', 'pin']
+# `make bench`: another implementation, to compare the speed, and Pinocchio, which then reads robot
+# models in the tests too.
+BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'pin']
 # The bill of materials of a release.
 RELEASE = ['cyclonedx-bom>=7']
 STYLE = [
@@ -164,6 +165,7 @@ setup(
     install_requires=['numpy>=1.26,<3', 'mcap>=1.2,<2', 'PyYAML>=6,<7'],
     extras_require={
         'arrays': ARRAYS,
+        'bench': BENCH,
         'ros': ROS,
         'demo': DEMO,
         'report': REPORT,
@@ -176,7 +178,7 @@ setup(
         'test': TEST,
         'view': VIEW,
         'dev': [
-            *(*DEMO, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON),
+            *(*DEMO, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *STYLE, *COLCON),
             *RELEASE,
         ],
     },

@@ -234,7 +234,7 @@ class InverseClosure(Closure):
         import numpy as np  # local import: the batch alone needs it
 
         columns = columns_of('inputs', inputs[0]) if len(inputs) == 1 else None
-        (given,) = self._single_input('inputs', columns or inputs)
+        (given,) = self._single_input('inputs', tuple(columns or inputs))
         values = to_doubles('inputs', given)
         speeds = np.broadcast_to(
             to_doubles('rates', 1.0 if rates is None else rates), values.shape

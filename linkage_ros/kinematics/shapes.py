@@ -57,6 +57,7 @@ _FLAT = 1e-6
 """Largest distance of collinear points from their line, relative to its length."""
 
 _ARC = pi / 8.0
+_PITCH_PARTS = 72  # Of a pitch circle, which may be as large as the picture
 
 _PULLEYS = 0.6
 """Sum of the radii of two pulleys, relative to the distance of their pins."""
@@ -286,7 +287,8 @@ def _pitch_circles(pose: _DrawnPose) -> Iterator[tuple[str, Shape]]:
         if not radius:
             continue
         for link, centre, r in zip(turning, (one, other), radii, strict=True):
-            places = [centre + rect(r, pose.angles[link] + k * _ARC / 2.0) for k in range(33)]
+            turns = [pose.angles[link] + k * tau / _PITCH_PARTS for k in range(_PITCH_PARTS + 1)]
+            places = [centre + rect(r, turn) for turn in turns]
             for k, place in enumerate(places[1:]):
                 yield link, Segment('rail', name, places[k], place)
             yield link, Segment('rail', name, centre, places[0])

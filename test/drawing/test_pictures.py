@@ -20,6 +20,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.resources import linkage_names, named_file
 from linkage_ros.tools.drawing import degree_step, figure as drawing, paint_picture
+from linkage_ros.tools.drawing.painting import NAME_INK
 import pytest
 
 pytest.importorskip('matplotlib')
@@ -55,6 +56,18 @@ def nearer(written: list[tuple[str, Any]], apart: float) -> list[tuple[str, str]
     ]
 
 
+def struck_by_leaders(axes: Any) -> list[str]:
+    """Return the names that a line from a name to its place passes through."""
+    struck = []
+    for leader in (line for line in axes.lines if line.get_color() == NAME_INK):
+        (x0, y0), (x1, y1) = axes.transData.transform(leader.get_xydata())
+        for name, b in map(box, axes.texts):
+            on_way = [(x0 + (x1 - x0) * k / 200.0, y0 + (y1 - y0) * k / 200.0) for k in range(201)]
+            if any(b.x0 < x < b.x1 and b.y0 < y < b.y1 for x, y in on_way):
+                struck.append(name)
+    return struck
+
+
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', linkage_names())
 def test_names_are_apart_and_all_texts_are_within_the_picture(name):
@@ -62,6 +75,7 @@ def test_names_are_apart_and_all_texts_are_within_the_picture(name):
     names = [box(text) for text in figure.axes[0].texts]
     assert {*load(name).linkage.links} - {'ground'} <= {text for text, _ in names}
     assert nearer(names, _APART) == []
+    assert struck_by_leaders(figure.axes[0]) == []
     others = [
         box(text)
         for axes in figure.axes

@@ -8,7 +8,7 @@
 
 """Shapes in metres: what is drawn is where the closure says that it is."""
 
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import cos, pi, remainder, sin, tau
 from pathlib import Path
 import random
@@ -217,6 +217,34 @@ def test_a_whole_turn_of_an_outline_is_one_turn():
     assert len(outline) == 16
     assert all(abs(place) == pytest.approx(1.0) for place in outline)
     assert tau / len(outline) == pytest.approx(pi / 8.0)
+
+
+GEARED = """
+links:
+  ground: {O: [0, 0], P: [0.06, 0], Q: [0.15, 0]}
+  sun: {O: [0, 0], A: [0.03, 0]}
+  planet: {P: [0, 0], B: [0.02, 0]}
+  rod: {B: [0, 0], C: [0.09, 0]}
+  lever: {Q: [0, 0], C: [0.05, 0]}
+input: {joint: sun_joint, parent: ground, child: sun}
+assembly: {C: left}
+joints: {planet_joint: {parent: ground, child: planet}}
+ratios: {planet_joint: {of: sun_joint, ratio: -2}}
+"""
+
+
+def test_pitch_circles_are_round_and_meet():
+    """A chord leaves its circle by less than a tenth of a pixel of a circle 200 pixels wide."""
+    closure = Closure(read_linkage(parse_yaml(GEARED.encode(), 'x.yaml')))
+    shapes = draw_shapes(closure, closure.position(0.4), 0.002, {})
+    chords = [s for s in shapes if isinstance(s, Segment) and s.name == 'planet_joint']
+    for centre, radius in ((0j, 0.04), (0.06, 0.02)):  # as the ratio divides the distance
+        ends = [s for s in chords if abs(abs(s.start - centre) - radius) < 1e-12]
+        ends = [s for s in ends if abs(abs(s.end - centre) - radius) < 1e-12]
+        assert all(one.end == other.start for one, other in pairwise(ends))
+        assert ends[0].start == pytest.approx(ends[-1].end, abs=1e-12)
+        sagitta = max(radius - abs(0.5 * (s.start + s.end) - centre) for s in ends)
+        assert sagitta / radius < 0.1 / 100.0
 
 
 @pytest.mark.parametrize('ratio', [1.0, 1e3, 1e6, 1e9])

@@ -64,7 +64,7 @@ def wanted(root, extra):
             yield requirement
 
 
-@pytest.mark.parametrize('name', ['dev.txt', 'demo.txt', 'run.txt'])
+@pytest.mark.parametrize('name', ['bench.txt', 'dev.txt', 'demo.txt', 'run.txt'])
 def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
     found = pins(root / 'requirements' / name)
     assert found
@@ -78,7 +78,14 @@ def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
 @pytest.mark.parametrize('python', PYTHONS)
 @pytest.mark.parametrize(
     ('name', 'extra'),
-    [('dev.txt', 'dev'), ('dev.txt', ''), ('demo.txt', 'demo'), ('demo.txt', ''), ('run.txt', '')],
+    [
+        ('bench.txt', 'bench'),
+        ('dev.txt', 'dev'),
+        ('dev.txt', ''),
+        ('demo.txt', 'demo'),
+        ('demo.txt', ''),
+        ('run.txt', ''),
+    ],
 )
 def test_a_lock_file_installs_all_that_setup_py_asks_for_once(root, name, extra, python):
     installed = installed_by(root / 'requirements' / name, python)
@@ -116,6 +123,17 @@ def test_make_test_adds_to_what_make_demo_installed_and_replaces_nothing(root, n
     assert all(hashes[pin.name, str(pin.specifier)] == known for pin, known in pins(part))
 
 
+@pytest.mark.parametrize('python', PYTHONS)
+def test_make_bench_adds_to_what_make_test_installed_and_replaces_nothing(root, python):
+    part, whole = (dict(installed_by(root / 'requirements' / name, python))
+                   for name in ('bench.txt', 'dev.txt'))  # fmt: skip
+    assert {name: whole[name] for name in part.keys() & whole.keys()} == {
+        name: part[name] for name in part.keys() & whole.keys()
+    }
+    # What only they compare with, in no other lock file: the most of what is installed.
+    assert {'pin', 'casadi', 'numba', 'pylinkage', 'llvmlite'}.isdisjoint(whole)
+
+
 def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
     made = (root / 'Makefile').read_text('utf-8')
     by_hash = '--require-hashes --requirement'
@@ -129,6 +147,7 @@ def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
     assert re.findall(r'call install_by,(\S+)\)', made) == [
         'requirements/demo.txt',
         'requirements/dev.txt',
+        'requirements/bench.txt',
     ]
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
-from math import ceil, floor, isnan, log10, pi
+from math import ceil, floor, inf, isnan, log10, pi
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
@@ -176,11 +176,31 @@ def _best_place(
                 )  # fmt: skip
                 cost += 20.0 * _is_outside(centre, half_width, half_height, frame)
                 if best is None or cost < best[0]:
+                    cost += 40.0 * _count_struck(label, PlacedText(centre, anchor), others)
+                if best is None or cost < best[0]:
                     cost += 2.5 * _count_inside(centre, half_width, half_height, obstacles)
                     if best is None or cost < best[0]:
                         best = cost, PlacedText(centre, anchor)
     assert best is not None, 'a label has an anchor'
     return best[1]
+
+
+def _count_struck(
+    label: Label, placed: PlacedText, others: Sequence[tuple[Label, PlacedText]]
+) -> int:
+    """Count the labels that a leader strikes: others by this one's, and this one by others'."""
+    struck = 0
+    for box, other in others:
+        for (leads, start), (beside, at) in (
+            ((label, placed), (box, other)),
+            ((box, other), (label, placed)),
+        ):
+            if has_leader(leads, start):
+                line = _points_between(start.anchor, leader_end(leads, start))
+                struck += bool(
+                    _count_inside(at.centre, 0.5 * beside.width, 0.5 * beside.height, line)
+                )
+    return struck
 
 
 def _count_inside(centre: complex, width: float, height: float, points: Sequence[complex]) -> int:
@@ -297,7 +317,8 @@ def show_lengths(axis: Any, name: str, size: float, length: str = 'm') -> None:
         """Ticks at round numbers of the unit."""
 
         def tick_values(self, vmin: float, vmax: float) -> Any:
-            return super().tick_values(vmin * factor, vmax * factor) / factor
+            ticks: Any = super().tick_values(vmin * factor, vmax * factor)
+            return ticks / factor
 
     unit, factor = unit_of_length(size, length)
     axis.set_major_locator(RoundInUnit())
@@ -460,14 +481,30 @@ class NameLabels:
         ):
             centre, anchor = placed
             written.set_position(back.transform((centre.real, centre.imag)))
-            away = centre - anchor
-            beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
-            if beside > label.clear + 0.4 * label.height:
-                start, end = (back.transform((p.real, p.imag)) for p in (anchor, centre))
+            if has_leader(label, placed):
+                edge = leader_end(label, placed)
+                start, end = (back.transform((p.real, p.imag)) for p in (anchor, edge))
                 self._axes.plot(
                     [start[0], end[0]], [start[1], end[1]],
                     color=NAME_INK, linewidth=0.5, zorder=LAYERS['label'],
                 )  # fmt: skip
+
+
+def has_leader(label: Label, placed: PlacedText) -> bool:
+    """Return whether a label is so far from its anchor that a line has to lead to it."""
+    away = placed.centre - placed.anchor
+    beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
+    return beside > label.clear + 0.4 * label.height
+
+
+def leader_end(label: Label, placed: PlacedText) -> complex:
+    """Return where the line from the anchor to the label's centre meets the label's box."""
+    away = placed.centre - placed.anchor
+    inside = min(
+        0.5 * size / abs(part) if part else inf
+        for size, part in ((label.width, away.real), (label.height, away.imag))
+    )
+    return placed.centre - min(inside, 1.0) * away
 
 
 def _points_between(start: complex, end: complex) -> list[complex]:

@@ -158,7 +158,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Compare; return 1 if it was stopped, or a bag is damaged."""
     bags = [open_bag(path, stop) for path in (arguments.bag, arguments.other)]
     scenes = [_read_conventions(bag) for bag in bags]
-    turning = scenes[0].turning | scenes[1].turning
+    turning = {**scenes[0].turning, **scenes[1].turning}
     differences = BagDifferences(turning, wrapped=scenes[0].wrapped or scenes[1].wrapped)
     readings = [BagReading(bag, stop) for bag in bags]
     with readings[0].with_progress() as first, readings[1].with_progress() as second:
