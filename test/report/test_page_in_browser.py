@@ -17,6 +17,8 @@ import random
 import re
 from threading import Event
 
+from linkage_ros.description import load_scene
+from linkage_ros.replay import simulate_run
 from linkage_ros.tools.view import bag_page
 from linkage_ros.tools.view.report import Window
 import numpy as np
@@ -823,6 +825,35 @@ def test_every_control_is_reached_and_worked_by_keys_alone(turning):
     # In a list, a letter chooses among its items.
     turning.locator('#speed').press('d')
     assert turning.locator('#unit').input_value() == 'degrees'
+
+
+# For each plot with a legend whether the buttons in its corner, or the curves, hide any of it.
+HIDDEN_LEGENDS = """() => [...document.querySelectorAll('[data-plot]')]
+  .filter((plot) => plot.querySelector('.legend'))
+  .map((plot) => {
+    const box = (selector) => plot.querySelector(selector).getBoundingClientRect();
+    const legend = box('.legend');
+    return ['.modebar', '.nsewdrag'].map(box).some((other) =>
+      other.left < legend.right && legend.left < other.right
+      && other.top < legend.bottom - 1 && legend.top < other.bottom - 1);
+  })"""
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize('width', [400, 700, 1000])
+@pytest.mark.parametrize('name', ['n{}', 'cylinder_number_{}'])
+def test_no_legend_lies_under_the_buttons(browser, tmp_path, name, width):
+    linkages = [f'{{name: {name.format(k)}, linkage: slider_crank}}' for k in range(9)]
+    scene = tmp_path / 'nine.yaml'
+    scene.write_text(
+        f'linkages: [{", ".join(linkages)}]\nrate: 50\ndrive: {{constant_rate: {{rate: 3}}}}\n'
+        'effects: {velocity: {}}\n'
+    )
+    simulate_run(load_scene(scene), tmp_path / 'bag', 100, lambda _: True)
+    with quiet(browser, page_of(tmp_path / 'bag'), width=width) as page:
+        hidden = page.evaluate(HIDDEN_LEGENDS)
+        assert len(hidden) > 3
+        assert not any(hidden)
 
 
 # Bags of others.

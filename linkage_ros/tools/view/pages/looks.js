@@ -5,6 +5,7 @@ const Looks = (() => {
   const MARGIN = { l: 66, r: 14, t: 12, b: 50 };
   const NARROW_MARGIN = { l: 54, r: 8, t: 10, b: 44 };
   const LEGEND_ROW = 22;
+  const BUTTONS = { width: 140, height: 30 }; // of a plot, in its upper right corner
   const LETTER = 6.6; // pixels: mean width at 12 pixels
   const LONGEST = 36; // letters of a name in a plot; the tables have all of them
   const DASHES = ['solid', 'dash', 'dot', 'dashdot'];
@@ -66,8 +67,11 @@ const Looks = (() => {
   /** Return the part of a layout that is about the legend, and how high it is. */
   function legend(names, width) {
     const letters = names.map((name) => 48 + LETTER * short(name).length);
-    const across = Math.max(1, Math.floor((width - 70) / Math.max(1, ...letters)));
-    const height = LEGEND_ROW * Math.ceil(names.length / across) + 6;
+    const widest = Math.max(1, ...letters);
+    const across = Math.max(1, Math.floor((width - 70) / widest));
+    const end = margin(width).l + Math.min(across, names.length) * widest;
+    const below = end > width - BUTTONS.width ? BUTTONS.height : 0;
+    const height = LEGEND_ROW * Math.ceil(names.length / across) + 6 + below;
     return [height, {
       showlegend: true,
       legend: {
