@@ -114,7 +114,7 @@ def _turns_to_reach(closure: Closure, group: Iterated, step: Iteration, unknowns
     branch = step.branch()
     if branch is None:
         return 0
-    low, high, _, turns = branch.interval
+    low, high, _, turns, _ = branch.interval
     (x,) = step.inputs
     last = turns - 1 if turns else int((high - x) // tau)
     first = 0 if turns else -int((x - low) // tau)

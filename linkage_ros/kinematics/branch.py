@@ -396,7 +396,7 @@ def _spectral_bound(matrix: Array) -> float:
 # crank direction has finitely many poses and a turn leads from one to another, so a branch
 # without an end comes back; the number of turns followed is bounded all the same. A branch that
 # is shorter than a turn has one pose for each crank direction: as with dyads, whole turns of the
-# input change nothing there.
+# input change nothing there, or as many as the ratios in the group need.
 
 
 class Interval(NamedTuple):
@@ -408,11 +408,13 @@ class Interval(NamedTuple):
     # For each end whether the linkage ends there; otherwise it was not followed farther.
     limited: tuple[bool, bool]
     turns: int  # Number of whole turns of the input after which it starts again; 0 if it does not
+    repeated_turns: int  # Number of whole turns after which the constraints are the same; or 0
 
     @property
     def period_turns(self) -> int:
         """Return how many whole turns of the input change nothing; 0 if each turn differs."""
-        return self.turns or int(self.high - self.low < tau)
+        is_short = self.high - self.low < tau * self.repeated_turns
+        return self.turns or (self.repeated_turns if is_short else 0)
 
 
 class Start(NamedTuple):
@@ -452,11 +454,12 @@ class Branch:
     """
     All solutions that lead from a pose without a toggle, for one input that turns or slides.
 
-    A slide is followed over the distance ``far`` at least.
+    A slide is followed over the distance ``far`` at least. After ``repeated_turns`` whole turns of
+    the input the constraints are the same; 0 if they never are.
     """
 
-    __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_sides', '_turning', '_turns',
-                 '_x', 'interval')  # fmt: skip
+    __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_repeated_turns', '_sides',
+                 '_turning', '_turns', '_x', 'interval')  # fmt: skip
 
     def __init__(
         self,
@@ -466,7 +469,9 @@ class Branch:
         *,
         turning: bool,
         far: float,
+        repeated_turns: int,
     ) -> None:
+        self._repeated_turns = repeated_turns
         self._continuation = continuation
         self._known_at = continuation.known_at
         self._turning = turning
@@ -480,7 +485,7 @@ class Branch:
 
     def find_start(self, x: float) -> Start | None:
         """Return the start of Newton's method at an input; None outside the branch."""
-        low, high, _, turns = self.interval
+        low, high, _, turns, _ = self.interval
         if not self._sides:
             return None
         turned, x = self.unwrap(x)
@@ -526,7 +531,7 @@ class Branch:
 
         UndecidedError is raised where the branch was not followed.
         """
-        low, high, limited, turns = self.interval
+        low, high, limited, turns, _ = self.interval
         if turns:
             return Status.CLOSED
         for side, end, is_limited in zip(self._sides, (low, high), limited, strict=True):
@@ -564,7 +569,7 @@ class Branch:
     def _follow(self, node: BranchNode | None, x: float) -> Interval:
         """Follow the branch to its ends, or until it comes back."""
         if node is None:
-            return Interval(x, x, (True, True), 0)
+            return Interval(x, x, (True, True), 0, self._repeated_turns)
         back, ahead = self._sides
         if not self._turning:
             self._follow_lap(back)
@@ -572,11 +577,13 @@ class Branch:
         else:
             while self._follow_lap(ahead):
                 if self._comes_back(node, ahead):
-                    return Interval(x, x + self._turns * tau, (False, False), self._turns)
+                    ends = x, x + self._turns * tau
+                    return Interval(*ends, (False, False), self._turns, self._repeated_turns)
             while self._follow_lap(back):
                 pass
         ends = -self._reach_of(back), self._reach_of(ahead)
-        return Interval(*ends, (back.end is not None, ahead.end is not None), 0)
+        limited = back.end is not None, ahead.end is not None
+        return Interval(*ends, limited, 0, self._repeated_turns)
 
     def _reach_of(self, side: _BranchSide) -> float:
         """Return how far a side was followed, times its sign."""

@@ -17,7 +17,9 @@ derivative by time for given rates and accelerations.
 from __future__ import annotations
 
 from cmath import phase
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from math import hypot, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.solved_links import SolvedLinks
 
 Array = NDArray[np.floating[Any]]
+
+_WHOLE = 1e-9
+"""Farthest that a number of turns, which comes from decimals, is from a whole one."""
 
 
 class End(NamedTuple):
@@ -461,6 +466,33 @@ class Constraints:
         terms = (*self._ratio_terms(joints[0], 1.0), *self._ratio_terms(joints[1], -ratio))
         self.constraints.append(Geared(terms, -given.offset / unit, period))
 
+    @property
+    def turns(self) -> int:
+        """
+        Return the whole turns of a single input that change nothing; 0 if none are known.
+
+        Where a ratio gains by the turns of the input, whole turns of a link that no other ratio
+        has must make up for them: with a ratio of 3/2 one turn leads to another tooth.
+        """
+        turns, turns_with = self._planner.ratio_turns, self._planner.turns_with
+        geared = [
+            [(factor, of) for factor, of in each.terms if isinstance(of, BodyDirection)]
+            for each in self.constraints
+            if isinstance(each, Geared)
+        ]
+        met = Counter(chain.from_iterable({of.body for _, of in terms} for terms in geared))
+        for terms in geared:
+            gained, factors = 0.0, dict.fromkeys(met, 0.0)
+            for factor, of in terms:
+                if of.body >= 0:
+                    factors[of.body] += factor
+                else:
+                    gained += factor * turns * turns_with.get(of.coordinate, (0.0,))[0]
+            own = [factor for body, factor in factors.items() if factor and met[body] == 1]
+            if gained and not any(_is_whole(gained / factor) for factor in own):
+                return 0
+        return turns
+
     def _ratio_terms(
         self, joint: RevoluteJoint | SlideJoint, factor: float
     ) -> Iterator[tuple[float, BodyDirection | OnLine]]:
@@ -485,3 +517,7 @@ class Constraints:
             return BodyDirection(self._bodies[link], 0, direction)
         angle = self._planner.angles[link].rotate_by(direction)
         return BodyDirection(-1, angle.coordinate, angle.constant)
+
+
+def _is_whole(number: float) -> bool:
+    return abs(number - round(number)) <= _WHOLE

@@ -372,17 +372,33 @@ class Grid:
                 found = _Found(self._start, self._start, None)
                 break
             key = (level, *[round(k * (count - 1) / count) for k in places])
+        else:
+            if way:
+                found = self._on_the_way(key) or found
         for key in reversed(way):
             if found.cell is None:
                 break
-            # Wider cells lead to where they are no longer proven.
-            wider = None if key is way[0] else self._wider_cell(key)
-            cell = wider or self._make_cell(key, found.cell)
-            found = _Found(cell, cell or found.last, cell.numbers if cell else None)
-            if wider is None:
-                if len(self._kept) >= _KEPT:
-                    del self._kept[next(iter(self._kept))]
-                self._kept[key] = found
+            passed = None if key is way[0] else self._on_the_way(key)
+            found = passed or self._keep_cell(key, found)
+        return found
+
+    def _on_the_way(self, key: Key) -> _Found | None:
+        """
+        Return what leads on from a cell instead of it: a wider proven one, if there is one.
+
+        Wider cells lead to where they are no longer proven. That the narrow one may be kept, since
+        a state was in it, or kept as not proven, changes nothing.
+        """
+        cell = self._wider_cell(key)
+        return None if cell is None else _Found(cell, cell, cell.numbers)
+
+    def _keep_cell(self, key: Key, before: _Found) -> _Found:
+        """Return a cell that a neighbour leads to, and keep it."""
+        cell = None if before.cell is None else self._make_cell(key, before.cell)
+        found = _Found(cell, cell or before.last, cell.numbers if cell else None)
+        if len(self._kept) >= _KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[key] = found
         return found
 
     def _wider_cell(self, key: Key) -> GridCell | None:

@@ -99,13 +99,15 @@ class Iteration:
     coordinates. ``inputs`` are the inputs of the pose, as coordinates, and ``sliding`` says for
     each whether it is a slide. ``start`` has the approximate angle and place of each body at the
     pose, one after the other. ``before`` are the steps before this one, and ``known`` is their
-    state at the pose. No slide needs to be longer than ``far`` to stretch a link.
+    state at the pose. No slide needs to be longer than ``far`` to stretch a link. Whole turns of a
+    single input change nothing if they are ``repeated_turns``; 0 if none are known.
     """
 
     __slots__ = (
         '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_given_inputs',
-        '_known_sizes', '_moving_line', '_rates_line', '_slides', '_sliding', '_solution_line',
-        '_start', '_system_line', '_table', 'branch', 'group', 'inputs', 'solution',
+        '_known_sizes', '_moving_line', '_rates_line', '_repeated_turns', '_slides', '_sliding',
+        '_solution_line', '_start', '_system_line', '_table', 'branch', 'group', 'inputs',
+        'solution',
     )  # fmt: skip
 
     def __init__(
@@ -119,13 +121,14 @@ class Iteration:
         given_inputs: Sequence[GridInput],
         far: float,
         known: LinkState,
+        repeated_turns: int,
     ) -> None:
         self._constraints = constraints
         self._slides = slides
         self._before = StepsBefore(before, inputs)
         self.inputs = inputs
         self._sliding = sliding
-        self._far = far
+        self._far, self._repeated_turns = far, repeated_turns
         self._given_inputs = given_inputs
         self._start = np.array(start)
         self._equations = GroupEquations(constraints, len(start) // 3)
@@ -343,6 +346,7 @@ class Iteration:
             self.inputs[0],
             turning=not self._sliding[0],
             far=self._far,
+            repeated_turns=self._repeated_turns,
         )
 
     def _solution_of_pose(self) -> Array | None:
@@ -585,5 +589,6 @@ def make_iteration(
     slides = tuple(constraints.slides.values())
     given = grid_inputs(linkage.inputs, inputs, scale)
     return Iteration(
-        tuple(constraints.constraints), slides, inputs, start, before, sliding, given, far, solved
-    )
+        tuple(constraints.constraints), slides, inputs, start, before, sliding, given, far, solved,
+        constraints.turns,
+    )  # fmt: skip

@@ -181,7 +181,7 @@ def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputR
     behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
     turning = not closure.linkage.inputs[0].slider
     unit = 1.0 if turning else closure.scale
-    low, high, limited, turns = branch.interval
+    low, high, limited, turns, _ = branch.interval
     low, high = (-pi * turns, pi * turns) if turns else (low * unit, high * unit)
     parts = [(low, high)]
     if behind:

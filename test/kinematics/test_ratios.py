@@ -294,6 +294,60 @@ def test_gears_on_moving_links_over_whole_turns(ratio: float, case: int) -> None
         assert same_angles(closure.position(end).joints[:3], angles, 1e-9), part
 
 
+def geared_rocker(rng: Random, ratio: float) -> tuple[Closure, float]:
+    """
+    Return a double rocker with an arm on its crank, geared to its own angle against the ground.
+
+    So the arm is at (θ + offset)/(1 − ratio): a turn of the crank may lead to another angle.
+    """
+    ground, crank, coupler, rocker = 1.0, *sorted(rng.uniform(0.3, 0.9) for _ in range(3))
+    while abs(ground - crank - coupler) < 0.05 or crank + ground < coupler + rocker:
+        ground, coupler, rocker = ground + 0.1, coupler * 0.95, rocker * 0.95
+    theta, arm = rng.uniform(-0.05, 0.05), rng.uniform(-3.0, 3.0)
+    offset = (1.0 - ratio) * arm - theta
+    place = rect(crank, theta)
+    end = place + rect(0.4, arm)
+    linkage = Linkage(
+        {
+            'ground': {'O': (0.0, 0.0), 'D': (ground, 0.0)},
+            'crank': {'O': (0.0, 0.0), 'A': (crank, 0.0)},
+            'coupler': {'A': (0.0, 0.0), 'B': (coupler, 0.0)},
+            'rocker': {'D': (0.0, 0.0), 'B': (rocker, 0.0)},
+            'arm': {'A': (0.0, 0.0), 'E': (0.4, 0.0)},
+        },
+        (Input('theta', 'ground', 'crank'),),
+        {'B': 'left'},
+        {
+            'arm_joint': RevoluteJoint('ground', 'arm'),
+            'gear_joint': RevoluteJoint('crank', 'arm'),
+        },
+        {},
+        ratios={'gear_joint': Ratio('arm_joint', ratio, offset)},
+        pose=AssemblyPose((theta,), {'E': (end.real, end.imag)}),
+    )
+    return Closure(linkage), offset
+
+
+@pytest.mark.parametrize('ratio', [-0.5, 0.25, -1.0, 3.0, 0.5, 0.37])
+def test_implicit_ratio_turns_its_link_by_whole_turns_of_the_input(ratio: float) -> None:
+    random = Random(8)
+    closed = 0
+    for _ in range(8):
+        closure, offset = geared_rocker(random, ratio)
+        values = [closure.linkage.pose.inputs[0]]  # type: ignore[union-attr]
+        for one in closure.closing_ranges:
+            values += [random.uniform(one.lowest, one.highest) for _ in range(4)]
+        for value in values:
+            for turns in range(-6, 7):
+                theta = value + tau * turns
+                position = closure.position(theta)
+                if position.joints:
+                    exact = (mpf(theta) + offset) / (1.0 - mpf(ratio))
+                    assert same_angles([position['arm_joint']], [exact], 1e-11), (theta, turns)
+                    closed += 1
+    assert closed >= 8
+
+
 @pytest.mark.parametrize('ratio', [1.0, -1.5, 0.37, -2.0])
 def test_ratio_of_a_joint_solved_before(ratio: float) -> None:
     """A rocker drives the crank of another four-bar."""

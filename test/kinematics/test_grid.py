@@ -1,0 +1,101 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The cells of a grid come from the inputs alone: from no state that was asked for before."""
+
+from math import floor, hypot, inf, sqrt
+import random
+
+from linkage_ros.kinematics.grid import Grid, GridInput
+import pytest
+
+
+class Sphere:
+    """
+    One unknown z over one or two inputs: z² = r² − |x − c|², singular at the rim.
+
+    At one of three places, by their digits, no solution is found.
+    """
+
+    def __init__(self, centre, radius):
+        self.centre, self.radius = centre, radius
+
+    def error(self, inputs, z):
+        return 0.5 * (z * z - self.radius**2 + hypot(*self.away(inputs)) ** 2)
+
+    def away(self, inputs):
+        return [x - c for x, c in zip(inputs, self.centre, strict=True)]
+
+    def proof(self, inputs, unknowns):
+        (z,) = unknowns
+        return abs(self.error(inputs, z) / z) * abs(1.0 / z) if z else inf
+
+    def solve_from(self, inputs, unknowns):
+        (z,) = unknowns
+        if floor(sum(inputs) * 977.0) % 3 == 1:
+            return None
+        for _ in range(60):
+            step = self.error(inputs, z) / z if z else inf
+            if abs(step) <= 4e-16:
+                return [z]
+            z -= step
+        return None
+
+    def forms_at(self, inputs, unknowns):
+        (z,) = unknowns
+        slopes = [-x / z for x in self.away(inputs)]
+        count, bends = len(slopes), []
+        for i in range(count):
+            for k in range(i, count):
+                both = (float(i == k) + slopes[i] * slopes[k]) / -z
+                bends.append((both if i != k else 0.5 * both,))
+        return [(slope,) for slope in slopes], bends
+
+
+def sphere_grid(rng, count):
+    """Return a function that makes grids of a random sphere, and inputs up to beyond its rim."""
+    centre = [rng.uniform(-0.3, 0.3) for _ in range(count)]
+    radius = rng.uniform(0.8, 2.0)
+    sphere = Sphere(centre, radius)
+    start = sqrt(radius**2 - hypot(*centre) ** 2)
+    inputs = [GridInput(0.0, -inf, inf, False)] * count
+
+    def make():
+        return Grid(sphere, inputs, range(count), [start])
+
+    def draw(states):
+        far = 1.05 * radius
+        return [tuple(c + rng.uniform(-far, far) for c in centre) for _ in range(states)]
+
+    return make, draw
+
+
+@pytest.mark.parametrize('count', [1, 2])
+@pytest.mark.parametrize('seed', range(12))
+def test_a_cell_is_the_same_whatever_was_asked_before(seed, count):
+    rng = random.Random(seed)
+    make, draw = sphere_grid(rng, count)
+    states = draw(40)
+    fresh = [make()(*inputs) for inputs in states]
+    assert any(fresh)
+    for order in (states, sorted(states), sorted(states, reverse=True), rng.sample(states, 40)):
+        grid = make()
+        found = {inputs: grid(*inputs) for inputs in order}
+        assert [found[inputs] for inputs in states] == fresh
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_the_way_that_a_grid_follows_is_the_same_whatever_was_asked_before(seed):
+    rng = random.Random(seed)
+    make, draw = sphere_grid(rng, 2)
+    states = draw(20)
+    fresh = [make().reach(inputs) for inputs in states]
+    grid = make()
+    for inputs in draw(40):
+        grid(*inputs)
+    assert [grid.reach(inputs) for inputs in states] == fresh
