@@ -37,7 +37,7 @@ from linkage_ros.cli import (
     show_result,
 )
 from linkage_ros.description import Units
-from linkage_ros.errors import BagError, escape_unprintable, LinkageError, list_names
+from linkage_ros.errors import BagError, LinkageError, list_names
 from linkage_ros.kinematics import Curve
 from linkage_ros.messages import JOINT_STATE_TYPE, Key, MessageValues, POSITION
 from linkage_ros.names import picture_text
