@@ -62,13 +62,16 @@ def nodes(context):
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     # Later parameters override earlier ones: an empty argument must not override the file.
     scene = {'scene': value['scene']} if value['scene'] else {}
+    shows = not value['robot_description_file'] and flag(value, 'robot_state_publisher')
+    # Else the publisher would know joints that nobody publishes.
+    model = {'model_joints': True} if shows else {}
     clock = {'use_sim_time': flag(value, 'use_sim_time')} if value['use_sim_time'] else {}
     yield Node(
         package='linkage_ros',
         executable='linkage_node',
         name='linkage_node',
         namespace=value['namespace'],
-        parameters=[value['params_file'], {**clock, **scene}],
+        parameters=[value['params_file'], {**clock, **scene, **model}],
         remappings=[('crank_states', value['crank_states'])],
         output='screen',
         on_exit=tell_failure,
@@ -76,7 +79,7 @@ def nodes(context):
     urdf = ''
     if value['robot_description_file']:
         urdf = text_of(value['robot_description_file'])
-    elif flag(value, 'robot_state_publisher'):
+    elif shows:
         if not value['scene']:
             raise LinkageError('robot_state_publisher', 'has no scene', 'name scene:=FILE too')
         urdf = model_of(value['scene'], write_urdf).decode()

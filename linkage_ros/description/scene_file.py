@@ -40,7 +40,7 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
-from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage, with_rod_joints
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ class _SceneSource:
     seed: int | None = None  # Seed if the scene names none; None to derive it from the name
     trust_effects: bool = True  # Whether user-defined effects are imported
     confinement: Confinement | None = None  # What the scene may name; None for anything
+    publishes_model_joints: bool = False  # Whether all joints of a robot model are published
     closed: Closure | None = None  # Closure of its only linkage, if there is one already
 
 
@@ -280,6 +281,10 @@ def _build_scene(
 def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     published, angle = SCENE.read_key(content, 'angles', {})
     content.units = Units(SCENE.read_key(content, 'units', {}), angle)
+    has_description = SCENE.read_key(content, 'robot_description', {})
+    all_joints = SCENE.read_key(content, 'model_joints', {})
+    all_joints = has_description if all_joints is None else all_joints
+    source = replace(source, publishes_model_joints=all_joints)
     members, linkage_files = _read_linkages(content, source)
     parts = _prefixed_parts(members)
 
@@ -299,7 +304,7 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         record=read('record'),
         files={SCENE_FILE: data, **linkage_files},
         folder=source.folder,
-        robot_description=read('robot_description'),
+        robot_description=has_description,
         units=_table_units(content, members),
     )
     for key in OF_A_LINKAGE.entries:
@@ -397,6 +402,8 @@ def _read_scene_linkage(
         published = drive != 'topic' or any(each.without_inputs for each in types.values())
     if closure is None:
         closure = read_any_closure(linkage_content, publish_inputs=published)
+    if source.publishes_model_joints and isinstance(closure, SpaceClosure):
+        closure = SpaceClosure(with_rod_joints(closure.linkage), closure.name)
     linkage = closure.linkage
     _refuse_effects(effects, types, drive, published)
     if isinstance(linkage, SpaceLinkage):
@@ -452,9 +459,8 @@ def _refuse_in_space(
     topic = drive_section(drives)
     if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
-    for key in ('loads', 'robot_description'):
-        if key in section_with(key):
-            raise section_with(key).error(key, reason, remedy)
+    if 'loads' in section_with('loads'):
+        raise section_with('loads').error('loads', reason, remedy)
 
 
 def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:

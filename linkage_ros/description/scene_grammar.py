@@ -499,6 +499,11 @@ SCENE = Keys(
         'robot_description': flag(
             'Whether the node publishes the linkages as URDF on robot_description.', False
         ),
+        'model_joints': flag(
+            'Whether all joints of the robot model are published, in space also those by which '
+            'rods and struts hang, and of links between joints; without it as robot_description.',
+            None,
+        ),
     },
 )
 

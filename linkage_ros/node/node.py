@@ -206,8 +206,10 @@ class LinkageNode(LifecycleNode):
 
     def _set_scene(self) -> tuple[str, list[str]]:
         """Return the scene's file and the settings beside it, as the parameters have them."""
-        settings = self.get_parameter('set').value
-        return self.get_parameter('scene').value, [each for each in settings if each]
+        settings = [each for each in self.get_parameter('set').value if each]
+        if self.get_parameter('model_joints').value:
+            settings.append('model_joints=true')
+        return self.get_parameter('scene').value, settings
 
     @property
     def _confinement(self) -> Confinement | None:

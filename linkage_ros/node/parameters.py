@@ -70,6 +70,11 @@ LINKAGE_NODE = (
     ),
     NodeParameter('runs_directory', '', "Folder of the bags; '' for the scene's own"),
     NodeParameter(
+        'model_joints',
+        False,
+        'Whether all joints of the robot model are published, as with model_joints in the scene',
+    ),
+    NodeParameter(
         'scene_directory',
         '',
         "Folder below which a scene may name files if it is set after the start; '': the working "

@@ -54,6 +54,21 @@ def test_a_late_comer_sees_a_linkage_that_moves(graph, write_scene, start):
         assert abs(ends[0] - ends[1]) < 1e-12 * 0.12
 
 
+def test_rods_in_space_move_with_their_platform(graph, write_scene, start):
+    """Every joint of the model is published, also those by which rods hang."""
+    text = 'rate: 200\ndrive: {sine: {amplitude: 0.2, frequency: 1}}\nrobot_description: true'
+    start(write_scene('delta_described', text, 'space/delta'))
+    states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: len(states) > 100, 'joint states')
+    heard = late(graph)
+    wait_for(lambda: heard, 'a robot model')
+    model = Walked(heard[0].data.encode())
+    assert {'rod1_joint1', 'rod1_joint2'} < model.joints
+    for state in states[::5]:
+        model.pose(list(state.name), list(state.position))
+        assert model.gap() < 1e-12
+
+
 def test_a_node_takes_it_on_its_command_line(graph, write_scene, start):
     """``-p robot_description:="$(cat leg.urdf)"``: rcl reads it as YAML."""
     start(write_scene('as_text', TURNING + 'robot_description: true'))

@@ -15,9 +15,15 @@ import importlib.util
 import sys
 from types import ModuleType, SimpleNamespace
 
+from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError, quote
+from linkage_ros.kinematics import usual_inputs
+from linkage_ros.messages import JointStateWriter
+from linkage_ros.resources import linkage_names, spatial_linkage_names
+from linkage_ros.tick import Pipeline
 import pytest
 
+from ..robot_models.walked import BEGIN, heard, MS, Walked
 from ..support.messages import joint_state, read_joint_state
 from ..support.scenes import FOUR_BAR, pipeline_of
 
@@ -265,3 +271,32 @@ def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
             tf.take(state.name, state.position, at)
             gaps.append(gap_of_pin(tf.angles))
     assert least <= max(gaps) <= most
+
+
+@pytest.mark.sample(12)
+@pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
+def test_any_linkage_of_the_gallery_is_shown_whole(start, name):
+    """What its two processes publish places every link, and the loops meet."""
+    node, publisher = start(scene=name, robot_state_publisher='true')
+    given = node['parameters'][-1]
+    settings = [f'{key}={value!s}'.lower() for key, value in given.items() if key != 'scene']
+    scene = load_scene(given['scene'], settings)
+    pipeline, (scene_linkage,) = Pipeline(scene), scene.linkages
+    model = Walked(publisher['parameters'][-1]['robot_description'].encode())
+    inputs = scene_linkage.linkage.inputs
+    pose = usual_inputs(scene_linkage.closure)
+    writer = JointStateWriter([driven.joint for driven in inputs])
+    shown = 0
+    for index in range(8):
+        now = BEGIN + 20 * index * MS
+        at = [value + 0.002 * index * (1 if k % 2 else -1) for k, value in enumerate(pose)]
+        driven = dict(zip([driven.joint for driven in inputs], at, strict=True))
+        if scene_linkage.drive[0] == 'topic':
+            pipeline.offer(writer.write(now, at, [0.0] * len(at)), now)
+        message = pipeline.tick(now).message
+        if message:
+            joints = dict(zip(*heard(message), strict=True))
+            model.pose(*zip(*{**driven, **joints}.items(), strict=True))
+            assert model.gap() < 1e-9
+            shown += 1
+    assert shown > 4

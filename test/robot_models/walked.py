@@ -9,10 +9,13 @@
 """A robot model walked by yourdfpy, and what the node says while a linkage moves."""
 
 import io
+from math import cos, sin
+from xml.etree import ElementTree as ET
 
 from linkage_ros.description import load_scene, parse_scene
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tick import Pipeline
+import numpy as np
 import yourdfpy
 
 from ..support.messages import read_joint_state
@@ -30,11 +33,29 @@ class Walked:
             io.BytesIO(data), build_scene_graph=True, load_meshes=False
         )
         self.joints = set(self.model.actuated_joint_names)
+        self._loops = ET.fromstring(data).findall('loop_joint')
 
     def pose(self, names, positions):
         """Take a joint state."""
         assert self.joints <= set(names), 'a joint that nobody publishes'
         self.model.update_cfg(dict(zip(names, positions, strict=True)))
+
+    def gap(self):
+        """Return by how much ends of loop joints are apart, or turned, in [m] and [rad]."""
+        return max(
+            (
+                float(abs(self._end(loop, 'link1') - self._end(loop, 'link2')).max())
+                for loop in self._loops
+            ),
+            default=0.0,
+        )
+
+    def _end(self, loop, tag):
+        """Return the frame of an end, or the place of a ball's."""
+        end = loop.find(tag)
+        numbers = (map(float, end.get(key).split()) for key in ('xyz', 'rpy'))
+        there = self.model.get_transform(end.get('link')) @ _transform(*map(list, numbers))
+        return there[:3, 3:] if loop.get('type') == 'spherical' else there
 
     def place(self, frame):
         """Return where a frame is, as x + iy, and that it lies in the plane."""
@@ -47,6 +68,19 @@ class Walked:
         """Return e^{i·angle} of a frame."""
         there = self.model.get_transform(frame)
         return complex(there[0, 0], there[1, 0])
+
+
+def _transform(xyz, rpy):
+    """Return a frame by its place and its angles about fixed axes."""
+    (cr, cp, cy), (sr, sp, sy) = (list(map(turn, rpy)) for turn in (cos, sin))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, xyz[0]],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, xyz[1]],
+            [-sp, cp * sr, cp * cr, xyz[2]],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def said(pipeline, every=50 * MS, count=126):

@@ -11,11 +11,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError, quote
-from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
+from linkage_ros.kinematics import Linkage, SpaceLinkage
 from linkage_ros.names import free_name
 from linkage_ros.tools.models.orientation import named_joints
 
@@ -23,7 +23,7 @@ from linkage_ros.tools.models.orientation import named_joints
 class ModelPart(NamedTuple):
     """A linkage of a model, whose links and joints get a prefix; wrapped angles are in (−π, π]."""
 
-    closure: Closure
+    closure: Any  # A Closure; for a URDF also a SpaceClosure
     prefix: str = ''
     loads: Loads | None = None
     wrapped: bool = False
