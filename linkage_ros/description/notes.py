@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _OTHER_UNIT = 300.0
 """Ratio of two links above which a unit was probably mistaken; mm for m make it 1000."""
 
-_LONG, _HUGE = 3.0, 10.0
+_LONG, _HUGE = 3.0, 30.0
 """
 Lengths above which metres were probably mistaken for millimetres, in [m]: of what moves in Hz or
 is light, and of what nothing else is known of.

@@ -341,7 +341,7 @@ def closure_in_pose(linkage: SpaceLinkage, name: str = '') -> SpaceClosure:
     try:
         _check_closed(closure)
     except _OverconstrainedError:
-        hinges = dict(reversed(linkage.hinges.items()))
+        hinges = dict(reversed([*linkage.hinges.items()]))
         turned = SpaceClosure(replace(linkage, hinges=hinges), name)
         with suppress(_OverconstrainedError):
             _check_closed(turned)

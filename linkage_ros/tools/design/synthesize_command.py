@@ -61,7 +61,7 @@ _NOT_MET = 1
 _LISTED = 3
 """Default number of solutions that a search lists."""
 
-_LONG_GROUND = 10.0
+_LONG_GROUND = 30.0
 """Length above which metres were probably mistaken for millimetres, in [m]."""
 
 EXAMPLE = 'linkage synthesize --pair 30 60 --pair 60 70 --pair 90 85 -o design.yaml'
@@ -352,11 +352,11 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _run_design(arguments: argparse.Namespace) -> int:
+    with show_progress('candidates') as advance:
+        found, meeting = find_solutions(arguments, advance)
     if arguments.ground > _LONG_GROUND:
         told = f'--ground: {arguments.ground:g} m is long; if it is in millimetres, divide by 1000'
         print(f'linkage synthesize: note: {told}', file=sys.stderr)
-    with show_progress('candidates') as advance:
-        found, meeting = find_solutions(arguments, advance)
     needs, units = needs_of(arguments), arguments.angles
     shown = found[: arguments.best]
     solutions = [_solution_json(answer, needs, units) for answer in shown]
