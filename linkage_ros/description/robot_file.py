@@ -380,7 +380,7 @@ class _Robot:
                 turns.append(_turn_of_frame(one, other))
         return turns
 
-    def _left(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
+    def _remaining_errors(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
         """Return what is left of all equations; directions are lengths at the size."""
         turns = (scale(self._size, turn) for turn in self._turns(frames))
         return [*chain(*self._gaps(frames), *turns)]
@@ -420,7 +420,7 @@ class _Robot:
         """Return values at which the loops close, as far as free joints do it, and the gap."""
         for _ in range(_MOST_STEPS):
             frames = self._place_links(values)
-            left = self._left(frames)
+            left = self._remaining_errors(frames)
             if hypot(*left) <= _ROUNDED * self._size or not free:
                 break
             columns = self._slopes(frames, free, ratios)
