@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 
 from linkage_ros.kinematics.equations import Array
 import numpy as np
@@ -19,9 +20,15 @@ System = Callable[[Array], tuple[Array, Array]]
 
 
 def descend(system: System, unknowns: Array) -> tuple[Array, float]:
-    """Return the unknowns of the least residual near some, and the greatest of it."""
+    """
+    Return the unknowns of the least residual near some, and the greatest of it.
+
+    It is infinite where numbers overflow.
+    """
     errors, jacobian = system(unknowns)
     for _ in range(20):
+        if not (np.isfinite(errors).all() and np.isfinite(jacobian).all()):
+            return unknowns, inf
         step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
         step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
         trial, slope = system(unknowns + step)
@@ -32,6 +39,8 @@ def descend(system: System, unknowns: Array) -> tuple[Array, float]:
 
 
 def reciprocal_condition(jacobian: Array) -> float:
-    """Return the ratio of the smallest singular value to the largest."""
+    """Return the ratio of the smallest singular value to the largest; 0 if numbers overflow."""
+    if not np.isfinite(jacobian).all():
+        return 0.0
     values = np.linalg.svd(jacobian, compute_uv=False)
     return float(values[-1] / values[0])

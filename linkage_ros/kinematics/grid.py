@@ -45,6 +45,9 @@ _KEPT = 4096
 _FARTHEST = 128
 """Widest cells from the pose to the farthest state: some 16 rad, or lengths."""
 
+_ALL = 2.0**62
+"""More cells than are followed."""
+
 _PROVEN = 0.25
 """Largest η·ω that is accepted."""
 
@@ -171,7 +174,10 @@ class Grid:
 
         This is what `find_start` calls in compiled code.
         """
-        return self._look_up(*inputs)
+        try:
+            return self._look_up(*inputs)
+        except OverflowError:
+            return None  # So far away that no number says how many cells it is.
 
     def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:
         """Return a call as a function, written for these inputs: most lie in a widest cell."""
@@ -223,7 +229,7 @@ class Grid:
 
     def _key_of(self, level: int, inputs: Sequence[float]) -> Key:
         width, ways = self.widths[level], zip(inputs, self.home, strict=True)
-        return (level, *[round((x - at) / width) for x, at in ways])
+        return (level, *[round(max(-_ALL, min((x - at) / width, _ALL))) for x, at in ways])
 
     def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
         """Return where Newton's method starts, with symbols too; None if no cell is there."""

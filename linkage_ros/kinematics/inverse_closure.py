@@ -187,13 +187,16 @@ class InverseClosure(Closure):
         if getattr(position, 'closure', None) is not self:
             self._check_own('position', position)
         (rate,) = self._single_number('rates', rates)
-        if not (position.status.has_rates and all_finite((rate,))):
+        places = self._beside_toggle(position, position.joints[0]) if position.poses else []
+        ways = places or [self._crank_position(position)]
+        if not (
+            position.status.has_rates
+            and all_finite([rate, *(rate / self._output_slope(way) for way in ways)])
+        ):
             return self._huge_velocity(position, (rate,))
-        places = self._beside_toggle(position, position.joints[0])
-        found = [
-            self._crank_velocity(place, rate)
-            for place in places or [self._crank_position(position)]
-        ]
+        found = [self._crank_velocity(way, rate) for way in ways]
+        if any(type(one.rates) is Velocity for one in found):
+            return self._huge_velocity(position, (rate,))
         (crank,) = self.closed.inputs_of(found[-1].state)
         joints = found[-1].joints
         if places:  # The crank stands there; the others are extrapolated.
@@ -208,18 +211,32 @@ class InverseClosure(Closure):
             self._check_own('velocity', velocity)
         (change,) = self._single_number('accelerations', accelerations)
         (rate,) = self.inputs_of(velocity.state)
+        if type(velocity.rates) is Velocity or not isfinite(change):
+            return self._huge_acceleration(position, velocity, (change,))
         places = self._beside_toggle(position, position.joints[0])
         found = []
         for place in places or [self._crank_position(position)]:
             moving = self._crank_velocity(place, rate)
             bent = self.closed.acceleration(place, moving, 0.0)
             *_, (bend,) = self._output_groups(place, moving, bent)
-            slope = self._output_slope(place)
-            found.append(self.closed.acceleration(place, moving, (change - bend) / slope))
+            crank = (change - bend) / self._output_slope(place)
+            if not isfinite(crank):
+                return self._huge_acceleration(position, velocity, (change,))
+            found.append(self.closed.acceleration(place, moving, crank))
         ends = [(*self.closed.inputs_of(one.state), *one.joints) for one in found]
         crank, *joints = _extrapolate(*ends) if places else ends[0]
         state = _given_state(change, *found[-1].state)
         return Acceleration(self._joints_with(crank, joints), state, self)
+
+    def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
+        found = super()._huge_velocity(position, rates)
+        return replace(found, state=_given_state(*rates, *found.state))
+
+    def _huge_acceleration(
+        self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
+    ) -> Acceleration:
+        found = super()._huge_acceleration(position, velocity, accelerations)
+        return replace(found, state=_given_state(*accelerations, *found.state))
 
     def solve(
         self,

@@ -44,7 +44,10 @@ class StraightLine:
         if self._line is None:
             with BUILD_LOCK:
                 self._line = self._compile(self._examples() or states)
-        found = self._line(*list_numbers(states))
+        try:
+            found = self._line(*list_numbers(states))
+        except (ValueError, OverflowError, ZeroDivisionError):
+            return None  # Numbers overflow: it is no function of them.
         return found and list(found[0])
 
     def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:

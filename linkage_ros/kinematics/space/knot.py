@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain, islice
-from math import dist, pi, remainder, tau
+from math import dist, inf, pi, remainder, tau
 from random import Random
 from typing import Any, NamedTuple
 
@@ -33,6 +33,9 @@ from linkage_ros.kinematics.straight_line import StraightLine
 
 _APART, _DIGITS = 1e-6, 12
 """Smallest distance of the ends of rods in two solutions, in lengths; and their digits."""
+
+_SHORTEST = 2.0**-6
+"""In lengths: the gap of a shorter rod is measured as that of one of this length."""
 
 _MOVED = 2.0**-20
 """A gap that shrinks to less, relative to itself, is closed by another assembly."""
@@ -169,10 +172,13 @@ class Knot:
         )
         if status is Status.CLOSED:
             return self._append(status, solved, found)
-        sizes = np.array([rod.rod.length(solved) for rod in self._equations.rods])
+        lengths = [rod.rod.length(solved) for rod in self._equations.rods]
+        sizes = np.maximum(lengths, _SHORTEST)
 
         def system(unknowns: Any) -> Any:
             found = self._matrix_line(solved, LinkState(unknowns.tolist(), []))
+            if found is None:
+                return np.full(len(sizes), inf), np.full((len(sizes), len(sizes)), inf)
             errors, *columns = np.array(found).reshape(-1, len(sizes)) / sizes
             return errors, np.transpose(columns)
 

@@ -102,7 +102,8 @@ class ThreeDistances:
         size = sqrt(square)
         for reach in (reach_between(one + other, size), reach_between(size, one - other)):
             if reach.status is not Status.CLOSED:
-                return MetPose(reach.status, reach.missing)
+                # On the line P0 P1 the point has no side, and the third rod hardly ever fits.
+                return MetPose(Status.OPEN, reach.missing)
         # The cross product of the shorter edge: of both it is the same.
         nearer = twice < 0.0
         edge = [where(nearer, a, b) for a, b in zip(across, beyond, strict=True)]
@@ -118,7 +119,7 @@ class ThreeDistances:
         short = one < other
         reach = reach_between(where(short, one, other), size * abs(where(short, foot, rest)))
         if reach.status is not Status.CLOSED:
-            return MetPose(reach.status, reach.missing)
+            return MetPose(Status.OPEN, reach.missing)
         radius = sqrt(reach.square)
         met = meet_circle(radius, distance, size * height, rod)
         if not met.status.has_pose:

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -87,6 +88,19 @@ def make_array_functions(closure: StepwiseClosure, package: str) -> ArrayFunctio
     for table in [key for key in made if key.endswith(('_columns', '_ends'))]:
         numbers = np.array(made[table])
         made[table] = xp.asarray(numbers) if package == 'torch' else numbers
-    position, velocity, motion = (made[function] for function in FUNCTIONS)
-    names = tuple(STATUSES)
-    return ArrayFunctions(position, velocity, motion, made['jacobian'], names, source)
+    functions = [made[function] for function in (*FUNCTIONS, 'jacobian')]
+    if package == 'jax':
+        # It takes arrays of NumPy too, but may compute in another precision than theirs, and the
+        # precision decides what is exact enough.
+        functions = [_converting(function, xp.asarray) for function in functions]
+    return ArrayFunctions(*functions, tuple(STATUSES), source)
+
+
+def _converting(function: Callable[..., Any], convert: Callable[[Any], Any]) -> Callable[..., Any]:
+    """Return a function that converts its arrays first."""
+
+    @wraps(function)
+    def converted(*arrays: Any) -> Any:
+        return function(*map(convert, arrays))
+
+    return converted

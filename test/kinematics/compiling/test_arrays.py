@@ -311,6 +311,28 @@ def test_the_functions_of_a_closure_can_be_compiled(library):
     assert done.returncode == 0, done.stderr
 
 
+SINGLE = """
+import linkage_ros as lr
+import numpy as np
+
+closure = lr.load('class_3')
+given = np.array(closure.linkage.pose.inputs) + np.linspace(0.01, 0.1, 20)[:, None]
+functions = closure.as_jax()
+(wide, joints), narrow = (functions.position(each) for each in (given, given.astype(np.float32)))
+assert (np.asarray(wide) == functions.statuses.index('CLOSED')).all()
+np.testing.assert_array_equal(joints, narrow[1])
+assert joints.dtype == np.float32
+"""
+
+
+@pytest.mark.timeout(300)
+def test_arrays_of_numpy_have_the_precision_in_which_jax_computes():
+    """Double ones are single there, unless it is told otherwise."""
+    command = [sys.executable, '-c', SINGLE]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_library_that_is_absent_is_named(monkeypatch):
     monkeypatch.setattr('linkage_ros.errors.find_spec', lambda _: None)
     with pytest.raises(

@@ -68,14 +68,14 @@ def test_the_order_of_visits_does_not_matter():
     assert sum(map(bool, forward)) > 0.9 * len(states)
 
 
-@pytest.mark.parametrize('first', [0.0, -1.0, 0.5])
-def test_a_state_has_the_same_bits_after_a_motion_to_it(first):
+def test_a_state_has_the_same_bits_after_a_motion_to_it():
     """Some cells on the way are narrow, next to a place where the loop nearly ends."""
     state = -0.7383024407166474
-    moved = closure_of('three_cylinders')
-    for value in np.linspace(first, state, 40)[:-1].tolist():
+    file = Path(__file__).parent.parent / 'three_cylinders.yaml'
+    moved = load(file)
+    for value in np.linspace(0.0, state, 40)[:-1].tolist():
         moved.position(value)
-    assert moved.position(state).joints == closure_of('three_cylinders').position(state).joints
+    assert moved.position(state).joints == load(file).position(state).joints
 
 
 def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypatch):
