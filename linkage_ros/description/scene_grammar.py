@@ -111,10 +111,10 @@ class _Effects(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
         effects = effects_section(content, lambda: parts, key)
         types = effect_types(effects, parts['left_out'])
-        values = {}
-        for name, of in types.items():
-            named = effects.section(name, example=lambda _, of=of: example_of(of, parts))
-            values[name] = read_parameters(named, of, parts)
+        values = {
+            name: ParameterGroup('', of).read(effects, name, parts, '')
+            for name, of in types.items()
+        }
         effects.finish(tuple(EFFECTS))
         return values
 

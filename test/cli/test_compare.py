@@ -11,9 +11,10 @@
 import json
 from math import pi, sin
 
-from linkage_ros.bag import BagWriter, Topic
+from linkage_ros.bag import BagWriter, read_bag, Topic
 from linkage_ros.errors import LinkageError
 from linkage_ros.tools.view import compare_command as compare
+import numpy as np
 import pytest
 
 from .recorded import answer, JOINT_STATE
@@ -112,3 +113,28 @@ def test_what_cannot_be_compared_is_an_error(tmp_path, values, topic, reason):
     second = bag(tmp_path / 'b', values, topic=topic)
     with pytest.raises(LinkageError, match=reason):
         answer(compare, first, second)
+
+
+def test_a_curve_breaks_where_states_are_missing(tmp_path, monkeypatch):
+    pytest.importorskip('matplotlib')
+    first = bag(tmp_path / 'a', {'p': swing}, seconds=1.0)
+    more = bag(tmp_path / 'c', {'p': swing}, begin=8, seconds=1.0)
+    messages = [*read_bag(first).messages(), *read_bag(more).messages()]
+    writer = BagWriter(tmp_path / 'gap', [Topic('/joint_states', JOINT_STATE, '', '')])
+    for _, log_time, publish_time, data in messages:
+        writer.write(0, log_time, publish_time, data)
+    writer.close()
+    second = bag(tmp_path / 'b', {'p': lambda t: swing(t) + 0.25}, seconds=5.0)
+    figures = []
+    monkeypatch.setattr(compare, 'save_picture', lambda figure, _: figures.append(figure))
+    assert answer(compare, tmp_path / 'gap', second, '-o', tmp_path / 'x.png') == 0
+    ((axes,),) = [figure.axes for figure in figures]
+    assert axes.get_ylabel() == 'difference of joint angle [°]'
+    (line,) = axes.get_lines()
+    x, y = line.get_data()
+    (break_at,) = np.flatnonzero(np.isnan(y))
+    assert x[break_at - 1] == pytest.approx(1.0, abs=0.02)
+    assert x[break_at + 1] == pytest.approx(3.0, abs=0.02)
+    # Its name stands at the end of the line, as in the other pictures.
+    assert axes.get_legend() is None
+    assert [text.get_text() for text in axes.texts] == ['p']

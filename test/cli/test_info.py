@@ -459,3 +459,12 @@ def read_worst(scene: Scene) -> tuple[float, float]:
         residuals.append(closure.residual(position))
         conditionings.append(closure.singularity_margin(position).conditioning)
     return max(residuals), min(conditionings)
+
+
+def test_a_simulated_clock_has_no_date(tmp_path, tell):
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text('linkage: four_bar\nrate: 10\ndrive: {constant_rate: {rate: 1}}\n')
+    simulate_run(load_scene(scene), tmp_path / 'bag', 21, lambda _: True)
+    told = tell(tmp_path / 'bag')
+    assert told['begin'] == '1.000000000 s of a simulated clock'
+    assert told['end'] == '3.000000000 s of a simulated clock'

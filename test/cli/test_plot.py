@@ -12,13 +12,15 @@ from math import remainder, tau
 from pathlib import Path
 
 from linkage_ros.description import read_linkage, read_yaml
-from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
+from linkage_ros.kinematics import Closure, Curve, InputSweep, usual_inputs
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.drawing import (
     crank_curves,
     curves_over_time,
     is_after_gap,
     plot_command as command,
+    plot_joints,
+    stacked_axes,
 )
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ import pytest
 from .recorded import answer, Recorded, scene_file
 
 pytest.importorskip('matplotlib')
+from matplotlib.figure import Figure
 
 
 def closure_of(name: str) -> Closure:
@@ -148,3 +151,55 @@ def test_the_axis_of_time_has_its_unit(tmp_path: Path) -> None:
     text = (tmp_path / 'x.svg').read_text()
     assert '<!-- time since the first joint state [s] -->' in text
     assert text.count('<!-- crank_joint -->') == 1
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Return the figures that were drawn, laid out."""
+    figures = []
+
+    def keep(figure, _file):
+        figure.draw_without_rendering()
+        figures.append(figure)
+
+    monkeypatch.setattr(command, 'save_picture', keep)
+    return figures
+
+
+@pytest.mark.parametrize('over', ['crank', 'time'])
+def test_accelerations_that_were_recorded_are_drawn_below_with_one_left_edge(
+    tmp_path, drawn, over
+):
+    linkage = shipped_path('linkages/slider_crank.yaml').read_text()
+    scene = scene_file(tmp_path, 'effects: {acceleration: {}}\n', linkage)
+    bag = Recorded(
+        tmp_path / 'bag', scene, lambda row: {'crank_joint': (1.0 + 0.007 * row, 7.0)}
+    ).run(500)
+    assert answer(command, bag, '--over', over, '-o', tmp_path / 'x.svg') == 0
+    (figure,) = drawn
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        'joint angle [°]', 'slide [mm]', 'rate of joint angle [°/s]', 'rate of slide [mm/s]',
+        'acceleration of joint angle [°/s²]', 'acceleration of slide [m/s²]',
+    ]  # fmt: skip
+    edges = {round(axes.get_position().x0, 9) for axes in figure.axes}
+    assert len(edges) == 1
+    # The accelerations are the slopes of the rates: over the crank, in degrees, at 7 rad/s.
+    per_x = 1.0 if over == 'time' else np.degrees(7.0)
+    for rates, accelerations in zip(figure.axes[2:4], figure.axes[4:], strict=True):
+        (rate,), (acceleration,) = rates.get_lines(), accelerations.get_lines()
+        x, y = rate.get_data()
+        slopes = np.gradient(y, x) * per_x
+        known = np.isfinite(slopes)
+        _, found = acceleration.get_data()
+        assert np.sum(known) > 400
+        assert found[known] == pytest.approx(slopes[known], abs=0.02 * np.nanmax(np.abs(found)))
+
+
+def test_more_curves_than_colours_are_told_apart():
+    names = [f'joint_{index}' for index in range(28)]
+    curves = [Curve(name, True, (0.0, 1.0), (float(i), float(i))) for i, name in enumerate(names)]
+    figure = Figure()
+    (panels,) = stacked_axes(figure.add_gridspec, [curves])
+    lines = plot_joints(panels, curves, degrees_x=False).values()
+    looks = {(line.get_color(), str(line._dash_pattern)) for line in lines}
+    assert len(looks) == 28
