@@ -194,7 +194,8 @@ class Bodies:
     def __init__(
         self, world: ET.Element, part: ModelPart, names: PrefixedNames, first_layer: int
     ) -> None:
-        self._closure = closure = part.closure
+        closure: Closure = part.closure
+        self._closure = closure
         self._names = names
         tree = physical_tree(closure)
         self.cuts = tree.cuts  # Pins that are cut: the point, and the two links that it joins
