@@ -328,7 +328,8 @@ class CrankBranch:
             return sqrt(low / self._height)
         if self.turns_back[1]:
             return 1.0 - sqrt(self._rise_between(y, self.high) / self._height)
-        return self._rise_between(self.low, y) / self._height
+        part: float = self._rise_between(self.low, y) / self._height
+        return part
 
     def distance_beyond(self, y: float) -> float:
         """Return how much a value is beyond the branch, in its unit; 0 if it is reached."""
@@ -365,10 +366,11 @@ class CrankBranch:
             return self.last + turns, 0.0 if self.turns_back[1] else inf
         cells = self._cells
         place = self._table_parameter(y) * cells
-        i = min(int(place), cells - 1)
+        # As in `StartTable`: an end belongs to the cell before it.
+        i = min(max(ceil(place) - 1, 0), cells - 1)
         t = place - i
         crank = self._start_at(self._cubics[i], t)
-        if i not in self._steep_cells:
+        if place == 1.0 or i not in self._steep_cells:
             fast, turning, square, last, least, most = self._known
             for count in range(1, 1 + _STEPS):
                 found = fast(crank, 1.0)

@@ -187,14 +187,14 @@ class InverseClosure(Closure):
         if getattr(position, 'closure', None) is not self:
             self._check_own('position', position)
         (rate,) = self._single_number('rates', rates)
-        places = self._beside_toggle(position, position.joints[0]) if position.poses else []
-        ways = places or [self._crank_position(position)]
-        if not (
-            position.status.has_rates
-            and all_finite([rate, *(rate / self._output_slope(way) for way in ways)])
-        ):
+        if not (position.status.has_rates and all_finite((rate,))):
             return self._huge_velocity(position, (rate,))
-        found = [self._crank_velocity(way, rate) for way in ways]
+        places = self._beside_toggle(position, position.joints[0])
+        ways = places or [self._crank_position(position)]
+        cranks = [rate / self._output_slope(way) for way in ways]
+        if any(map(_overflows, cranks)):
+            return self._huge_velocity(position, (rate,))
+        found = [self.closed.velocity(way, crank) for way, crank in zip(ways, cranks, strict=True)]
         if any(type(one.rates) is Velocity for one in found):
             return self._huge_velocity(position, (rate,))
         (crank,) = self.closed.inputs_of(found[-1].state)
@@ -211,7 +211,7 @@ class InverseClosure(Closure):
             self._check_own('velocity', velocity)
         (change,) = self._single_number('accelerations', accelerations)
         (rate,) = self.inputs_of(velocity.state)
-        if type(velocity.rates) is Velocity or not isfinite(change):
+        if type(velocity.rates) is Velocity or _overflows(change):
             return self._huge_acceleration(position, velocity, (change,))
         places = self._beside_toggle(position, position.joints[0])
         found = []
@@ -220,7 +220,7 @@ class InverseClosure(Closure):
             bent = self.closed.acceleration(place, moving, 0.0)
             *_, (bend,) = self._output_groups(place, moving, bent)
             crank = (change - bend) / self._output_slope(place)
-            if not isfinite(crank):
+            if _overflows(crank):
                 return self._huge_acceleration(position, velocity, (change,))
             found.append(self.closed.acceleration(place, moving, crank))
         ends = [(*self.closed.inputs_of(one.state), *one.joints) for one in found]
@@ -230,13 +230,13 @@ class InverseClosure(Closure):
 
     def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
         found = super()._huge_velocity(position, rates)
-        return replace(found, state=_given_state(*rates, *found.state))
+        return replace(found, state=_given_state(rates[0], *found.state))
 
     def _huge_acceleration(
         self, position: Position, velocity: Velocity, accelerations: tuple[float, ...]
     ) -> Acceleration:
         found = super()._huge_acceleration(position, velocity, accelerations)
-        return replace(found, state=_given_state(*accelerations, *found.state))
+        return replace(found, state=_given_state(accelerations[0], *found.state))
 
     def solve(
         self,
@@ -290,7 +290,7 @@ class InverseClosure(Closure):
         """Return the range of the joint on its branch."""
         one = self.branch
         turns = max(1, round(abs(one.rise) / tau))
-        limited = tuple(not endless for endless in one.endless)
+        limited = not one.endless[0], not one.endless[1]
         ends = one.low, one.high
         return (InputRange(*ends, self.inverse.output.turning, limited, turns, one.by),)
 
@@ -354,6 +354,10 @@ class InverseClosure(Closure):
 
     def _crank_velocity(self, forward: Position, rate: float) -> Velocity:
         return self.closed.velocity(forward, rate / self._output_slope(forward))
+
+
+def _overflows(number: Any) -> bool:
+    return isinstance(number, float) and not isfinite(number)
 
 
 def _as_input(output: Output) -> Input:

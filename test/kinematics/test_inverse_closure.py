@@ -286,6 +286,24 @@ def test_compiled_code_inverts_beside_a_pole():
         assert (status, joints) == (0, inverse.position(slide).joints), slide
 
 
+@pytest.mark.parametrize('name', LINKAGES)
+def test_compiled_code_has_the_bits_of_the_closure_at_the_ends_of_cells(name):
+    """One of them is the middle of the branch. Beside a toggle numbers are bisected further."""
+    closure = gallery(name)
+    branch = closure.branches(outputs(closure)[0])[0]
+    inverse = closure.driven_by(outputs(closure)[0], branch=branch.number)
+    subject = Subject(inverse, 'm', 'x.yaml', 0, inverse.joint_names)
+    made: dict = {}
+    exec(write_source(subject, LANGUAGES['.py'](subject)), made)
+    cells = branch._cells
+    beside_toggles = {end for i in branch._steep_cells for end in (i, i + 1)}
+    for k in {*range(1, cells)} - beside_toggles:
+        value, _ = branch._output_at(k / cells)
+        status, joints = made['position']([value])[:2]
+        if status == 0:
+            assert repr(joints) == repr(inverse.position(value).joints), (k, value)
+
+
 def test_calls_in_any_order_give_the_same_bits():
     values = np.linspace(0.97, 2.24, 500).tolist()
     once = [

@@ -93,7 +93,8 @@ def make_array_functions(closure: StepwiseClosure, package: str) -> ArrayFunctio
         # It takes arrays of NumPy too, but may compute in another precision than theirs, and the
         # precision decides what is exact enough.
         functions = [_converting(function, xp.asarray) for function in functions]
-    return ArrayFunctions(*functions, tuple(STATUSES), source)
+    position, velocity, motion, jacobian = functions
+    return ArrayFunctions(position, velocity, motion, jacobian, tuple(STATUSES), source)
 
 
 def _converting(function: Callable[..., Any], convert: Callable[[Any], Any]) -> Callable[..., Any]:
