@@ -150,7 +150,7 @@ class RunState:
         return 'torque' in drives
 
     @property
-    def uncommanded(self) -> str:
+    def idle_text(self) -> str:
         """Return what acts on the inputs of torque drives while no command comes."""
         acting = []
         for line in self.loop.pipeline.linkages:
@@ -260,7 +260,7 @@ def _describe_silence(run: RunState, age: float) -> str:
     """Return that samples or commands are missing, the newest of an age in [s]."""
     if run.takes_commands:
         text = 'No command yet' if age == inf else f'No command for {age:.1f} s'
-        return f'{text}: {run.uncommanded}'
+        return f'{text}: {run.idle_text}'
     return 'No crank yet' if age == inf else f'No crank for {age:.1f} s, by its stamps'
 
 
@@ -403,7 +403,7 @@ class Warnings:
         among = f'({number} publisher{"" if number == 1 else "s"})'
         if run.takes_commands:
             line = (
-                f'no command on {crank_topic} in {waited:.0f} s {among}, so {run.uncommanded}; '
+                f'no command on {crank_topic} in {waited:.0f} s {among}, so {run.idle_text}; '
                 f'send sensor_msgs/JointState with the effort of {list_names(run.inputs)} there, '
                 'or remap the topic'
             )

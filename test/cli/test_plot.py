@@ -27,8 +27,7 @@ import pytest
 
 from .recorded import answer, Recorded, scene_file
 
-pytest.importorskip('matplotlib')
-from matplotlib.figure import Figure
+Figure = pytest.importorskip('matplotlib.figure').Figure
 
 
 def closure_of(name: str) -> Closure:
