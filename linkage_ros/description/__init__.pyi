@@ -104,10 +104,6 @@ from linkage_ros.description.scene_grammar import (
 )
 from linkage_ros.description.scene_settings import apply_settings as apply_settings
 from linkage_ros.description.section import Section as Section
-from linkage_ros.description.space_file import (
-    is_spatial as is_spatial,
-    read_space_closure as read_space_closure,
-)
 from linkage_ros.description.space_grammar import linkage_schema as linkage_schema
 from linkage_ros.description.tables import (
     block_rows as block_rows,

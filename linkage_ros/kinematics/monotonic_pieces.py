@@ -155,7 +155,7 @@ def _turning_points(
                     yield last_inside(keeps_sign(slope), after, at)
 
 
-class _Sample(NamedTuple):
+class _OutputSample(NamedTuple):
     """An output at a crank, as an angle u: that of a slide does not jump at a pole."""
 
     crank: float
@@ -172,16 +172,16 @@ class _Sampler:
         self._evaluate, self._size = evaluate, evaluate.size
         self._period = tau if evaluate.turning else pi
 
-    def sample(self, crank: float) -> _Sample:
+    def sample(self, crank: float) -> _OutputSample:
         """Return a sample."""
         value, slope = self._evaluate(crank)
         if self._evaluate.turning:
-            return _Sample(crank, value, slope, value, slope)
+            return _OutputSample(crank, value, slope, value, slope)
         size = self._size
         angle_slope = slope * size / (size * size + value * value)
-        return _Sample(crank, value, slope, atan2(value, size), angle_slope)
+        return _OutputSample(crank, value, slope, atan2(value, size), angle_slope)
 
-    def refine(self, cranks: Sequence[float]) -> Iterator[_Sample]:
+    def refine(self, cranks: Sequence[float]) -> Iterator[_OutputSample]:
         """Yield the samples at cranks, and those between that are needed."""
         waiting = [self.sample(crank) for crank in reversed(cranks)]
         depths = [0] * len(waiting)
@@ -197,12 +197,12 @@ class _Sampler:
                 before, _ = waiting.pop(), depths.pop()
                 yield before
 
-    def excess(self, one: _Sample, other: _Sample) -> float:
+    def excess(self, one: _OutputSample, other: _OutputSample) -> float:
         """Return the change of the angle beyond what its slopes lead to, without whole turns."""
         change = 0.5 * (one.angle_slope + other.angle_slope) * (other.crank - one.crank)
         return abs(remainder(other.angle - one.angle - change, self._period))
 
-    def jumps(self, sampled: Sequence[_Sample]) -> Iterator[float]:
+    def jumps(self, sampled: Sequence[_OutputSample]) -> Iterator[float]:
         """
         Yield the cranks at which the output jumps: where links pass through infinity.
 
@@ -213,7 +213,7 @@ class _Sampler:
             if self.excess(low, high) >= _JUMP:
                 yield from self._jump_between(low, high)
 
-    def _jump_between(self, low: _Sample, high: _Sample) -> Iterator[float]:
+    def _jump_between(self, low: _OutputSample, high: _OutputSample) -> Iterator[float]:
         middle = low.crank
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low.crank + high.crank)

@@ -50,7 +50,7 @@ class FinishedRuns:
 
     def _read_runs(self, count: int) -> None:
         """Read the runs; of a line that was cut, and behind it, nothing is kept."""
-        with self._open('r+b') as stream:
+        with self._open_file('r+b') as stream:
             head = stream.readline(len(self._head))
             if head != self._head:
                 raise LinkageError(
@@ -70,7 +70,7 @@ class FinishedRuns:
                 whole += len(line)
             stream.truncate(whole)
 
-    def _open(self, mode: str) -> BinaryIO:
+    def _open_file(self, mode: str) -> BinaryIO:
         """Open the file, but not where its name is a link, which may be another user's."""
 
         def open_no_link(path: str, flags: int) -> int:
@@ -83,7 +83,7 @@ class FinishedRuns:
         self.outcomes[number] = outcome
         try:
             if self._stream is None:
-                self._stream = self._open('ab')
+                self._stream = self._open_file('ab')
                 if not self._stream.tell():
                     self._stream.write(self._head)
             self._stream.write(_line_of(number, outcome))

@@ -104,11 +104,13 @@ FACES = {
 BY_PATH = ('linkage_ros.cli.main', 'linkage_ros.stages.drives.')
 # Tests of what lies within, by their file.
 WITHIN = {
-    'linkage_ros.kinematics.crank_branches',
+    'linkage_ros.kinematics.grid',
+    'linkage_ros.kinematics.monotonic_pieces',
     'linkage_ros.kinematics.space.joints',
     'linkage_ros.kinematics.space.steps',
     'linkage_ros.tools.design.motion',
     'linkage_ros.tools.design.pairs.freudenstein',
+    'linkage_ros.tools.drawing.painting',
     'linkage_ros.tools.models.fmu.stepped_scene',
     'linkage_ros.tools.view.report.diagnostics_summary',
 }

@@ -101,7 +101,7 @@ def _converting(function: Callable[..., Any], convert: Callable[[Any], Any]) -> 
     """Return a function that converts its arrays first."""
 
     @wraps(function)
-    def converted(*arrays: Any) -> Any:
+    def convert_first(*arrays: Any) -> Any:
         return function(*map(convert, arrays))
 
-    return converted
+    return convert_first
