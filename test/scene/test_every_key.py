@@ -216,14 +216,17 @@ def refusal(read):
         return error
 
 
+def read_text(text):
+    return read_any_closure(parse_yaml(text.encode(), 'file.yaml'))
+
+
 @pytest.mark.parametrize(
     ('name', 'within'), [*((name, ()) for name in WHOLE), ('gallery hexapod', ('balls',))]
 )
 def test_a_linkage_without_a_key_or_with_a_wrong_one_is_refused_in_one_line(name, within):
     read_any_closure(parse_yaml(LINKAGES[name].encode(), 'file.yaml'))
     for path, text in damaged(yaml.safe_load(LINKAGES[name]), within):
-        content = parse_yaml(text.encode(), 'file.yaml')
-        error = refusal(partial(read_any_closure, content))
+        error = refusal(partial(read_text, text))
         assert error is None or is_one_line(error), (path, str(error))
 
 
@@ -264,7 +267,7 @@ def test_a_misspelt_link_of_a_joint_is_told_by_its_right_name(name):
         if typo in links:
             continue
         at(changed, path[:-1])[path[-1]] = typo
-        error = refusal(partial(read_any_closure, parse_yaml(flow(changed).encode(), 'x')))
+        error = refusal(partial(read_text, flow(changed)))
         assert error.key == '.'.join(path)
         assert error.remedy.startswith('did you mean '), error
 
