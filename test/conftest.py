@@ -20,14 +20,8 @@ from linkage_ros.cli import terminal
 import pytest
 
 from .browser import chromium
+from .support.missing_packages import missing_package
 from .support.sampling import choose_covering, EXAMPLES, TAKES_ALL
-
-WITHOUT_KEY = {
-    'aiohttp', 'casadi', 'dask', 'distributed', 'ezdxf', 'flint', 'fmpy', 'jax',
-    'matplotlib', 'mpmath', 'mujoco', 'numba', 'PIL', 'plotly', 'pyarrow', 'pylinkage',
-    'pythonfmu3', 'rich', 'scipy', 'torch', 'yourdfpy', 'zstandard',
-}  # fmt: skip
-"""Packages without a rosdep key, or too large for a robot: `colcon test` runs without them."""
 
 _skipped: set[str] = set()
 
@@ -61,15 +55,26 @@ def pytest_make_collect_report(
     """Skip a file of tests that needs a package which package.xml cannot name."""
     report = yield
     text = str(report.longrepr) if report.failed else ''
-    package = re.search(r"No module named '(\w+)", text)
+    package = missing_package(text)
     # What a file that was skipped holds may be imported by another one.
     part = re.search(r"cannot import name '\w+' from '[.\w]+' \((.*)\)", text)
-    if (package and package[1] in WITHOUT_KEY) or (part and part[1] in _skipped):
+    if package or (part and part[1] in _skipped):
         report.outcome = 'skipped'
-        what = f'needs the package {package[1]}' if package else f'needs {part[1]}'
-        report.longrepr = report.nodeid, 0, f'Skipped: {what}'
+        what = f'the package {package}' if package else part[1]
+        report.longrepr = report.nodeid, 0, f'Skipped: needs {what}'
     if report.skipped:
         _skipped.add(str(collector.path))
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Skip a test whose command says that such a package is not installed."""
+    report = yield
+    said = ''.join(text for _, text in report.sections)
+    if report.failed and (package := missing_package(f'{report.longrepr}{said}')):
+        report.outcome = 'skipped'
+        report.longrepr = report.nodeid, 0, f'Skipped: needs the package {package}'
     return report
 
 

@@ -14,7 +14,7 @@ import sys
 
 import pytest
 
-from ..conftest import WITHOUT_KEY
+from ..support.missing_packages import WITHOUT_KEY
 
 PROGRAM = """
 import sys

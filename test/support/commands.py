@@ -74,6 +74,11 @@ def linkage(
     folder: Path, *arguments: str, timeout: float = 60.0, **variables: str
 ) -> subprocess.CompletedProcess[str]:
     """Run ``linkage`` in a folder, with more variables of its environment."""
+    # Here, since this file is the program of the server too.
+    import pytest
+
+    from .missing_packages import missing_package
+
     request = {
         'arguments': arguments,
         'folder': str(folder),
@@ -106,7 +111,10 @@ def linkage(
         server.settimeout(None)
         out.seek(0)
         err.seek(0)
-        return subprocess.CompletedProcess(arguments, code, out.read(), err.read())
+        done = subprocess.CompletedProcess(arguments, code, out.read(), err.read())
+    if code and (package := missing_package(done.stderr)):
+        pytest.skip(f'needs the package {package}')
+    return done
 
 
 @cache
