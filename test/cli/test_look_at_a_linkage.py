@@ -49,6 +49,7 @@ def test_check_gives_json_in_si_units(linkage: Run) -> None:
 
 
 def test_check_on_a_terminal_draws_tables(tmp_path: Path) -> None:
+    pytest.importorskip('rich')
     shown = on_terminal(tmp_path, 'check', FOUR_BAR, columns=160)
     assert '╭' in shown
     # Units in brackets are no markup.
