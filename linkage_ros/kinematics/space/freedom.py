@@ -58,7 +58,7 @@ class _MotionEquations:
         self.needed = 6 + 5 * len(linkage.pair_joints)
         balls = [row for point in linkage.points for row in self._ball_rows(point)]
         ratios = [
-            (self.rate(name) - ratio.ratio * self.rate(ratio.of))[None]
+            _without_unit(self.rate(name) - ratio.ratio * self.rate(ratio.of))[None]
             for name, ratio in linkage.ratios.items()
         ]
         self.needed += 3 * len(balls) + len(ratios)
@@ -118,7 +118,7 @@ class _MotionEquations:
 def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
     """Return the degrees of freedom in the pose."""
     equations = _MotionEquations(linkage, plan)
-    inputs = np.vstack([equations.rate(name) for name in linkage.driven])
+    inputs = np.vstack([_without_unit(equations.rate(name)) for name in linkage.driven])
     driven = np.vstack([equations.constraints, inputs])
     rods = plan.rods
 
@@ -205,6 +205,11 @@ def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[
         if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < MERGED:
             return True
     return False
+
+
+def _without_unit(row: Array) -> Array:
+    """Return a row in metres or radians as a row among others, which have no unit."""
+    return row / (np.abs(row).max() or 1.0)
 
 
 def _rank_and_motions(matrix: Array, tolerance: float) -> tuple[int, Array]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from random import Random
 
 import linkage_ros as lr
+from linkage_ros.description import parse_yaml, read_any_closure
 from linkage_ros.kinematics import Status
 from linkage_ros.resources import named_file, spatial_linkage_names
 from mpmath import mp, mpf
@@ -337,3 +338,37 @@ def test_bennett_equations_are_met_within_the_rounding_of_cad_or_refused(tmp_pat
         return
     with pytest.raises(lr.FileError, match='over-constrained'):
         lr.load(file)
+
+
+LIFTED = """
+points: {{a: [0, 0, 0], b: [{0!r}, 0, {1!r}]}}
+links: {{ground: [a], arm: [b]}}
+hinges: {{q: {{parent: ground, child: arm, at: [{1!r}, 0, 0], axis: [0, 1, 0]}}}}
+struts: {{s: [a, b]}}
+input: [s]
+"""
+PUSHED = """
+points: {{a: [{1!r}, 0, 0], b: [{0!r}, 0, {1!r}]}}
+links: {{block: [a], arm: [b], rod: [a, b]}}
+slides: {{s: {{parent: ground, child: block, axis: [1, 0, 0], value: {1!r}}}}}
+hinges: {{q: {{parent: ground, child: arm, at: [0, 0, 0], axis: [0, 1, 0]}}}}
+input: [s]
+"""
+
+
+def turned(q, x, z, pivot):
+    """Return x and z of a place that turns about the y axis through a pivot on the x axis."""
+    return pivot + cos(q) * (x - pivot) + sin(q) * z, cos(q) * z - sin(q) * (x - pivot)
+
+
+@pytest.mark.parametrize('power', range(-12, 9))
+def test_struts_and_slides_drive_linkages_of_any_size(power):
+    size, half = 10.0**power, 0.5 * 10.0**power
+    lifted = read_any_closure(parse_yaml(LIFTED.format(size, half).encode(), 'x.yaml'))
+    q = lifted.position(1.2 * size)['q']
+    x, z = turned(q, size, half, half)
+    assert hypot(x, z) == pytest.approx(1.2 * size, rel=1e-12)
+    pushed = read_any_closure(parse_yaml(PUSHED.format(size, half).encode(), 'x.yaml'))
+    q = pushed.position(0.55 * size)['q']
+    x, z = turned(q, size, half, 0.0)
+    assert hypot(x - 0.55 * size, z) == pytest.approx(hypot(half, half), rel=1e-12)
