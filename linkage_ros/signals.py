@@ -25,7 +25,7 @@ import os
 from queue import Empty, SimpleQueue
 import signal
 import sys
-from threading import Event
+from threading import Event, Timer
 from time import monotonic
 from typing import Any, NoReturn
 
@@ -161,20 +161,30 @@ def end_soon(code: int) -> None:
 
 
 @contextmanager
-def bounded_end() -> Iterator[None]:
+def bounded_end(code: int) -> Iterator[None]:
     """
-    Let SIGALRM end the process if the code within the context, its shutdown, hangs.
+    End the process with an exit code if the code within the context, its shutdown, hangs.
 
     Of some thousand nodes one did not end after its signal; where it hung is unknown. If threads
     of the middleware deadlock while they hold the interpreter's lock, no Python thread can end
-    the process.
+    the process: then SIGALRM does, without the exit code.
     """
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # configuring may have been given another
-    signal.alarm(_LONGEST_END)
+    signal.setitimer(signal.ITIMER_REAL, _LONGEST_END + _LONGEST_GOODBYE)
+    end = Timer(_LONGEST_END, _exit_at_once, [code])
+    end.daemon = True
+    end.start()
     try:
         yield
     finally:
+        end.cancel()
         signal.alarm(0)
+
+
+def _exit_at_once(code: int) -> NoReturn:
+    with suppress(Exception):
+        sys.stdout.flush()
+    os._exit(code)
 
 
 def _ignore_unraisable(unraisable: Any) -> None:

@@ -121,7 +121,7 @@ def _listening_node() -> Iterator[Node]:
     try:
         yield node
     finally:
-        with bounded_end():
+        with bounded_end(1):
             node.destroy_node()
             rclpy.try_shutdown()
 

@@ -79,7 +79,7 @@ def run_demo_node(
         rclpy.try_shutdown()
         return 2
     run(node, stop)
-    with bounded_end():
+    with bounded_end(0):
         node.destroy_node()
         rclpy.try_shutdown()
     return 0

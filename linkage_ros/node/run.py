@@ -89,6 +89,7 @@ def run_linkage_node(
         return EXIT_CONFIGURATION
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    code = EXIT_INCOMPLETE
     try:
         code = _run_node(node, executor, stop, seconds, patience, view)
         if raise_errors and node.failure is not None:
@@ -100,7 +101,7 @@ def run_linkage_node(
         return code
     finally:
         node.end_run()
-        with bounded_end():
+        with bounded_end(EXIT_CONFIGURATION if node.failure is not None else code):
             executor.shutdown()
             node.destroy_node()
             rclpy.try_shutdown()

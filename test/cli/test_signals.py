@@ -376,3 +376,31 @@ def test_a_signal_in_the_first_instants_shows_no_traceback(tmp_path, program):
         assert 'Traceback' not in done.stderr
         assert 'Fatal' not in done.stderr
         assert len(done.stderr.splitlines()) <= 1
+
+
+HANGS = """
+import ctypes, sys, time
+from linkage_ros import signals
+signals._LONGEST_END, signals._LONGEST_GOODBYE = 0.2, 0.2
+print('said')
+with signals.bounded_end(2):
+    eval(sys.argv[1])
+"""
+
+
+@pytest.mark.parametrize(
+    ('hanging', 'code'),
+    [
+        ('time.sleep(30)', 2),
+        # It holds the interpreter's lock, as a deadlock of the middleware may.
+        ('ctypes.PyDLL(None).sleep(30)', -signal.SIGALRM),
+        ('None', 0),
+    ],
+)
+def test_a_shutdown_that_hangs_ends_with_the_exit_code_if_python_still_runs(hanging, code):
+    done = subprocess.run(
+        [sys.executable, '-c', HANGS, hanging], capture_output=True, text=True, check=False,
+        timeout=20,
+    )  # fmt: skip
+    assert done.returncode == code
+    assert done.stdout == 'said\n' or code < 0

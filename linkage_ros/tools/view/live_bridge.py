@@ -207,7 +207,7 @@ class LiveBridge:
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
-        with bounded_end():
+        with bounded_end(0):
             self._executor.shutdown()
             self._node.destroy_node()
             rclpy.try_shutdown(context=self._context)
