@@ -61,6 +61,7 @@ from linkage_ros.kinematics import (
     GROUND,
     GROUND_FRAME,
     length,
+    Limits,
     minus,
     ONE_PLACE,
     plus,
@@ -489,19 +490,11 @@ class _Robot:
         made = _LinkageParts({}, {}, {}, {})
         for name in self._moving:
             joint, frame = joints[name], frames[joints[name].child]
-            turns, limits = joint.kind != 'prismatic', joint.limits
-            if turns and limits.high - limits.low >= tau:  # It does not limit an angle.
-                limits = replace(limits, low=-inf, high=inf)
-            value, told_value = values[name], as_told[name]
-            if value != told_value and limits.low <= told_value <= limits.high:
-                # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
-                room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._size
-                low, high = min(limits.low, value - room), max(limits.high, value + room)
-                limits = replace(limits, low=low, high=high)
+            limits = self._limits_in_pose(joint, values[name], as_told[name])
             axis, ends = frame.turn(direction_of(joint.axis)), (on[joint.parent], on[joint.child])
             if ends[0] != ends[1]:  # It is not held by a fixed loop.
-                joined = SpatialJoint(*ends, axis, frame.origin, value, limits)
-                (made.hinges if turns else made.slides)[name] = joined
+                joined = SpatialJoint(*ends, axis, frame.origin, values[name], limits)
+                (made.slides if joint.kind == 'prismatic' else made.hinges)[name] = joined
         found = [*made.hinges, *made.slides]
         for loop in self._loops:
             self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
@@ -517,6 +510,18 @@ class _Robot:
             open_by=open_by[0],
             turned_by=turned_by[0],
         )
+
+    def _limits_in_pose(self, joint: UrdfJoint, value: float, told: float) -> Limits:
+        """Return the limits of a joint, whose value in the pose is corrected."""
+        turns, limits = joint.kind != 'prismatic', joint.limits
+        if turns and limits.high - limits.low >= tau:  # It does not limit an angle.
+            limits = replace(limits, low=-inf, high=inf)
+        if value != told and limits.low <= told <= limits.high:
+            # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
+            room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._size
+            low, high = min(limits.low, value - room), max(limits.high, value + room)
+            limits = replace(limits, low=low, high=high)
+        return limits
 
     def _add_loop(
         self, loop: UrdfLoop, on: list[str], frames: Mapping[str, SpaceFrame], made: _LinkageParts
