@@ -42,7 +42,10 @@ def _reader():
 @pytest.fixture
 def running(graph, tmp_path, write_scene, start):
     """Return a node that has recorded for a second, and is fed no more."""
-    node = start(write_scene(tmp_path.name, SCENE % (SILENCES, tmp_path)))
+    node = start(
+        write_scene(tmp_path.name, SCENE % (SILENCES, tmp_path)),
+        *('-p', f'runs_directory:={tmp_path}'),
+    )
     publisher = graph.publisher(JointState, '/crank_states')
     heard = graph.listen(JointState, '/joint_states')
     wait_for(publisher.get_subscription_count, 'the node')

@@ -45,7 +45,9 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, is_open=Fal
         ),
     )
     scene_linkage = SimpleNamespace(
-        name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={})
+        name='',
+        drive=('topic', None),
+        linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}),
     )
     linkages = [SimpleNamespace(scene_linkage=scene_linkage, closure=closure, drive=None)]
     counts.last_tick = SimpleNamespace(linkages=linkages, states=(look,))
