@@ -22,7 +22,6 @@ from linkage_ros.description import (
     check_kind,
     check_new,
     check_output_name,
-    files_of_scene,
     TABLE_KINDS,
     Units,
 )
@@ -141,6 +140,8 @@ def refuse_existing(arguments: argparse.Namespace) -> None:
 
 def _read_files(arguments: argparse.Namespace) -> Iterator[Path]:
     """Yield the files that arguments name to read, and those that scenes among them name."""
+    from linkage_ros.description import files_of_scene  # local import: bags are not always there
+
     for name, value in vars(arguments).items():
         if name in _WRITTEN or not isinstance(value, (str, Path)):
             continue

@@ -261,7 +261,8 @@ def _write_results(
               if found[number].failure]  # fmt: skip
     for alike in _group_by_reason(failed)[:_MOST_NAMED]:
         given, failure = alike[0]
-        others = f'; likewise {len(alike) - 1} other runs' if alike[1:] else ''
+        count = len(alike) - 1
+        others = f'; likewise {count} other run{"s" * (count > 1)}' if count else ''
         _print_note(f'{_settings_text(given)}: {failure}{others}')
     if failed:
         _print_note(f'{len(failed)} of {len(runs)} runs failed')

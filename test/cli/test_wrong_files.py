@@ -91,7 +91,7 @@ def test_a_file_of_another_kind_is_called_by_its_name(
     if command in OF_BAGS and kind in ('bin', 'db3', 'bag'):
         return  # the reader of bags shows how it starts, or how to convert it
     if command == 'import' and kind in ('xml', 'svg'):
-        assert line.startswith(f'{name}: holds <')
+        assert line.startswith(f'{name}: is XML, and not a <robot>')
     else:
         assert f' is {noun}' in line
     if kind == 'urdf' and command not in OF_BAGS:

@@ -304,7 +304,7 @@ def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
     ('.effect: {}', 'effects..effect: is not a dotted module name; write package.module'),
     ('MINE.add: {buy: 1}', "effects.MINE.add.buy: unknown key; did you mean 'by'?"),
     ('MINE.add: {by: 11}', 'effects.MINE.add.by: 11 is out of bounds; write a finite number'),
-    ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {…}'),
+    ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {}'),
     ('biass: {}', "effects.biass: unknown key; did you mean 'bias'?"),
 ])  # fmt: skip
 def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, line, said):
