@@ -47,6 +47,7 @@ def refusal(setting: str) -> str:
     return ''
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize('setting', MAPPINGS)
 def test_the_example_of_a_mapping_can_be_pasted(setting):
     text = refusal(setting)

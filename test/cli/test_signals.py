@@ -364,7 +364,7 @@ PROGRAMS = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('program', PROGRAMS)
 def test_a_signal_in_the_first_instants_shows_no_traceback(tmp_path, program):
     for number in (1, 2, 3, 5, 8, 13, 21, 34, 55, 89):

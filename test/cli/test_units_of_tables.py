@@ -151,6 +151,7 @@ def test_a_table_has_the_units_of_its_file(folders: list[Path], command: str) ->
     assert converted or command in {'scene', 'info'}  # their quantities are texts
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('command', sorted(TABLES.keys() - {'export', 'simulate'}))
 def test_json_is_in_si(folders: list[Path], command: str) -> None:
     in_si, in_mm = (
@@ -204,6 +205,7 @@ traced: [A]
 """
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('unit', ['cm', 'mm', 'in'])
 @pytest.mark.parametrize(
     'typed',

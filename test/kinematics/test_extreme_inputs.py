@@ -38,6 +38,7 @@ def check_position(closure, *inputs):
     return position
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_extreme_numbers_have_an_answer(name):
     closure = load(name)
@@ -54,6 +55,7 @@ def test_extreme_numbers_have_an_answer(name):
         check_motion(closure, position)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     'name', [name for name in linkage_names() if len(load(name).input_names) == 1]
 )

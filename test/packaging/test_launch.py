@@ -273,7 +273,7 @@ def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
     assert least <= max(gaps) <= most
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_any_linkage_of_the_gallery_is_shown_whole(start, name):
     """What its two processes publish places every link, and the loops meet."""

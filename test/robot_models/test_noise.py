@@ -48,6 +48,7 @@ def models():
     return {}
 
 
+@pytest.mark.sample(14)
 @pytest.mark.parametrize('powers', [FINE, COARSE], ids=['fine', 'coarse'])
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_noise_of_cad_and_the_order_of_joints_change_no_pose(tmp_path, models, name, powers):

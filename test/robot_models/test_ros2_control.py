@@ -435,6 +435,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(name, tmp_path, capsys):
     assert [file.name for file in tmp_path.iterdir()] == ['file']
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('count', range(6))
 @pytest.mark.parametrize('force', [False, True])
 def test_a_package_is_written_whole_or_not_at_all(count, force, tmp_path, capsys, monkeypatch):
