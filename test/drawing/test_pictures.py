@@ -122,6 +122,7 @@ def test_lengths_below_a_metre_are_in_millimetres():
     assert slide.xaxis.get_major_formatter()(-0.1) == '−100'
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('length', LENGTHS)
 def test_lengths_of_a_file_are_in_its_unit_and_round(length):
     shown = 'mm' if length == 'm' else length

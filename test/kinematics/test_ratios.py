@@ -328,6 +328,7 @@ def geared_rocker(rng: Random, ratio: float) -> tuple[Closure, float]:
     return Closure(linkage), offset
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('ratio', [-0.5, 0.25, -1.0, 3.0, 0.5, 0.37])
 def test_implicit_ratio_turns_its_link_by_whole_turns_of_the_input(ratio: float) -> None:
     random = Random(8)
