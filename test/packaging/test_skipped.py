@@ -12,8 +12,6 @@ import re
 import subprocess
 import sys
 
-import pytest
-
 from ..support.missing_packages import WITHOUT_KEY
 from ..support.sampling import TAKES_ALL
 
