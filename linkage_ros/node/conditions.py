@@ -116,9 +116,8 @@ class RunState:
     counts: Counts  # Counts of the loop, as read at this instant
     clock: int  # Time of the node's clock, in [ns]
     recording: RunRecording
-    limits: Mapping[
-        str, float
-    ]  # Warning threshold for each attribute of `SingularityMargin`; 0: never
+    # Warning threshold for each attribute of `SingularityMargin`; 0: never
+    limits: Mapping[str, float]
     is_simulated: bool = False  # Whether a simulation's clock decides when to tick
     start: int = 0  # Time of the activation, in [ns] of the steady clock
     crank_topic: str = ''  # Resolved name of the drives' topic; '' for none
@@ -146,15 +145,16 @@ class RunState:
     @property
     def takes_commands(self) -> bool:
         """Whether the drives take commands, which move the inputs, instead of samples of these."""
-        drives = [line.scene_linkage.drive[0] for line in self.loop.pipeline.linkages]
-        return 'torque' in drives
+        return any(line.scene_linkage.drive[0] == 'torque' for line in self.loop.pipeline.linkages)
 
     @property
     def idle_text(self) -> str:
         """Return what acts on the inputs of torque drives while no command comes."""
         acting = []
         for line in self.loop.pipeline.linkages:
-            drive = line.scene_linkage.drive[1]
+            name, drive = line.scene_linkage.drive
+            if name != 'torque':
+                continue
             unit = 'N' if line.closure.linkage.inputs[0].slider else 'N·m'
             names = list_names(line.scene_linkage.sampled_joints)
             what = (

@@ -86,3 +86,19 @@ def test_stamps_ahead_of_the_clock_are_not_to_be_let_in_by_max_lead():
         '/crank: 1 samples rejected: stamp in the future (1): synchronise the clocks, or write '
         'drive: {topic: {stamp: arrival}}'
     )
+
+
+@pytest.mark.parametrize(
+    'other', ['constant_rate: {rate: 1}', 'sine: {amplitude: 1, frequency: 1}']
+)
+def test_beside_a_linkage_under_torque_another_may_have_any_drive(tmp_path, other):
+    file = tmp_path / 'scene.yaml'
+    file.write_text(
+        'linkages:\n'
+        '- {name: a, linkage: four_bar, drive: {torque: {on_timeout: brake, brake: 0.2}}}\n'
+        f'- {{name: b, linkage: four_bar, drive: {{{other}}}}}\n'
+    )
+    pipeline = Pipeline(load_scene(file))
+    run = observe(fake_loop(pipeline=pipeline), Counts(chatter=[0, 0]))
+    assert run.takes_commands
+    assert run.idle_text == 'the brake of 0.2 N·m holds a_crank_joint'

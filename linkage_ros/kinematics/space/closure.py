@@ -99,8 +99,8 @@ class SpaceClosure(StepwiseClosure):
         check_freedom(linkage, plan, self.freedom)
         self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
-        self._error_line = StraightLine(self._list_errors, lambda: None)
         """Rods that may turn about themselves."""
+        self._error_line = StraightLine(self._list_errors, lambda: None)
         self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
         self.ratio_turns = plan.ratio_turns
         self._terms = tuple(
