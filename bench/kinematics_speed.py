@@ -11,8 +11,8 @@ Speed of solving linkages with accelerations: one state at a time, and a million
 
 They are compared with pylinkage, and with the formulas of a four-bar in one straight-line function
 without status, pose and steps. That function is valid for linkages whose crank turns fully and
-passes no change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
-`linkage_ros.kinematics.diagonals`.
+passes no change point. Its arithmetic is that of `linkage_ros.kinematics.plane.dyads.rrr` over
+`linkage_ros.kinematics.plane.diagonals`.
 """
 
 from __future__ import annotations

@@ -29,14 +29,14 @@ from linkage_ros.messages.joint_state import (
     Rejection as Rejection,
 )
 from linkage_ros.kinematics.batch import Batch as Batch
-from linkage_ros.kinematics.closure import Closure as Closure
-from linkage_ros.kinematics.inverse_closure import InverseClosure as InverseClosure
+from linkage_ros.kinematics.plane.closure import Closure as Closure
+from linkage_ros.kinematics.analysis.inverse_closure import InverseClosure as InverseClosure
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
     Position as Position,
     Velocity as Velocity,
 )
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics.plane.linkage import (
     Input as Input,
     Limits as Limits,
     Linkage as Linkage,

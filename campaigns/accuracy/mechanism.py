@@ -38,7 +38,7 @@ class Spot(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """A point of a link on a line of another; as `linkage_ros.kinematics.linkage.Slider`."""
+    """A point of a link on a line of another; as `linkage_ros.kinematics.plane.linkage.Slider`."""
 
     point: str
     along: str

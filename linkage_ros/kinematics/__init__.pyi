@@ -6,71 +6,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-from linkage_ros.kinematics.arithmetic import (
-    all_finite as all_finite,
-    call as call,
-    copysign as copysign,
-    cross_product as cross_product,
-    has_result as has_result,
-    make_vector as make_vector,
-    remainder as remainder,
-    ROUNDING as ROUNDING,
-    sin as sin,
-    SMALLEST as SMALLEST,
-    sqrt as sqrt,
-    UNIT_ROUNDOFF as UNIT_ROUNDOFF,
-    unit_vector as unit_vector,
-    where as where,
-)
-from linkage_ros.kinematics.assembly_modes import (
-    other_assemblies as other_assemblies,
-    STARTS as STARTS,
-)
-from linkage_ros.kinematics.batch import (
-    Array as Array,
-    Batch as Batch,
-    CODES as CODES,
-    Complex as Complex,
-    Mask as Mask,
-)
-from linkage_ros.kinematics.checks import (
-    check_planar as check_planar,
-    PLANAR_ONLY as PLANAR_ONLY,
-)
-from linkage_ros.kinematics.closure import Closure as Closure
-from linkage_ros.kinematics.crank_branches import CrankBranch as CrankBranch
-from linkage_ros.kinematics.curves import (
+from linkage_ros.kinematics.analysis.crank_branches import CrankBranch as CrankBranch
+from linkage_ros.kinematics.analysis.curves import (
     Curve as Curve,
     drawn_once as drawn_once,
     sweep_range as sweep_range,
     traced_carriers as traced_carriers,
     unwrap_angles as unwrap_angles,
 )
-from linkage_ros.kinematics.doubles import (
-    SHRINK as SHRINK,
-)
-from linkage_ros.kinematics.drawn_pose import read_drawn_pose as read_drawn_pose
-from linkage_ros.kinematics.dyads.rpr import (
-    RPRDyad as RPRDyad,
-    RPRPose as RPRPose,
-    swivel_diagonal as swivel_diagonal,
-)
-from linkage_ros.kinematics.dyads.rrr import (
-    crank_diagonal as crank_diagonal,
-    RRRDyad as RRRDyad,
-    RRRPose as RRRPose,
-)
-from linkage_ros.kinematics.elimination import Elimination as Elimination
-from linkage_ros.kinematics.equations import (
-    BodyDirection as BodyDirection,
-    CoincidentPoints as CoincidentPoints,
-    Constraint as Constraint,
-    End as End,
-    evaluate_constraints as evaluate_constraints,
-    OnLine as OnLine,
-    Parallel as Parallel,
-)
-from linkage_ros.kinematics.grashof import (
+from linkage_ros.kinematics.analysis.grashof import (
     CHANGE_POINTS as CHANGE_POINTS,
     four_bar_type as four_bar_type,
     four_bars as four_bars,
@@ -78,28 +22,8 @@ from linkage_ros.kinematics.grashof import (
     GRASHOF as GRASHOF,
     TRIPLE_ROCKERS as TRIPLE_ROCKERS,
 )
-from linkage_ros.kinematics.grid import Grid as Grid
-from linkage_ros.kinematics.inverse_closure import InverseClosure as InverseClosure
-from linkage_ros.kinematics.limits import Bound as Bound
-from linkage_ros.kinematics.link_frames import separate_blocks as separate_blocks
-from linkage_ros.kinematics.linkage import (
-    AssemblyPose as AssemblyPose,
-    GROUND as GROUND,
-    Input as Input,
-    Limits as Limits,
-    Linkage as Linkage,
-    links_by_point as links_by_point,
-    Mass as Mass,
-    NO_LIMITS as NO_LIMITS,
-    Point as Point,
-    Ratio as Ratio,
-    RevoluteJoint as RevoluteJoint,
-    Side as Side,
-    SlideJoint as SlideJoint,
-    Slider as Slider,
-    without_limits as without_limits,
-)
-from linkage_ros.kinematics.pose_view import (
+from linkage_ros.kinematics.analysis.inverse_closure import InverseClosure as InverseClosure
+from linkage_ros.kinematics.analysis.pose_view import (
     all_places as all_places,
     LinkageView as LinkageView,
     pose_text as pose_text,
@@ -107,22 +31,14 @@ from linkage_ros.kinematics.pose_view import (
     SAME_ANGLE as SAME_ANGLE,
     symbol_size as symbol_size,
 )
-from linkage_ros.kinematics.ranges import (
+from linkage_ros.kinematics.analysis.ranges import (
     describe_ranges as describe_ranges,
     golden_section as golden_section,
     is_iterated as is_iterated,
     link_lengths as link_lengths,
     sample_inputs as sample_inputs,
 )
-from linkage_ros.kinematics.results import (
-    Acceleration as Acceleration,
-    InputRange as InputRange,
-    Position as Position,
-    SingularInput as SingularInput,
-    SingularityMargin as SingularityMargin,
-    Velocity as Velocity,
-)
-from linkage_ros.kinematics.shapes import (
+from linkage_ros.kinematics.analysis.shapes import (
     bar_size as bar_size,
     bounding_corners as bounding_corners,
     carried_shapes as carried_shapes,
@@ -143,13 +59,128 @@ from linkage_ros.kinematics.shapes import (
     Shape as Shape,
     shape_outline as shape_outline,
 )
-from linkage_ros.kinematics.sides import (
+from linkage_ros.kinematics.analysis.sweep_analysis import (
+    check_closes as check_closes,
+    check_limits as check_limits,
+    check_turns as check_turns,
+    conditioning_curves as conditioning_curves,
+    find_extremes as find_extremes,
+    find_worst_states as find_worst_states,
+    grid_positions as grid_positions,
+    InputSweep as InputSweep,
+    pose_alone as pose_alone,
+    starts_at_pose as starts_at_pose,
+    SweptCurve as SweptCurve,
+    transmission_angles as transmission_angles,
+    usual_inputs as usual_inputs,
+)
+from linkage_ros.kinematics.arithmetic import (
+    all_finite as all_finite,
+    call as call,
+    copysign as copysign,
+    cross_product as cross_product,
+    has_result as has_result,
+    make_vector as make_vector,
+    remainder as remainder,
+    ROUNDING as ROUNDING,
+    sin as sin,
+    SMALLEST as SMALLEST,
+    sqrt as sqrt,
+    UNIT_ROUNDOFF as UNIT_ROUNDOFF,
+    unit_vector as unit_vector,
+    where as where,
+)
+from linkage_ros.kinematics.batch import (
+    Array as Array,
+    Batch as Batch,
+    CODES as CODES,
+    Complex as Complex,
+    Mask as Mask,
+)
+from linkage_ros.kinematics.doubles import (
+    SHRINK as SHRINK,
+)
+from linkage_ros.kinematics.iterated.elimination import Elimination as Elimination
+from linkage_ros.kinematics.iterated.equations import (
+    BodyDirection as BodyDirection,
+    CoincidentPoints as CoincidentPoints,
+    Constraint as Constraint,
+    End as End,
+    evaluate_constraints as evaluate_constraints,
+    OnLine as OnLine,
+    Parallel as Parallel,
+)
+from linkage_ros.kinematics.iterated.grid import Grid as Grid
+from linkage_ros.kinematics.iterated.start_table import StartTable as StartTable
+from linkage_ros.kinematics.limits import Bound as Bound
+from linkage_ros.kinematics.plane.assembly_modes import (
+    other_assemblies as other_assemblies,
+    STARTS as STARTS,
+)
+from linkage_ros.kinematics.plane.checks import (
+    check_planar as check_planar,
+    PLANAR_ONLY as PLANAR_ONLY,
+)
+from linkage_ros.kinematics.plane.closure import Closure as Closure
+from linkage_ros.kinematics.plane.drawn_pose import read_drawn_pose as read_drawn_pose
+from linkage_ros.kinematics.plane.dyads.rpr import (
+    RPRDyad as RPRDyad,
+    RPRPose as RPRPose,
+    swivel_diagonal as swivel_diagonal,
+)
+from linkage_ros.kinematics.plane.dyads.rrr import (
+    crank_diagonal as crank_diagonal,
+    RRRDyad as RRRDyad,
+    RRRPose as RRRPose,
+)
+from linkage_ros.kinematics.plane.link_frames import separate_blocks as separate_blocks
+from linkage_ros.kinematics.plane.linkage import (
+    AssemblyPose as AssemblyPose,
+    GROUND as GROUND,
+    Input as Input,
+    Limits as Limits,
+    Linkage as Linkage,
+    links_by_point as links_by_point,
+    Mass as Mass,
+    NO_LIMITS as NO_LIMITS,
+    Point as Point,
+    Ratio as Ratio,
+    RevoluteJoint as RevoluteJoint,
+    Side as Side,
+    SlideJoint as SlideJoint,
+    Slider as Slider,
+    without_limits as without_limits,
+)
+from linkage_ros.kinematics.plane.sides import (
     assembly_sides as assembly_sides,
     closes_in_two_ways as closes_in_two_ways,
     closing_name as closing_name,
     sides_at as sides_at,
     without_drawn_pose as without_drawn_pose,
     written_sides as written_sides,
+)
+from linkage_ros.kinematics.plane.standing_joints import (
+    find_standing_state as find_standing_state,
+    turning_points as turning_points,
+)
+from linkage_ros.kinematics.plane.topology import (
+    assur_groups as assur_groups,
+    count_mobility as count_mobility,
+    Driven as Driven,
+    Dyad as Dyad,
+    Group as Group,
+    Iterated as Iterated,
+    Joint as Joint,
+    links_of as links_of,
+    Structure as Structure,
+)
+from linkage_ros.kinematics.results import (
+    Acceleration as Acceleration,
+    InputRange as InputRange,
+    Position as Position,
+    SingularInput as SingularInput,
+    SingularityMargin as SingularityMargin,
+    Velocity as Velocity,
 )
 from linkage_ros.kinematics.space.closure import (
     closure_in_pose as closure_in_pose,
@@ -176,39 +207,8 @@ from linkage_ros.kinematics.space.vectors import (
     Vector as Vector,
     ZERO as ZERO,
 )
-from linkage_ros.kinematics.standing_joints import (
-    find_standing_state as find_standing_state,
-    turning_points as turning_points,
-)
-from linkage_ros.kinematics.start_table import StartTable as StartTable
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
     LinkState as LinkState,
 )
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure as StepwiseClosure
-from linkage_ros.kinematics.sweep_analysis import (
-    check_closes as check_closes,
-    check_limits as check_limits,
-    check_turns as check_turns,
-    conditioning_curves as conditioning_curves,
-    find_extremes as find_extremes,
-    find_worst_states as find_worst_states,
-    grid_positions as grid_positions,
-    InputSweep as InputSweep,
-    pose_alone as pose_alone,
-    starts_at_pose as starts_at_pose,
-    SweptCurve as SweptCurve,
-    transmission_angles as transmission_angles,
-    usual_inputs as usual_inputs,
-)
-from linkage_ros.kinematics.topology import (
-    assur_groups as assur_groups,
-    count_mobility as count_mobility,
-    Driven as Driven,
-    Dyad as Dyad,
-    Group as Group,
-    Iterated as Iterated,
-    Joint as Joint,
-    links_of as links_of,
-    Structure as Structure,
-)

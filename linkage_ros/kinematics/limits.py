@@ -23,13 +23,13 @@ from math import inf, pi, remainder, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import ROUNDING, UNIT_ROUNDOFF
-from linkage_ros.kinematics.linkage import GROUND, Limits, Linkage, RevoluteJoint
+from linkage_ros.kinematics.plane.linkage import GROUND, Limits, Linkage, RevoluteJoint
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array, Mask
+    from linkage_ros.kinematics.plane.topology import Structure
     from linkage_ros.kinematics.results import InputRange, Position
-    from linkage_ros.kinematics.topology import Structure
 
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
 """A state of these becomes limited beyond the limits; a toggle stays one, without rates."""

@@ -20,10 +20,10 @@ from math import tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.errors import list_names, quote
-from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.plane.topology import Structure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
-from linkage_ros.kinematics.topology import Structure
 
 
 class InputRange(NamedTuple):

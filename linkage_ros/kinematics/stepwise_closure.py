@@ -20,12 +20,13 @@ from operator import mul
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.errors import escape_unprintable, list_names, quote
+from linkage_ros.kinematics.analysis.ranges import closing_ranges, input_ranges
+from linkage_ros.kinematics.analysis.singularity_margin import singular_inputs, singularity_margin
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
 from linkage_ros.kinematics.limits import Bounds, limit_status
-from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.kinematics.ranges import closing_ranges, input_ranges
+from linkage_ros.kinematics.plane.linkage import RevoluteJoint
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -34,7 +35,6 @@ from linkage_ros.kinematics.results import (
     SingularityMargin,
     Velocity,
 )
-from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
 from linkage_ros.workbench import find_tool
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from linkage_ros import ArrayFunctions
     from linkage_ros.kinematics.batch import Array, Batch
     from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
-    from linkage_ros.kinematics.grid import Grid
+    from linkage_ros.kinematics.iterated.grid import Grid
     from numpy.typing import ArrayLike
 
 _FILLED = 2

@@ -112,7 +112,7 @@ IMPORTED = (
     'linkage_ros.errors',
     'linkage_ros.cli.terminal',
     'linkage_ros.cli.check',
-    'linkage_ros.kinematics.closure',
+    'linkage_ros.kinematics.plane.closure',
 )
 
 

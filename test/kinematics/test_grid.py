@@ -11,7 +11,7 @@
 from math import floor, hypot, inf, sqrt
 import random
 
-from linkage_ros.kinematics.grid import Grid, GridInput
+from linkage_ros.kinematics.iterated.grid import Grid, GridInput
 import pytest
 
 

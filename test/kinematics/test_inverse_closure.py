@@ -38,7 +38,7 @@ from linkage_ros.kinematics import (
     Slider,
     Status,
 )
-from linkage_ros.kinematics.monotonic_pieces import monotonic_pieces
+from linkage_ros.kinematics.analysis.monotonic_pieces import monotonic_pieces
 from linkage_ros.tools.models.source_code import LANGUAGES, Subject, write_source
 from linkage_ros.tools.study import prove, SingularError
 import numpy as np

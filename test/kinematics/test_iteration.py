@@ -20,7 +20,6 @@ from linkage_ros.kinematics import (
     AssemblyPose,
     assur_groups,
     Closure,
-    closure as closure_module,
     Driven,
     GROUND,
     Input,
@@ -33,6 +32,7 @@ from linkage_ros.kinematics import (
     Status,
     Structure,
 )
+from linkage_ros.kinematics.plane import closure as closure_module
 import numpy as np
 import pytest
 

@@ -27,13 +27,9 @@ from linkage_ros.kinematics import (
     Batch,
     Closure,
     CODES,
-    diagonals,
-    dyads,
     Input,
     Linkage,
-    newton_group,
     Position,
-    rail,
     RevoluteJoint,
     SlideJoint,
     Slider,
@@ -42,6 +38,8 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.kinematics.compiling import BLOCK, Compiled, CompiledAnswer
+from linkage_ros.kinematics.iterated import newton_group
+from linkage_ros.kinematics.plane import diagonals, dyads, rail
 import numpy as np
 from numpy.typing import NDArray
 import pytest

@@ -104,8 +104,8 @@ FACES = {
 BY_PATH = ('linkage_ros.cli.main', 'linkage_ros.stages.drives.')
 # Tests of what lies within, by their file.
 WITHIN = {
-    'linkage_ros.kinematics.grid',
-    'linkage_ros.kinematics.monotonic_pieces',
+    'linkage_ros.kinematics.iterated.grid',
+    'linkage_ros.kinematics.analysis.monotonic_pieces',
     'linkage_ros.kinematics.space.joints',
     'linkage_ros.kinematics.space.steps',
     'linkage_ros.tools.design.motion',

@@ -15,6 +15,8 @@ from itertools import islice, product
 from math import inf, pi, tau
 from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.analysis.ranges import is_iterated
+from linkage_ros.kinematics.analysis.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.arithmetic import UndecidedError
 from linkage_ros.kinematics.compiling.python import (
     python_body,
@@ -29,9 +31,7 @@ from linkage_ros.kinematics.compiling.trace import (
     published_joints,
     trace_path,
 )
-from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.analysis.ranges import is_iterated
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.built_once import keep_results
@@ -35,7 +36,6 @@ from linkage_ros.kinematics.compiling.trace import (
     Tree,
 )
 from linkage_ros.kinematics.doubles import columns_of, HUGE, SHRINK, to_doubles
-from linkage_ros.kinematics.ranges import is_iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import ArrayLike

@@ -17,7 +17,7 @@ from __future__ import annotations
 from itertools import combinations
 from math import dist, hypot
 
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import SpaceLinkage
 from linkage_ros.kinematics.space.vectors import (
     cross,

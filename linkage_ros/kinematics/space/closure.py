@@ -17,8 +17,10 @@ from math import dist, sqrt, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
-from linkage_ros.kinematics.linkage import SlideJoint
+from linkage_ros.kinematics.iterated.straight_line import StraightLine
+from linkage_ros.kinematics.plane.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.linkage import (
     check_space_linkage,
@@ -39,8 +41,6 @@ from linkage_ros.kinematics.space.vectors import (
 )
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
-from linkage_ros.kinematics.straight_line import StraightLine
-from linkage_ros.kinematics.sweep_analysis import grid_positions
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.freedom import Freedom

@@ -22,14 +22,14 @@ from math import dist, inf, pi, remainder, tau
 from random import Random
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.grid import Grid, GridInput
-from linkage_ros.kinematics.grid_group import GridGroup
+from linkage_ros.kinematics.iterated.grid import Grid, GridInput
+from linkage_ros.kinematics.iterated.grid_group import GridGroup
+from linkage_ros.kinematics.iterated.steps_before import StepsBefore
+from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.knot_equations import KnotEquations
 from linkage_ros.kinematics.space.steps import missing_length
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
-from linkage_ros.kinematics.steps_before import StepsBefore
-from linkage_ros.kinematics.straight_line import StraightLine
 
 _APART, _DIGITS = 1e-6, 12
 """Smallest distance of the ends of rods in two solutions, in lengths; and their digits."""
@@ -164,7 +164,7 @@ class Knot:
 
     def _close_slowly(self, solved: LinkState) -> KnotPose:
         """Close the links where no cell is proven: next to a singularity, or beyond it."""
-        from linkage_ros.kinematics.descent import descend  # local import: it loads numpy
+        from linkage_ros.kinematics.iterated.descent import descend  # local import: it loads numpy
         import numpy as np  # local import: few states need it
 
         status, found = self._group.close_slowly(
@@ -196,7 +196,7 @@ class Knot:
         return [*errors, *chain(*zip(*rows, strict=True))]
 
     def _conditioning_at(self, known: LinkState, unknowns: Sequence[float]) -> float:
-        from linkage_ros.kinematics.descent import (
+        from linkage_ros.kinematics.iterated.descent import (
             reciprocal_condition,  # local import: it loads numpy
         )
         import numpy as np  # local import: few states need it

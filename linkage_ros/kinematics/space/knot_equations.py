@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.elimination import Elimination
-from linkage_ros.kinematics.grid_group import Solve
+from linkage_ros.kinematics.iterated.elimination import Elimination
+from linkage_ros.kinematics.iterated.grid_group import Solve
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (

@@ -22,7 +22,8 @@ from math import dist
 from typing import NamedTuple
 
 from linkage_ros.errors import list_names
-from linkage_ros.kinematics.grid import grid_inputs
+from linkage_ros.kinematics.iterated.grid import grid_inputs
+from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.space.knot import Knot
 from linkage_ros.kinematics.space.knot_equations import KnotEquations, KnotRod, Mover, RodEnd
 from linkage_ros.kinematics.space.plan import SpacePlan
@@ -39,7 +40,6 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
     ZERO,
 )
-from linkage_ros.kinematics.steps_before import StepsBefore
 
 _INDEPENDENT = 1e-6
 """Least part of a rod's equation that others do not tell, in the pose."""

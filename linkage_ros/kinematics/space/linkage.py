@@ -21,8 +21,8 @@ from functools import cached_property
 from math import dist, frexp, isfinite, ldexp
 
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
-from linkage_ros.kinematics.checks import check_all_limits
-from linkage_ros.kinematics.linkage import (
+from linkage_ros.kinematics.plane.checks import check_all_limits
+from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
     GROUND,
     Input,

@@ -33,8 +33,8 @@ from math import atan2, dist, hypot, lcm, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.solved_links import count_turns
+from linkage_ros.kinematics.plane.linkage import GROUND
+from linkage_ros.kinematics.plane.solved_links import count_turns
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of

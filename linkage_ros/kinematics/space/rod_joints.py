@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.vectors import (
     cross,

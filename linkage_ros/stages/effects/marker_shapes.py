@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-A linkage's markers, from the shapes of `linkage_ros.kinematics.shapes`, packed once.
+A linkage's markers, from the shapes of `linkage_ros.kinematics.analysis.shapes`, packed once.
 
 The shape of a link has its own frame, at a point of the link and turned with it, so only positions
 and angles change from message to message. Shapes that lie on top in the drawing get a greater z,

@@ -21,9 +21,9 @@ its lifetime, so that a silent linkage does not look like one that stands still.
 Forces are arrows; see `linkage_ros.stages.effects.marker_shapes`.
 
 Links are red while the conditioning of their group (see
-`linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), with the threshold μ: for a
-dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no pose:
-moving markers are deleted, and a text shows the closure error.
+`linkage_ros.kinematics.analysis.singularity_margin`) is below √2·sin(μ/2), with the threshold μ:
+for a dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no
+pose: moving markers are deleted, and a text shows the closure error.
 """
 
 from __future__ import annotations

@@ -40,10 +40,10 @@ def drawn_in_frames(shown: LinkageView) -> dict[str, Any]:
     Return the drawing of a linkage as JSON data; lengths are in [m].
 
     ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
-    ``role`` (see `linkage_ros.kinematics.shapes`), and ``points``, x and y in turn: of a circle
-    its centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
-    ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
-    bar, ``paths`` the curves of the traced points over the range of the input.
+    ``role`` (see `linkage_ros.kinematics.analysis.shapes`), and ``points``, x and y in turn: of a
+    circle its centre, with a ``radius``; of a segment its ends; of an area its corners, with
+    ``closed``. ``frame`` is the lower left and upper right corner of the drawing, ``size`` half
+    the width of a bar, ``paths`` the curves of the traced points over the range of the input.
     """
     size = symbol_size(shown)
     drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)

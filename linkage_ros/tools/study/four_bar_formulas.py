@@ -22,7 +22,7 @@ same sign belongs to the other assembly. The formula is used as it is printed, w
 throughout. It gives no rates.
 
 **Single precision:** the closed form in numbers of 32 bits, inputs and constants included. It is
-the stable form by the half angle, as in `linkage_ros.kinematics.diagonals`. With
+the stable form by the half angle, as in `linkage_ros.kinematics.plane.diagonals`. With
 near = 2√(ad)·sin(φ/2) and far = 2√(ad)·cos(φ/2), s² = (d − a)² + near²::
 
     K² = (s² − (b − c)²)·((b + c)² − s²)

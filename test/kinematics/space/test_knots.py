@@ -79,7 +79,7 @@ def test_a_state_has_the_same_bits_after_a_motion_to_it():
 
 
 def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypatch):
-    from linkage_ros.kinematics import grid
+    from linkage_ros.kinematics.iterated import grid
 
     states = random_inputs(closure_of('ankle_motors'), 60, 0.6)
     whole = closure_of('ankle_motors')

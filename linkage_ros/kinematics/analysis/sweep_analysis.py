@@ -1,0 +1,643 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A linkage while one input goes through its range: samples, extremes, checks of limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise, product
+from math import inf, isfinite, nan, pi, remainder, tau
+from typing import NamedTuple
+
+from linkage_ros.errors import DefinitionError, list_names, quote
+from linkage_ros.kinematics.analysis.ranges import (
+    describe_ranges,
+    even_samples,
+    find_intervals,
+    golden_section,
+    is_iterated,
+    joints_repeat,
+    sample_inputs,
+    through_the_end,
+    turns_to_repeat,
+    within_own,
+    within_published,
+)
+from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.limits import Bound
+from linkage_ros.kinematics.plane.linkage import AssemblyPose, Linkage
+from linkage_ros.kinematics.results import (
+    InputRange,
+    LoopClosure,
+    Position,
+    SingularityMargin,
+)
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
+
+# The pose of one step of a solution, from the steps that it starts from and no others.
+
+_SAMPLES = 720
+_GRID, _MOST_ON_GRID = 24, 14_000
+"""Values of each input on a grid, and states on it at most."""
+
+_FEW, _MOST_OF_MANY, _MOST_ITERATED = 3, 60, 1000
+"""Inputs that so many states are meant for; how many of more inputs, and of iterated links."""
+
+_SAME = 1e-9
+"""Largest difference of values that count as equal, in [rad] or relative to a length."""
+
+_NOISE = 1e-13
+"""Largest difference of values that is rounding, in [rad]."""
+
+_DEEPER = 10.0
+"""Depth that a valley may have below its sample, relative to the height of those beside it."""
+
+_APART = 1e-4
+"""Places nearer to each other than this count as one, in [rad] or [m]."""
+
+_MANY = 12
+"""An extreme met at more places than this lists none of them; also the lines of a grid."""
+
+_NEAR_ZERO, _ZERO = 0.25, 1e-7
+"""Upper bounds of a sample next to a zero, and of a zero, in [rad]."""
+
+_EASY = 0.25
+"""Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
+
+
+def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., StepPose]:
+    """
+    Return a function that gives the pose of a step at inputs, in [rad] and [m].
+
+    If a crank drives a hundred independent loops, it closes only one. ``inputs`` are inputs at
+    which the linkage closes: they show where each step appends its results.
+    """
+    needed = closure.needed_groups(closure.step_groups[number])
+    walked = closure.initial_state(*inputs)
+    plan: list[tuple[Callable[[LinkState], StepPose], int, int]] = []
+    for step, group in zip(closure.steps[: number + 1], closure.step_groups, strict=False):
+        start = len(walked.coordinates), len(walked.pins)
+        # A pin is placed for the first group that needs it, and used by others.
+        if step.close(walked) is PLACED or group in needed:
+            plan.append((step.close, *start))
+
+    def pose_at(*values: float) -> StepPose:
+        state = closure.initial_state(*values)
+        found: StepPose = PLACED
+        for close, coordinates, pins in plan:
+            # Steps that are left out keep their places in the lists, which nothing reads.
+            state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
+            state.pins.extend([0j] * (pins - len(state.pins)))
+            found = close(state)
+            if not found.status.has_pose:
+                break
+        return found
+
+    return pose_at
+
+
+class Extreme(NamedTuple):
+    """A lowest or highest value, and the inputs where it occurs; none if it is constant."""
+
+    value: float
+    at: tuple[float, ...]
+
+
+class Sampled(NamedTuple):
+    """The values of a function at samples of an input, from one end of a range to the other."""
+
+    interval: InputRange
+    values: list[float]
+    results: list[float]
+
+
+class SweptCurve(NamedTuple):
+    """The lowest and the highest value of a function over the ranges of an input."""
+
+    lowest: Extreme
+    highest: Extreme
+
+
+class InputSweep:
+    """
+    A linkage as a function of its first input; the others are held.
+
+    ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input.
+    """
+
+    def __init__(self, closure: LoopClosure, held: Sequence[float] = (0.0,)) -> None:
+        self.closure = closure
+        self._others = tuple(held[1:])
+        self.input = closure.linkage.inputs[0]
+        self.turning = not self.input.slider
+
+    def inputs_at(self, value: float) -> tuple[float, ...]:
+        """Return the values of all inputs."""
+        return value, *self._others
+
+    def position_at(self, value: float) -> Position:
+        """Return the position at a value of the input."""
+        return self.closure.position(*self.inputs_at(value))
+
+    def is_closed(self, value: float) -> bool:
+        """Return whether every loop closes there, with no joint beyond its limits."""
+        inputs = self.inputs_at(value)
+        position = self.closure.position(*inputs)
+        bounds = self.closure.bounds
+        return bool(position.joints) and not (
+            bounds and bounds.first_exceeded(inputs, position.joints)
+        )
+
+    @BuiltProperty
+    def ranges(self) -> tuple[InputRange, ...]:
+        """
+        Ranges in which every loop closes, with angles as a user expects them.
+
+        A full turn begins at 0, and is two turns if the linkage repeats only after two; the
+        middle of a limited range lies in (−π, π].
+        """
+        if len(self.closure.linkage.inputs) == 1:
+            found = self.closure.input_ranges
+        else:
+            found = self.closure.keep_usual(
+                tuple(self._name_ends(*ends) for ends in self._search_intervals())
+            )
+        return tuple(map(self._usual_range, found))
+
+    def range_about(self, value: float) -> InputRange | None:
+        """Return the range in which a value lies, or None."""
+        for interval in self.ranges:
+            if interval.is_whole or interval.lowest <= value <= interval.highest:
+                return interval
+            if interval.turning and not self.input.limits.is_bounded:
+                shift = self._turn_shift(interval, value)
+                if shift:
+                    return interval.shift_by(shift)
+        return None
+
+    def _turn_shift(self, interval: InputRange, value: float) -> float:
+        """Return the turns, in [rad], that bring a range to a value in the same poses, or 0."""
+        period, turns = tau * interval.turns, -interval.shift(value)
+        # If the linkage repeats only after two turns, one turn leads to another pose.
+        for shift in (turns, turns - period, turns + period):
+            within = interval.lowest <= value - shift <= interval.highest
+            if not (shift and within):
+                continue
+            limited = bool(self.closure.bounds.joints)
+            if not limited or joints_repeat(self.closure, self.position_at, value, -shift):
+                return shift
+        return 0.0
+
+    @property
+    def widest_range(self) -> InputRange | None:
+        """Return the widest range; of equal ones the last, in which slides are positive."""
+        return max(
+            reversed(self.ranges),
+            key=lambda interval: round(interval.highest - interval.lowest, 6),
+            default=None,
+        )
+
+    def _usual_range(self, interval: InputRange) -> InputRange:
+        if not interval.turning or self.input.limits.is_bounded:
+            return interval
+        if not interval.turns:
+            return interval
+        if interval.is_whole:
+            return interval._replace(
+                lowest=0.0, highest=tau * turns_to_repeat(self.closure, self.position_at)
+            )
+        middle = 0.5 * (interval.lowest + interval.highest)
+        shift = -interval.shift(0.0)
+        if shift and joints_repeat(self.closure, self.position_at, middle, shift):
+            return interval.shift_by(shift)
+        return interval
+
+    def _search_intervals(self) -> list[tuple[float, float]]:
+        """Return the intervals in which every loop closes, for several inputs."""
+        far = pi if self.turning else self.closure.slide_bound
+        limits = self.input.limits
+        if limits.is_bounded:
+            low, high = max(limits.low, -far), min(limits.high, far)
+            if self.turning:
+                # Angles count with their turns.
+                low = limits.low if limits.low > -inf else limits.high - tau
+                high = limits.high if limits.high < inf else limits.low + tau
+            return (
+                list(find_intervals(self.is_closed, even_samples(low, high))) if low < high else []
+            )
+        found = list(find_intervals(self.is_closed, even_samples(-far, far)))
+        return through_the_end(found, -far, far) if self.turning else found
+
+    def _name_ends(self, low: float, high: float) -> InputRange:
+        """Return a range with the joints whose limits end it; the other inputs are held."""
+        by = []
+        whole = self.turning and high - low >= tau and not self.closure.bounds
+        for end, outwards in ((low, low - high), (high, high - low)):
+            beyond = self.inputs_at(end + 1e-9 * outwards)
+            joints = () if whole else self.closure.position(*beyond).joints
+            bound = self.closure.bounds.first_exceeded(beyond, joints) if joints else None
+            by.append(bound.name if bound else '')
+        return InputRange(low, high, self.turning, by=(by[0], by[1]))
+
+
+def starts_at_pose(closure: LoopClosure) -> bool:
+    """Return whether the file's pose is the start, not only the start of an iteration."""
+    linkage = closure.linkage
+    several = len(linkage.inputs) > 1
+    return linkage.pose is not None and not (
+        linkage.pose.is_drawn and not several and is_iterated(closure)
+    )
+
+
+def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
+    """
+    Return inputs at which a linkage is shown, or from which it starts.
+
+    These are the inputs of the file's pose, if the linkage closes there; with a single input only
+    if no links are iterated, for which the pose is the start. Otherwise a
+    single input is at 60 degrees if it turns fully, or at two thirds of its widest range: in the
+    middle the links of a symmetric linkage often lie on each other. Several inputs are at 60
+    degrees each if that is far from a toggle, or else at the point of a coarse grid that is
+    farthest from one.
+    """
+    linkage = closure.linkage
+    pose: AssemblyPose | None = linkage.pose
+    several = len(linkage.inputs) > 1
+    # Without joints a loop is open.
+    if pose and starts_at_pose(closure) and closure.position(*pose.inputs).joints:
+        return pose.inputs
+    if several:
+        usual = (pi / 3.0,) * len(linkage.inputs)
+        turning = not any(given.slider for given in linkage.inputs)
+        if turning and _pose_conditioning(closure, closure.position(*usual)) > _EASY:
+            return usual
+        return max(
+            grid_positions(closure, _MANY), key=lambda found: _pose_conditioning(closure, found[1])
+        )[0]
+    interval = InputSweep(closure).widest_range
+    assert interval is not None, 'reading the file has proved that it closes somewhere'
+    if interval.is_whole:
+        return (pi / 3.0,)
+    return (interval.lowest + (interval.highest - interval.lowest) * 2.0 / 3.0,)
+
+
+def _pose_conditioning(closure: LoopClosure, position: Position) -> float:
+    if position.status is not Status.CLOSED:
+        return -1.0
+    return closure.singularity_margin(position).conditioning
+
+
+def grid_positions(
+    closure: LoopClosure, count: int = _GRID
+) -> Iterator[tuple[tuple[float, ...], Position]]:
+    """Yield positions on a grid over all inputs."""
+    for inputs in inputs_on_grid(closure, count):
+        yield inputs, closure.position(*inputs)
+
+
+def inputs_on_grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[float, ...]]:
+    """Yield a grid over all inputs: one turn each, or the reach of a slide."""
+    ways, inputs_count = [], len(closure.linkage.inputs)
+    most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
+    most = most if inputs_count <= _FEW else _MOST_OF_MANY
+    count = min(count, max(1, int(most ** (1.0 / inputs_count))))
+    for number, given in enumerate(closure.linkage.inputs):
+        low, high = given.limits.low, given.limits.high
+        if given.slider:
+            least, farthest = closure.slide_reach(number)
+            low, high = max(low, least), min(high, farthest)
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
+        elif given.limits.is_bounded:
+            low = low if low > -inf else high - tau
+            high = high if high < inf else low + tau
+            ways.append([low + (high - low) * i / count for i in range(count + 1)])
+        else:
+            ways.append([tau * i / count for i in range(count)])
+    yield from product(*ways)
+
+
+def find_extremes(
+    function: Callable[[float], float], ranges: Sequence[InputRange], count: int = _SAMPLES
+) -> SweptCurve:
+    """
+    Find the lowest and the highest value of a function of the input.
+
+    The function is sampled, and each valley and summit is narrowed down by golden sections.
+    """
+    sampled = []
+    for interval in ranges:
+        values = sample_inputs(interval, count)
+        sampled.append(Sampled(interval, values, [function(value) for value in values]))
+    return _min_max_curve(function, sampled)
+
+
+def _min_max_curve(function: Callable[[float], float], sampled: Sequence[Sampled]) -> SweptCurve:
+    lowest = _find_lowest(function, sampled)
+    upside_down = [one._replace(results=[-y for y in one.results]) for one in sampled]
+    highest = _find_lowest(lambda value: -function(value), upside_down)
+    return SweptCurve(lowest, Extreme(-highest.value, highest.at))
+
+
+def _find_lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
+    found: list[tuple[float, float]] = []
+    best = min((y for one in sampled for y in one.results if isfinite(y)), default=nan)
+    for interval, values, results in sampled:
+        last = len(values) - 1
+        for i, result in enumerate(results):
+            # The ends of a full turn are one place: each continues at the other.
+            turn = values[last] - values[0] if interval.is_whole else 0.0
+            before = values[i - 1] if i else values[last - 1] - turn if turn else values[0]
+            after = values[i + 1] if i < last else values[1] + turn if turn else values[last]
+            beside = (
+                results[i - 1 if i or turn else 0],
+                results[(i + 1) % last if turn else min(i + 1, last)],
+            )
+            found.append((result, values[i]))
+            # A valley much higher than the deepest cannot reach it, even with a kink.
+            deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
+            if deep and result <= min(beside) and result < max(beside):
+                lowest = golden_section(function, before, after)
+                # The place of a smooth valley has half the digits; the sample may be better.
+                if result - lowest[0] > _NOISE:
+                    found[-1] = lowest
+    found = [(result, value) for result, value in found if isfinite(result)]
+    if not found:
+        return Extreme(nan, ())
+    best = min(result for result, _ in found)
+    places = sorted(value for result, value in found if result - best <= _SAME)
+    if len(places) > _MANY:
+        return Extreme(best, ())
+    at: list[float] = []
+    for value in places:
+        whole = any(interval.is_whole for interval, _, _ in sampled)
+        if all(abs(remainder(value - p, tau) if whole else value - p) > _APART for p in at):
+            at.append(value)
+    return Extreme(best, tuple(at))
+
+
+def find_zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
+    """
+    Return the zeros of a function that is never negative, inside its ranges, not at their ends.
+
+    Values within the rounding errors of a chain of dyads count as 0.
+    """
+    found = []
+    for interval in ranges:
+        values = sample_inputs(interval)
+        results = [function(value) for value in values]
+        valleys = range(1, len(values) - 1)
+        if interval.is_whole:
+            # The ends of a full turn are one place.
+            step = values[1] - values[0]
+            values, results = [*values, values[-1] + step], [*results, results[1]]
+            valleys = range(1, len(values) - 1)
+        for i in valleys:
+            if results[i] <= min(results[i - 1], results[i + 1]) and results[i] < _NEAR_ZERO:
+                lowest, at = golden_section(function, values[i - 1], values[i + 1])
+                if min(lowest, results[i]) < _ZERO:
+                    found.append(at if lowest <= results[i] else values[i])
+    return found
+
+
+def transmission_angles(sweep: InputSweep) -> dict[int, SweptCurve]:
+    """
+    Return the extreme transmission angles of each group over the range, by its number, in [rad].
+
+    They are folded into [0, π/2]. Groups that are iterated have none.
+    """
+    return _step_extremes(sweep, 'transmission_angle', _SAMPLES)
+
+
+def conditioning_curves(sweep: InputSweep) -> dict[int, SweptCurve]:
+    """Return the extreme conditioning of each iterated group over the range, by its number."""
+    return _step_extremes(sweep, 'conditioning', _SAMPLES // 4)
+
+
+def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptCurve]:
+    """Return the extremes of a method of the steps, applied to their poses, by group."""
+    closure = sweep.closure
+    methods = {
+        index: getattr(step, name)
+        for index, step in enumerate(closure.steps)
+        if hasattr(step, name)
+    }
+    if not methods:
+        return {}
+    # One sweep for all steps: otherwise each of n loops would be closed n times.
+    sampled: dict[int, list[Sampled]] = {number: [] for number in methods}
+    closed = nan
+    for interval in sweep.ranges:
+        values = sample_inputs(interval, count)
+        for of_step in sampled.values():
+            of_step.append(Sampled(interval, values, []))
+        for value in values:
+            position = sweep.position_at(value)
+            if position.status.has_pose:
+                closed = value
+            for number, method in methods.items():
+                result = method(position.poses[number]) if position.status.has_pose else nan
+                sampled[number][-1].results.append(result)
+    if closed != closed:
+        return {
+            closure.step_groups[number]: _min_max_curve(lambda _: nan, []) for number in methods
+        }
+    return {
+        closure.step_groups[number]: _min_max_curve(
+            _as_input_function(sweep, number, method, closed), sampled[number]
+        )
+        for number, method in methods.items()
+    }
+
+
+def _as_input_function(
+    sweep: InputSweep, number: int, method: Callable[..., float], closed: float
+) -> Callable[[float], float]:
+    """Return a method of a step as a function of the input; NaN where its loops do not close."""
+    pose_at = pose_alone(sweep.closure, number, *sweep.inputs_at(closed))
+
+    def pose_value(value: float) -> float:
+        pose = pose_at(*sweep.inputs_at(value))
+        return method(pose) if pose.status.has_pose else nan
+
+    return pose_value
+
+
+class WorstStates(NamedTuple):
+    """The worst of many positions: where they miss by most, and nearest to a singularity."""
+
+    residual: float  # In [m]
+    inputs: tuple[float, ...]  # Where that is, in [rad] or [m]
+    positions: int  # How many there are
+    margin: SingularityMargin | None  # The least, of several inputs
+    nearest: tuple[float, ...]  # Where that is
+
+
+def find_worst_states(closure: LoopClosure) -> WorstStates | None:
+    """Return the worst states over the range, or over a grid of several inputs; None if empty."""
+    several = len(closure.linkage.inputs) > 1
+    if several:
+        tried = grid_positions(closure)
+    else:
+        sweep = InputSweep(closure)
+        values = [value for interval in sweep.ranges for value in sample_inputs(interval)]
+        tried = (((value,), sweep.position_at(value)) for value in values)
+    found = [(inputs, position) for inputs, position in tried if position.status.has_pose]
+    if not found:
+        return None
+    residual, at = max((closure.residual(position), inputs) for inputs, position in found)
+    if not several:
+        return WorstStates(residual, at, len(found), None, ())
+    margins = ((closure.singularity_margin(position), inputs) for inputs, position in found)
+    # Symmetrical linkages have several: the first, whatever the last digits are.
+    margin, nearest = min(margins, key=lambda each: round(each[0].conditioning, 9))
+    return WorstStates(residual, at, len(found), margin, nearest)
+
+
+# Checks that a linkage closes, and that it can be within its limits.
+
+
+def check_closes(closure: LoopClosure) -> None:
+    """
+    Refuse a linkage whose loops close at no value of its only input.
+
+    The DefinitionError says which links miss each other, and by how much where they are nearest.
+    """
+    if len(closure.linkage.inputs) != 1 or closure.closing_ranges:
+        return
+
+    def miss_distance(position: Position) -> tuple[int, float]:
+        return -len(position.poses), position.gap
+
+    states = [(inputs[0], position) for inputs, position in grid_positions(closure, _SAMPLES)]
+    value, nearest = min(states, key=lambda state: miss_distance(state[1]))
+    step = abs(states[1][0] - states[0][0])
+    between = golden_section(lambda at: closure.position(at).gap, value - step, value + step)[1]
+    nearest = min(nearest, closure.position(between), key=miss_distance)
+    links = closure.links_of_group(closure.step_groups[len(nearest.poses) - 1])
+    if len(links) == 1:
+        links.append('the rest')
+    raise DefinitionError(
+        'links',
+        f'the loops close at no value of the input; {list_names(links, " and ")} miss each '
+        'other by '
+        f'{nearest.gap:.3g} m or more',
+        'the longest link of a loop must be shorter than its others together',
+    )
+
+
+def check_turns(closure: LoopClosure) -> None:
+    """Refuse a ratio of an angle that leaves the half turns in which its turns are known."""
+    for step in closure.steps:
+        if not isinstance(step, FollowerJoint) or step.middle is None:
+            continue
+        for interval in closure.closing_ranges:
+            found = [closure.close_unlimited(value) for value in sample_inputs(interval)]
+            states = [one.state.coordinates for one in found if one.status.has_pose]
+            followed = [x[step.one] - x[step.other] + step.constant - step.middle for x in states]
+            turned = [remainder(value, tau) for value in followed]
+            if any(abs(one - other) > pi for one, other in pairwise(turned)):
+                of = closure.linkage.ratios[step.joint].of
+                raise DefinitionError(
+                    f'ratios.{step.joint}.of',
+                    f'{quote(of)} passes {step.middle + pi:.4g} rad, where its turns are not '
+                    'known, and the ratio is not a whole number',
+                    f'write limits for {quote(of)}, with the middle of its swing as their middle',
+                )
+
+
+def check_limits(closure: LoopClosure) -> None:
+    """
+    Refuse limits between which a linkage cannot be.
+
+    A DefinitionError is raised if the pose is beyond limits, or no state of the input's range is
+    within the limits of the input, of a published joint, or of all joints together.
+    """
+    bounds, linkage = closure.bounds, closure.linkage
+    if not bounds:
+        return
+    if linkage.pose:
+        joints = closure.position(*linkage.pose.inputs).joints
+        bound = bounds.first_exceeded(linkage.pose.inputs, joints) if joints else None
+        if bound is not None:
+            raise DefinitionError(
+                'pose.inputs',
+                f'bring {quote(bound.name)} to {bound.turn_to_middle(joints[bound.number]):.6g} '
+                f'{_joint_unit(linkage, bound)}, '
+                f'beyond its limits {_limits_text(closure, bound)}',
+                'start within the limits, or widen them',
+            )
+    if len(linkage.inputs) == 1:
+        _check_single(closure)
+    elif not (linkage.pose and joints) and not _met_on_grid(closure):
+        names = list_names(map(quote, linkage.limits))
+        raise DefinitionError(
+            'input.limits',
+            f'no state was found within the limits of {names}',
+            'widen them, or name a pose within them',
+        )
+
+
+def _check_single(closure: LoopClosure) -> None:
+    ranges, bounds = closure.closing_ranges, closure.bounds
+    if bounds.inputs:
+        (bound,) = bounds.inputs
+        ranges = within_own(closure, ranges)
+        if not ranges:
+            raise DefinitionError(
+                'input.limits',
+                f'{_limits_text(closure, bound)} of {quote(bound.name)} never meet its range, '
+                f'{describe_ranges(closure.closing_ranges)}',
+                'widen them',
+            )
+    for bound in bounds.joints:
+        if not within_published(closure, ranges, [bound]):
+            low, high = _joint_range(closure, ranges, bound)
+            raise DefinitionError(
+                f'joints.{bound.name}.limits',
+                f'{_limits_text(closure, bound)} of {quote(bound.name)} are never met: it goes '
+                'from '
+                f'{low:.6g} to {high:.6g} {_joint_unit(closure.linkage, bound)}',
+                'widen them',
+            )
+    if bounds.joints and not within_published(closure, ranges, bounds.joints):
+        names = list_names(quote(bound.name) for bound in bounds.joints)
+        raise DefinitionError(
+            'joints',
+            f'the limits of {names} are met, but never together',
+            'widen them',
+        )
+
+
+def _joint_range(
+    closure: LoopClosure, ranges: Iterable[InputRange], bound: Bound
+) -> tuple[float, float]:
+    """Return the range of a published joint, with the turns that bring it nearest its limits."""
+    values = [value for one in ranges for value in sample_inputs(one)]
+    found = [closure.position(value).joints for value in values]
+    turned = [bound.turn_to_middle(joints[bound.number]) for joints in found if joints]
+    return min(turned), max(turned)
+
+
+def _met_on_grid(closure: LoopClosure) -> bool:
+    return any(
+        position.joints and closure.bounds.first_exceeded(inputs, position.joints) is None
+        for inputs, position in grid_positions(closure)
+    )
+
+
+def _limits_text(closure: LoopClosure, bound: Bound) -> str:
+    limits = closure.linkage.limits[bound.name]
+    return f'{limits} {_joint_unit(closure.linkage, bound)}'
+
+
+def _joint_unit(linkage: Linkage, bound: Bound) -> str:
+    driven = {given.joint: given.unit for given in linkage.inputs}
+    return driven.get(bound.name) or linkage.joints[bound.name].unit

@@ -1,0 +1,471 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Solutions of links that close only together, as a function of their inputs, without history.
+
+A grid lies over the inputs. A cell has the solution at its centre, and the form of second order
+about it. It is made when it is first met, from its neighbour on the straight line to the pose, and
+that one likewise: there is one way to each cell, so the order of visits cannot matter. A cell is
+accepted if the theorem of Kantorovich proves, at each quarter of the way and at the corners of the
+cell, that the prediction leads to one solution::
+
+    η·ω ≤ 1/4    η = |J⁻¹F|, the first step of Newton's method    ω a bound of |J⁻¹·J'|
+
+(≤ 1/2 is needed.) Otherwise the way and the cell are halved, four times at most. What no cell
+covers lies next to a singularity, or beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, islice, product
+from math import copysign, inf, isfinite, ldexp, prod, tau
+from typing import Any, NamedTuple, Protocol
+
+from linkage_ros.generated_code import define_function
+from linkage_ros.kinematics.arithmetic import call, has_result
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
+from linkage_ros.kinematics.compiling import compile_line
+from linkage_ros.kinematics.plane.linkage import Input
+
+_WIDTH = 0.125
+"""Width of the widest cells, in [rad] or lengths."""
+
+_LEVELS = 5
+"""Number of widths; each is half the one before."""
+
+_KEPT = 4096
+"""Most cells that are kept: any other is made again, to the same bits."""
+
+_FARTHEST = 128
+"""Widest cells from the pose to the farthest state: some 16 rad, or lengths."""
+
+_ALL = 2.0**62
+"""More cells than are followed."""
+
+_PROVEN = 0.25
+"""Largest η·ω that is accepted."""
+
+_MOST_CORNERED = 3
+"""Of more inputs only the ends of the axes and two diagonals are tested: 64 corners take long."""
+
+_DIGITS = 28
+"""Binary digits after the point of the numbers of a cell: a start needs no more."""
+
+_BEYOND = 0.5 + 2.0**-20
+"""In widths of a cell: how far from its centre the next one is looked for."""
+
+_RETURNED = 1e-9
+"""Farthest from the pose, apart from whole turns, that links are back."""
+
+_SHORTEST = 2.0**-50
+"""Shortest step beyond the cells, as a part of the way."""
+
+_HOPELESS = 2.0**-12
+"""The same, as a part of what is left: a way that needs shorter ones ends before the inputs."""
+
+Key = tuple[int, ...]
+"""A cell: the number of its width, and its place along each input, in widths from the pose."""
+
+
+class GridInput(NamedTuple):
+    """An input: its value in the pose, its limits, and whether it turns without any."""
+
+    home: float
+    low: float
+    high: float
+    turns: bool
+
+
+def grid_inputs(
+    inputs: Sequence[Input], pose: Sequence[float], scale: float
+) -> tuple[GridInput, ...]:
+    """Return the inputs of a linkage as coordinates; lengths are in units of ``scale`` metres."""
+    found = []
+    for given, home in zip(inputs, pose, strict=True):
+        unit, limits = scale if given.slider else 1.0, given.limits
+        turns = not given.slider and not limits.is_bounded
+        found.append(GridInput(home, limits.low / unit, limits.high / unit, turns))
+    return tuple(found)
+
+
+class GridCell(NamedTuple):
+    """A solution at certain inputs, and the quadratic form of the unknowns about it."""
+
+    inputs: tuple[float, ...]
+    unknowns: tuple[float, ...]
+    slopes: tuple[tuple[float, ...], ...]  # For each input
+
+    # For each input, and each from it on, the factors of the product of both.
+    bends: tuple[tuple[float, ...], ...]
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Return all numbers, one after the other."""
+        return (*self.inputs, *self.unknowns, *chain(*self.slopes, *self.bends))
+
+
+class _Found(NamedTuple):
+    """A cell, or None if it is not proven; and the last proven one on the way to it."""
+
+    cell: GridCell | None
+    last: GridCell
+    numbers: tuple[float, ...] | None  # Of the cell, if it is proven
+
+
+class GridFunctions(Protocol):
+    """The equations of a group of links, at its inputs."""
+
+    def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
+        """Return η·ω of Kantorovich's theorem; infinite where there is none."""
+
+    def solve_from(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[float] | None:
+        """Return the solution that Newton's method leads to."""
+
+    def forms_at(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
+        """Return slopes and bends at a solution, as a cell has them."""
+
+
+class Grid:
+    """
+    The cells of a group of links about a pose, whose unknowns are given.
+
+    ``numbers`` are those of its inputs among all that the linkage has.
+    """
+
+    def __init__(
+        self,
+        group: GridFunctions,
+        inputs: Sequence[GridInput],
+        numbers: Sequence[int],
+        unknowns: Sequence[float],
+    ) -> None:
+        self._group, self._inputs, self.numbers = group, inputs, numbers
+        count = len(inputs)
+        level = (0.0,) * len(unknowns)
+        bends = (level,) * (count * (count + 1) // 2)
+        self.home = tuple(given.home for given in inputs)
+        """The inputs of the pose, at the centre of the first cell."""
+        self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
+        self._kept: dict[Key, _Found] = {}
+        self._look_up = self._write_look_up()
+        self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
+        self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
+        if count > _MOST_CORNERED:
+            axes = [
+                tuple(sign * (k == axis) for k in range(count))
+                for axis in range(count)
+                for sign in (-0.5, 0.5)
+            ]
+            self._corners = [*axes, self._corners[0], self._corners[-1]]
+
+    def __call__(self, *inputs: float) -> tuple[float, ...] | None:
+        """
+        Return inputs, unknowns and slopes of the widest proven cell at inputs; None if none is.
+
+        This is what `find_start` calls in compiled code.
+        """
+        try:
+            return self._look_up(*inputs)
+        except OverflowError:
+            return None  # So far away that no number says how many cells it is.
+
+    def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:
+        """Return a call as a function, written for these inputs: most lie in a widest cell."""
+        names = [f'q{k}' for k in range(len(self.home))]
+        places = [
+            f'round(({name} - {home!r}) / {_WIDTH!r})'
+            for name, home in zip(names, self.home, strict=True)
+        ]
+        given = ', '.join(names)
+        lines = (
+            f'def look_up({given}):',
+            f'    found = get((0, {", ".join(places)}))',
+            '    if found is None or found.numbers is None:',
+            f'        return search({given})',
+            '    return found.numbers',
+        )
+        bound = {'get': self._kept.get, 'search': self._search}
+        look_up: Callable[..., Any] = define_function('\n'.join(lines), 'look_up', bound)
+        return look_up
+
+    def _search(self, *inputs: float) -> tuple[float, ...] | None:
+        for level in range(_LEVELS):
+            key = self._key_of(level, inputs)
+            found = self._kept.get(key)
+            if found is None:
+                with BUILD_LOCK:
+                    found = self._follow(key)
+            if found.numbers is not None:
+                return found.numbers
+        return None
+
+    def look_ahead(self, inputs: Sequence[float], rates: Sequence[float]) -> None:
+        """Make the cell that inputs at these rates enter next, from one that is made."""
+        turned, _ = self.turn_back(inputs)
+        keys = (self._key_of(level, turned) for level in range(_LEVELS))
+        for key in keys:
+            found = self._kept.get(key)
+            if found is not None and found.numbers is not None:
+                break
+        else:
+            return
+        soonest, beyond = inf, _BEYOND * self.widths[key[0]]
+        for x, rate, centre in zip(turned, rates, self._centre(key), strict=True):
+            if rate:
+                edge = centre + copysign(beyond, rate)
+                soonest = min(soonest, (edge - x) / rate)
+        if soonest < inf:
+            self(*(x + rate * soonest for x, rate in zip(turned, rates, strict=True)))
+
+    def _key_of(self, level: int, inputs: Sequence[float]) -> Key:
+        width, ways = self.widths[level], zip(inputs, self.home, strict=True)
+        return (level, *[round(max(-_ALL, min((x - at) / width, _ALL))) for x, at in ways])
+
+    def find_start(self, inputs: Sequence[Any]) -> list[Any] | None:
+        """Return where Newton's method starts, with symbols too; None if no cell is there."""
+        turned, gains = self.turn_back(inputs)
+        found = call(self, *turned)
+        if not has_result(found):
+            return None
+        values = _predict(found, turned, len(self._given.unknowns))
+        return [value + gain if gain else value for value, gain in zip(values, gains, strict=True)]
+
+    def turn_back(self, inputs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+        """
+        Return the inputs within half a turn of the pose, and what the unknowns gain by the turns.
+
+        Only inputs are turned after a turn of which the links are back.
+        """
+        turned, gains = [*inputs], [0.0] * len(self._given.unknowns)
+        for k, gained in enumerate(self._gained_in_turns):
+            if gained is not None:
+                turns = round((inputs[k] - self.home[k]) / tau)
+                turned[k] = inputs[k] - tau * turns
+                gains = [
+                    gain + by * turns if by else gain
+                    for gain, by in zip(gains, gained, strict=True)
+                ]
+        return turned, gains
+
+    @BuiltProperty
+    def _gained_in_turns(self) -> list[tuple[float, ...] | None]:
+        """Return for each input what the unknowns gain in a turn; None if it does not return."""
+        found: list[tuple[float, ...] | None] = []
+        for k, given in enumerate(self._inputs):
+            later = tuple(x + tau * (i == k) for i, x in enumerate(self.home))
+            cell, left = self.reach(later) if given.turns else (self._start, 1.0)
+            moved = [b - a for a, b in zip(self._start.unknowns, cell.unknowns, strict=True)]
+            gained = tuple(tau * round(each / tau) for each in moved)
+            returns = all(abs(a - b) < _RETURNED for a, b in zip(moved, gained, strict=True))
+            found.append(gained if returns and not left else None)
+        return found
+
+    def fill(self) -> dict[Key, tuple[float, ...]] | None:
+        """
+        Make all cells within the limits of the inputs; return their numbers by level and place.
+
+        None where an input has no limits, or where these are more cells than are kept.
+        """
+        cells: dict[Key, tuple[float, ...]] = {}
+        limits = [(given.low, given.high) for given in self._inputs]
+        if not all(map(isfinite, chain(*limits))):
+            return None
+        waiting = [(0, self._keys_between(0, limits))]
+        while waiting:
+            level, keys = waiting.pop()
+            if len(cells) + prod(map(len, keys)) > _KEPT:
+                return None
+            for key in product((level,), *keys):
+                if key in cells:
+                    continue
+                with BUILD_LOCK:
+                    numbers = self._follow(key).numbers
+                if numbers is not None:
+                    cells[key] = numbers
+                elif level + 1 < _LEVELS:
+                    half = 0.5 * self.widths[level]
+                    within = [
+                        (max(low, x - half), min(high, x + half))
+                        for x, (low, high) in zip(self._centre(key), limits, strict=True)
+                    ]
+                    waiting.append((level + 1, self._keys_between(level + 1, within)))
+        return cells
+
+    def _keys_between(self, level: int, limits: Sequence[tuple[float, float]]) -> list[range]:
+        """Return for each input the places of the cells between two values."""
+        width = self.widths[level]
+        return [
+            range(*(round((end - at) / width) + k for k, end in enumerate(ends)))
+            for at, ends in zip(self.home, limits, strict=True)
+        ]
+
+    def _centre(self, key: Key) -> list[float]:
+        level, *places = key
+        width = self.widths[level]
+        return [at + k * width for at, k in zip(self.home, places, strict=True)]
+
+    def predict(self, cell: GridCell, inputs: Sequence[float]) -> Sequence[float]:
+        """Return the unknowns at inputs near a cell."""
+        (unknowns,) = self._prediction(*inputs, *cell.numbers)
+        return tuple(unknowns)
+
+    @BuiltProperty
+    def _prediction(self) -> Callable[..., Any]:
+        count, unknowns = len(self.home), len(self._given.unknowns)
+
+        def compute(*numbers: Any) -> list[Any]:
+            return _predict(numbers[count:], numbers[:count], unknowns)
+
+        return compile_line(compute, [*self.home, *self._given.numbers])
+
+    @BuiltProperty
+    def _start(self) -> GridCell:
+        """Return the solution in the pose, with its forms."""
+        return self._step_to(self._given, self.home) or self._given
+
+    def home_corners(self) -> Iterator[tuple[Sequence[float], Sequence[float]]]:
+        """Yield the corners of the cell about the pose, with the unknowns predicted there."""
+        home = (0,) * len(self.home)
+        for level, width in enumerate(self.widths):
+            with BUILD_LOCK:
+                cell = self._follow((level, *home)).cell
+            if cell is not None:
+                for corner in self._corners:
+                    at = [c + part * width for c, part in zip(cell.inputs, corner, strict=True)]
+                    yield at, self.predict(cell, at)
+                return
+
+    def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
+        """
+        Follow the straight line from the last cell to inputs, in proven steps.
+
+        Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
+        them.
+        """
+        key = self._key_of(_LEVELS - 1, inputs)
+        with BUILD_LOCK:
+            begin = cell = self._follow(key).last
+            done, step = 0.0, 1.0
+            while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
+                part = min(1.0, done + step)
+                found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
+                if found is None:
+                    step *= 0.5
+                else:
+                    cell, done, step = found, part, 2.0 * step
+        return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
+
+    def _follow(self, key: Key) -> _Found:
+        """Return a cell, made from its neighbour on the straight line to the pose."""
+        way: list[Key] = []
+        while (found := self._kept.get(key)) is None:
+            way.append(key)
+            level, *places = key
+            count = max(map(abs, places), default=0)
+            if count > _FARTHEST << level:
+                return _Found(None, self._start, None)
+            if not count:
+                found = _Found(self._start, self._start, None)
+                break
+            key = (level, *[round(k * (count - 1) / count) for k in places])
+        else:
+            if way:
+                found = self._on_the_way(key) or found
+        for key in reversed(way):
+            if found.cell is None:
+                break
+            passed = None if key is way[0] else self._on_the_way(key)
+            found = passed or self._keep_cell(key, found)
+        return found
+
+    def _on_the_way(self, key: Key) -> _Found | None:
+        """
+        Return what leads on from a cell instead of it: a wider proven one, if there is one.
+
+        Wider cells lead to where they are no longer proven. That the narrow one may be kept, since
+        a state was in it, or kept as not proven, changes nothing.
+        """
+        cell = self._wider_cell(key)
+        return None if cell is None else _Found(cell, cell, cell.numbers)
+
+    def _keep_cell(self, key: Key, before: _Found) -> _Found:
+        """Return a cell that a neighbour leads to, and keep it."""
+        cell = None if before.cell is None else self._make_cell(key, before.cell)
+        found = _Found(cell, cell or before.last, cell.numbers if cell else None)
+        if len(self._kept) >= _KEPT:
+            del self._kept[next(iter(self._kept))]
+        self._kept[key] = found
+        return found
+
+    def _wider_cell(self, key: Key) -> GridCell | None:
+        """Return the widest proven cell, of wider ones, at the centre of a cell."""
+        level, *places = key
+        for wider in range(level):
+            cell = self._follow((wider, *[round(k / (1 << level - wider)) for k in places])).cell
+            if cell is not None:
+                return cell
+        return None
+
+    def _make_cell(self, key: Key, known: GridCell) -> GridCell | None:
+        """Return a cell, if it is proven from a known one."""
+        width, centre = self.widths[key[0]], self._centre(key)
+        found = self._step_to(known, centre)
+        if found is None:
+            return None
+        # The last digits of functions differ from machine to machine.
+        forms = (tuple(map(_round_binary, each)) for each in (found.slopes, found.bends))
+        cell = GridCell(found.inputs, _round_binary(found.unknowns), *forms)
+        for corner in self._corners:
+            at = [c + part * width for c, part in zip(centre, corner, strict=True)]
+            if not self._group.proof(at, self.predict(cell, at)) <= _PROVEN:
+                return None
+        return cell
+
+    def _step_to(self, known: GridCell, inputs: Sequence[float]) -> GridCell | None:
+        """Return the solution that a known one is proven to lead to."""
+        group = self._group
+        for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
+            at = _part_of_way(known.inputs, inputs, part)
+            if not group.proof(at, self.predict(known, at)) <= _PROVEN:
+                return None
+        unknowns = group.solve_from(inputs, self.predict(known, inputs))
+        forms = None if unknowns is None else group.forms_at(inputs, unknowns)
+        if unknowns is None or forms is None:
+            return None
+        slopes, bends = (tuple(map(tuple, each)) for each in forms)
+        return GridCell(tuple(inputs), tuple(unknowns), slopes, bends)
+
+
+def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:
+    """Return the unknowns by the numbers of a cell; both may be symbols."""
+    n, number = len(inputs), len(inputs) * (1 + count) + count
+    offs = [value - numbers[i] for i, value in enumerate(inputs)]
+    unknowns = [numbers[n + k] for k in range(count)]
+    for i, off in enumerate(offs):
+        slopes = [numbers[n + count * (1 + i) + k] for k in range(count)]
+        for other in islice(offs, i, None):
+            slopes = [slope + other * numbers[number + k] for k, slope in enumerate(slopes)]
+            number += count
+        unknowns = [one + off * slope for one, slope in zip(unknowns, slopes, strict=True)]
+    return unknowns
+
+
+def _part_of_way(one: Sequence[float], other: Sequence[float], part: float) -> Sequence[float]:
+    """Return inputs at a part of the way; the other end itself at 1."""
+    if part == 1.0:
+        return other
+    return [a + part * (b - a) for a, b in zip(one, other, strict=True)]
+
+
+def _round_binary(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(ldexp(float(round(ldexp(value, _DIGITS))), -_DIGITS) for value in values)

@@ -1,0 +1,375 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+A group of links that close only together, as a function of its inputs.
+
+What a `Grid` asks for is here: the proof that a start leads to one solution, the solution, and its
+derivatives by the inputs. Each is straight-line code, with the steps before the group in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations_with_replacement, islice
+from math import inf
+from operator import mul
+from typing import Any, Protocol, TypeVar
+
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.compiling import Tape
+from linkage_ros.kinematics.iterated.elimination import subtract
+from linkage_ros.kinematics.iterated.grid import Grid, GridInput
+from linkage_ros.kinematics.iterated.steps_before import StepsBefore
+from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import LinkState
+
+T = TypeVar('T')
+Solve = Callable[[Sequence[Any]], list[Any]]
+
+_SECOND = 8.0
+"""How often the next step at most is in the unit of an unknown."""
+
+_LAST_STEP = 2.0**-36
+"""Sum of the last changes by Newton's method, in [rad] and lengths: the next is a rounding."""
+
+_LEAST_STEP = 2.0**-20
+"""The same of a solution next to a singularity, where the rounding is greater."""
+
+_SINGULAR = 1e-11
+"""Least ratio of smallest to largest singular value at which rates exist."""
+
+_TOGGLE = 2.0**-43
+"""How far a toggle may be from where the way to its inputs ends, relative to their size."""
+
+_HALFWAY, _MOST_STEPS = 2.0**-21, 6
+"""Sum of the last changes but one, whose square is a rounding; and most steps of the method."""
+
+
+class Equations(Protocol):
+    """As many equations as unknowns, for numbers and symbols; ``known`` has the steps before."""
+
+    def errors(self, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
+        """Return how far each equation is from being met."""
+
+    def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """
+        Return the errors, and a function that solves with the matrix of their derivatives.
+
+        An UndecidedError is raised if that is singular.
+        """
+
+    def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
+        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
+
+    def solve_rates(
+        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns."""
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns."""
+
+
+class GridGroup:
+    """
+    Equations after the steps ``before``.
+
+    ``start`` has the unknowns in the pose, ``given_inputs`` are all inputs.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        before: StepsBefore,
+        start: Sequence[float],
+        given_inputs: Sequence[GridInput],
+    ) -> None:
+        self._given_inputs = given_inputs
+        self._equations, self._before, self._start = equations, before, tuple(start)
+        given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
+
+        def compile_later(function: Callable[..., list[float]], *kinds: LinkState) -> StraightLine:
+            return StraightLine(function, lambda: kinds)
+
+        self._system_line = compile_later(self._list_system, given, pose)
+        self._forms_line = compile_later(self._list_forms, given, pose)
+        self._solution_line = compile_later(self._list_solution, given)
+        self._rates_line = compile_later(self._list_rates, given, pose, given)
+        self._accelerations_line = compile_later(
+            self._list_accelerations, given, pose, given, pose, given
+        )
+
+    @BuiltProperty
+    def inputs(self) -> tuple[int, ...]:
+        """Return the numbers of the inputs that the equations depend on."""
+        tape, count = Tape(), len(self._before.inputs)
+        given: list[Any] = [
+            tape.add_input(f'q{k}', value) for k, value in enumerate(self._before.inputs)
+        ]
+        try:
+            numbers: list[Any] = self._list_system(
+                LinkState(given, []), LinkState([*self._start], [])
+            )
+        except UndecidedError:
+            return tuple(range(count))
+        waiting = [number.operation for number in numbers if hasattr(number, 'operation')]
+        seen: set[Any] = set()
+        while waiting:
+            operation = waiting.pop()
+            if operation not in seen:
+                seen.add(operation)
+                waiting += operation.operands()
+        return tuple(k for k in range(count) if given[k].operation in seen)
+
+    @BuiltProperty
+    def grid(self) -> Grid:
+        """Return the cells from which the equations are solved."""
+        inputs = [self._given_inputs[k] for k in self.inputs]
+        return Grid(self, inputs, self.inputs, self._start)
+
+    @BuiltProperty
+    def _step_count(self) -> int:
+        """Return how many steps of Newton's method suffice at the corners about the pose."""
+        most = 2
+        for inputs, unknowns in self.grid.home_corners():
+            count, size, values = 0, inf, unknowns
+            while size > _HALFWAY and count < _MOST_STEPS:
+                found = self._evaluate_system(inputs, values)
+                if found is None:
+                    break
+                step = found[: len(values)]
+                size, count = sum(map(abs, step)), count + 1
+                values = [a - b for a, b in zip(values, step, strict=True)]
+            most = max(most, count)
+        return most
+
+    def solution(self, solved: LinkState) -> Sequence[Any] | None:
+        """Return the unknowns; None where no straight line leads to them."""
+        if has_symbols(solved):
+            return self._straight_solution(solved)
+        return self._solution_line(self._inputs_of(solved))
+
+    def rates(
+        self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> Sequence[Any]:
+        """Return the rates of the unknowns."""
+        found = None
+        if not has_symbols(solved, velocities):
+            pose = LinkState([*unknowns], [])
+            found = self._rates_line(self._inputs_of(solved), pose, self._inputs_of(velocities))
+        return found or self._equations.solve_rates(solved, unknowns, velocities)
+
+    def accelerations(
+        self,
+        solved: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> Sequence[Any]:
+        """Return the accelerations of the unknowns."""
+        found = None
+        if not has_symbols(solved, velocities, changes):
+            known, moving, changing = map(self._inputs_of, (solved, velocities, changes))
+            pose, speeds = LinkState([*unknowns], []), LinkState([*rates], [])
+            found = self._accelerations_line(known, pose, moving, speeds, changing)
+        return found or self._equations.solve_accelerations(
+            solved, unknowns, velocities, rates, changes
+        )
+
+    def _inputs_of(self, state: LinkState) -> LinkState:
+        """Return the inputs of a state, or their derivatives."""
+        end = 1 + len(self._before.inputs)
+        return LinkState(state.coordinates[1:end], [])
+
+    def _straight_solution(self, known: LinkState) -> list[Any]:
+        """
+        Return the unknowns: steps of Newton's method, and one more with the last slopes.
+
+        An UndecidedError is raised where no cell is, or where the last step is no rounding.
+        """
+        values = self.grid.find_start([known.coordinates[1 + k] for k in self.inputs])
+        if values is None:
+            raise UndecidedError
+        step: Sequence[Any] = ()
+        for _ in range(self._step_count):
+            errors, solve = self._equations.linearize(known, values)
+            step = solve(errors)
+            values = [subtract(value, change) for value, change in zip(values, step, strict=True)]
+        step = solve(self._equations.errors(known, values))
+        if not sum(map(abs, step[1:]), abs(step[0])) <= _LAST_STEP:
+            raise UndecidedError
+        return [subtract(value, change) for value, change in zip(values, step, strict=True)]
+
+    def known_in_pose(self) -> LinkState:
+        """Return the state of the steps before, in the pose."""
+        return _require(self._before.known_at(self._before.inputs))
+
+    def close_slowly(
+        self, solved: LinkState, conditioning: Callable[[Sequence[float]], float]
+    ) -> tuple[Status, Sequence[float]]:
+        """
+        Return status and unknowns where no straight line leads to them, as next to a singularity.
+
+        If they are open, the unknowns are where the way to the inputs ends. ``conditioning`` is
+        that of the equations at unknowns.
+        """
+        inputs = [solved.coordinates[1 + k] for k in self.inputs]
+        start = self.grid.find_start(inputs)
+        if start is not None and (found := self.solve_from(inputs, start)) is not None:
+            return Status.CLOSED, found
+        turned, gains = self.grid.turn_back(inputs)
+        cell, left = self.grid.reach(turned)
+        unknowns = [value + gain for value, gain in zip(cell.unknowns, gains, strict=True)]
+        if not left:
+            regular = conditioning(unknowns) > _SINGULAR
+            return (Status.CLOSED if regular else Status.TOGGLE), unknowns
+        near = left <= _TOGGLE * (1.0 + max(map(abs, turned)))
+        return (Status.TOGGLE if near else Status.OPEN), unknowns
+
+    # What the grid asks for; inputs on which nothing depends are as in the pose
+
+    def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
+        """
+        Return η·ω of Kantorovich's theorem; infinite where there is none.
+
+        The norm is the largest change of an unknown: all in one unit, the largest step; or each in
+        its own, its step and some times what the next may be at most. The better one counts.
+        """
+        found = self._evaluate_system(inputs, unknowns)
+        if found is None:
+            return inf
+        count = len(unknowns)
+        numbers, pairs = iter(map(abs, found)), count * (count + 1) // 2
+        steps = [step + SMALLEST for step in islice(numbers, count)]
+        columns = [[*islice(numbers, count)] for _ in range(count)]
+        bounds = [[*islice(numbers, pairs)] for _ in range(count)]
+
+        def changes_within(units: Sequence[float]) -> list[float]:
+            """Return how much the matrix, and so the step, may change by these changes."""
+            squares = [a * b for a, b in combinations_with_replacement(units, 2)]
+            bends = [sum(map(mul, bound, squares)) for bound in bounds]
+            return [sum(map(mul, row, bends)) for row in zip(*columns, strict=True)]
+
+        even = [max(steps)] * count
+        fitted = [a + _SECOND * b for a, b in zip(steps, changes_within(steps), strict=True)]
+        return min(
+            max(a / b for a, b in zip(changes_within(units), units, strict=True))
+            for units in (even, fitted)
+        )
+
+    def solve_from(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> Sequence[float] | None:
+        """Return the solution that Newton's method leads to, until no step is shorter."""
+        values, last = [*unknowns], inf
+        while True:
+            found = self._evaluate_system(inputs, values)
+            size = sum(map(abs, found[: len(values)])) if found else inf
+            if found is None or not size < last:
+                return values if last <= _LEAST_STEP else None
+            values, last = [a - b for a, b in zip(values, found, strict=False)], size
+
+    def forms_at(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
+        """Return slopes and bends at a solution, as a cell has them."""
+        found = self._forms_line(self._complete(inputs), LinkState([*unknowns], []))
+        if found is None:
+            return None
+        size = len(unknowns)
+        rows: list[Sequence[float]] = [*zip(*[iter(found)] * size, strict=True)]
+        count = len(inputs)
+        return rows[:count], rows[count:]
+
+    def _complete(self, inputs: Sequence[float]) -> LinkState:
+        given = [*self._before.inputs]
+        for k, value in zip(self.inputs, inputs, strict=True):
+            given[k] = value
+        return LinkState(given, [])
+
+    def _evaluate_system(
+        self, inputs: Sequence[float], unknowns: Sequence[float]
+    ) -> list[float] | None:
+        return self._system_line(self._complete(inputs), LinkState([*unknowns], []))
+
+    # The functions of the straight lines
+
+    def _list_system(self, given: LinkState, pose: LinkState) -> list[Any]:
+        """Return a step of Newton's method, the inverse by columns, and bounds by equations."""
+        known, count = _require(self._before.known_at(given.coordinates)), len(pose.coordinates)
+        errors, solve = self._equations.linearize(known, pose.coordinates)
+        found = solve(errors)
+        for k in range(count):
+            found += solve([float(i == k) for i in range(count)])
+        for k in range(count):
+            found += self._equations.bound_bends(k, known, pose.coordinates)
+        return found
+
+    def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
+        """Return slopes and bends: rates and accelerations along one input, or along two."""
+        slopes: list[Any] = []
+        squares: dict[tuple[int, int], list[Any]] = {}
+        still = LinkState([0.0] * len(given.coordinates), [])
+        for one, other in combinations_with_replacement(self.inputs, 2):
+            rates = LinkState(
+                [float(k in (one, other)) for k in range(len(still.coordinates))], []
+            )
+            found = self._list_rates(given, pose, rates)
+            squares[one, other] = self._list_accelerations(
+                given, pose, rates, LinkState(found, []), still
+            )
+            if one == other:
+                slopes += found
+        bends = []
+        for (one, other), both in squares.items():
+            if one == other:
+                bends += [0.5 * value for value in both]
+            else:
+                # Along both inputs at once: twice what is mixed, and what each has alone.
+                alone = zip(squares[one, one], squares[other, other], strict=True)
+                bends += [0.5 * (value - a - b) for value, (a, b) in zip(both, alone, strict=True)]
+        return [*slopes, *bends]
+
+    def _list_solution(self, given: LinkState) -> list[Any]:
+        return self._straight_solution(_require(self._before.known_at(given.coordinates)))
+
+    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
+        states = self._before.moving_at(given.coordinates, rates.coordinates)
+        known, velocities = _require(states)
+        return self._equations.solve_rates(known, pose.coordinates, velocities)
+
+    def _list_accelerations(
+        self,
+        given: LinkState,
+        pose: LinkState,
+        rates: LinkState,
+        speeds: LinkState,
+        accelerations: LinkState,
+    ) -> list[Any]:
+        states = self._before.changing_at(*(x.coordinates for x in (given, rates, accelerations)))
+        known, velocities, changes = _require(states)
+        return self._equations.solve_accelerations(
+            known, pose.coordinates, velocities, speeds.coordinates, changes
+        )
+
+
+def _require(found: T | None) -> T:
+    """Return what the steps before have; UndecidedError is raised where they have none."""
+    if found is None:
+        raise UndecidedError
+    return found

@@ -1,0 +1,174 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+The equations of a group of links that no dyad covers, as straight lines.
+
+All functions take numbers or symbols and make no decision, so each is recorded on a tape as it
+stands. A pin gives the place of a link from its angle: the places follow from the angles, one link
+after the other, and only the equations that close loops are left to be solved. The derivatives by
+the places are the constants 1 and −1, which the elimination takes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import prod
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.iterated.bend_bounds import ArmSums, list_bounds
+from linkage_ros.kinematics.iterated.elimination import Elimination, is_zero, subtract
+from linkage_ros.kinematics.iterated.equations import (
+    CoincidentPoints,
+    Constraint,
+    differentiate_constraints,
+    End,
+    evaluate_constraints,
+    GroupMotion,
+)
+from linkage_ros.kinematics.step import LinkState
+
+Solve = Callable[[Sequence[Any]], list[Any]]
+
+
+class _PlacedBody(NamedTuple):
+    """A body that a pin places: the row of the pin's equations, and its two ends."""
+
+    row: int
+    end: End
+    other: End
+
+
+class GroupEquations:
+    """
+    As many equations as unknowns: for each of ``bodies`` links its angle and its place.
+
+    ``free`` has the indices of the unknowns that no pin gives.
+    """
+
+    def __init__(self, constraints: Sequence[Constraint], bodies: int) -> None:
+        self._constraints = constraints
+        self._count = 3 * bodies
+        self._placed = _place_bodies(constraints, bodies)
+        by_pins = {each.end.body for each in self._placed}
+        self.free = tuple(k for k in range(self._count) if not k % 3 or k // 3 not in by_pins)
+        self._rows_of_pins = {each.row + axis for each in self._placed for axis in (0, 1)}
+        rows = [
+            (constraint, axis)
+            for constraint in constraints
+            for axis in range(1 + isinstance(constraint, CoincidentPoints))
+        ]
+        self._closing = [row for row in range(len(rows)) if row not in self._rows_of_pins]
+        self._closing_constraints = [rows[row][0] for row in self._closing]
+        self._sums = ArmSums({each.end.body: (each.end, each.other) for each in self._placed})
+        # The last first: its place is in no other of the equations that remain.
+        self._unit_pivots = [
+            (each.row + axis, 3 * each.end.body + 1 + axis)
+            for each in reversed(self._placed)
+            for axis in (0, 1)
+        ]
+
+    def place_bodies(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
+        """Return all unknowns, from those that are free."""
+        unknowns: list[Any] = [0.0] * self._count
+        for k, value in zip(self.free, values, strict=True):
+            unknowns[k] = value
+        for _, end, other in self._placed:
+            k = 3 * end.body
+            place = subtract(other.place_and_arm(unknowns, solved)[0], end.rotated_arm(unknowns))
+            unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
+        return unknowns
+
+    # The equations that close loops, as functions of the free unknowns; see `GridGroup`
+
+    def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return how far the equations are from being met."""
+        unknowns = self.place_bodies(values, known)
+        errors, _ = evaluate_constraints(self._constraints, unknowns, known)
+        return [errors[row] for row in self._closing]
+
+    def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """Return the errors, and a function that solves with the matrix of their derivatives."""
+        unknowns = self.place_bodies(values, known)
+        errors, jacobian = evaluate_constraints(self._constraints, unknowns, known)
+        eliminated = Elimination(jacobian, self._unit_pivots)
+        divisors = eliminated.divisors
+        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+            raise UndecidedError
+
+        def solve(right: Sequence[Any]) -> list[Any]:
+            whole = [0.0] * self._count
+            for row, value in zip(self._closing, right, strict=True):
+                whole[row] = value
+            found = eliminated.solve(whole)
+            return [found[k] for k in self.free]
+
+        return [errors[row] for row in self._closing], solve
+
+    def bound_bends(self, number: int, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
+        unknowns = self.place_bodies(values, known)
+        bounds = self._sums.bound_bends(self._closing_constraints[number], unknowns, known)
+        return list_bounds(bounds, self.free)
+
+    def solve_rates(
+        self, known: LinkState, values: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the free unknowns."""
+        rates = self._all_rates(known, self.place_bodies(values, known), velocities)
+        return [rates[k] for k in self.free]
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        values: Sequence[Any],
+        velocities: LinkState,
+        _rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the free unknowns."""
+        unknowns, still = self.place_bodies(values, known), [0.0] * self._count
+        rates = self._all_rates(known, unknowns, velocities)
+        found = self.solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
+        return [found[k] for k in self.free]
+
+    def _all_rates(
+        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        return self.solve_motion(GroupMotion(unknowns, known, [0.0] * self._count, velocities))
+
+    def solve_motion(self, motion: GroupMotion) -> list[Any]:
+        """Return the highest derivatives of the unknowns, for a motion that has 0 for them."""
+        drift = differentiate_constraints(self._constraints, motion)
+        # On a tape the matrix is that of rates and of accelerations, and is there only once.
+        jacobian = evaluate_constraints(self._constraints, motion.unknowns, motion.solved)[1]
+        right = [0.0 if is_zero(each) else -each for each in drift]
+        return Elimination(jacobian, self._unit_pivots).solve(right)
+
+
+def _place_bodies(constraints: Sequence[Constraint], bodies: int) -> list[_PlacedBody]:
+    """Return the bodies that pins place, each after the one that its pin is on."""
+    pins = []
+    row = 0
+    for constraint in constraints:
+        if isinstance(constraint, CoincidentPoints):
+            one, other = constraint
+            pins += [_PlacedBody(row, one, other), _PlacedBody(row, other, one)]
+        row += 2 if isinstance(constraint, CoincidentPoints) else 1
+    placed = []
+    unknown = list(range(bodies))
+    while unknown:
+        pin = next(
+            (p for p in pins if p.end.body in unknown and p.other.body not in unknown), None
+        )
+        if pin is not None:
+            placed.append(pin)
+        # Where nothing places a body, its own place is free, and others may follow from it.
+        unknown.remove(unknown[0] if pin is None else pin.end.body)
+    return placed

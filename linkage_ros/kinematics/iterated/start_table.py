@@ -1,0 +1,159 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Where Newton's method starts on a branch, as a table of cubics.
+
+The branch is cut into rows, each with a cubic of the input for every free unknown, through four
+solutions. A row ends where two steps of Newton's method would not be certain to end within the
+rounding. At a toggle the unknowns have no series in the input x, but one in √|x − end|: the cubics
+of the row there are in the root.
+
+All numbers of the table are rounded to some 24 binary digits: a start needs no more, and so the
+table, and with it each state, is the same whatever the last digits of numpy are.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from math import frexp, ldexp
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.arithmetic import call, sqrt as root_of, where
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.iterated.equations import Array
+
+_DIGITS = 24
+"""Binary digits of the numbers of a row, relative to the largest change in it."""
+
+_INPUT_DIGITS = 38
+"""The same for the inputs at the ends of rows, relative to the length of a row."""
+
+_DEEPEST = 12
+"""How often a cell of the branch is halved at most."""
+
+_THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+_TRIED = (0.125, 0.875)
+"""Where a cubic goes through the solutions, and where it is farthest from them."""
+
+_HEAD = 4
+"""Numbers of a row before the coefficients: see `StartTable`."""
+
+
+class StartRow(NamedTuple):
+    """A piece of a branch between two inputs."""
+
+    low: float
+    high: float
+    folds: float  # −1 or 1 if the branch turns back at the low or the high end, otherwise 0
+
+
+class StartTable:
+    """
+    Rows over the inputs up to each of ``ends``, as a function from an input to its row.
+
+    A row holds an input and a factor, which lead to the part p of the row from 0 to 1; whether p
+    is the root of that; the farthest that a solution may be from the start; and for each unknown
+    four coefficients of p.
+    """
+
+    def __init__(self, ends: Sequence[float], rows: Sequence[tuple[float, ...]]) -> None:
+        self.ends = tuple(ends[:-1])
+        self.rows = tuple(rows)
+        self._has_folds = any(row[2] for row in rows)
+
+    def __call__(self, x: float) -> tuple[float, ...]:
+        """Return the row of an input."""
+        return self.rows[bisect_left(self.ends, x)]
+
+    def find_start(self, x: Any) -> tuple[list[Any], Any]:
+        """Return the unknowns at which Newton's method starts, and how far it may lead."""
+        row = call(self, x)
+        part = (x - row[0]) * row[1]
+        if self._has_folds:
+            part = where(row[2] > 0.0, root_of(abs(part)), part)
+        unknowns = []
+        for k in range(_HEAD, len(self.rows[0]), 4):
+            a, b, c, d = (row[k + i] for i in range(4))
+            unknowns.append(a + part * (b + part * (c + part * d)))
+        return unknowns, row[3]
+
+
+def make_start_table(
+    pieces: Sequence[StartRow],
+    solution_at: Callable[[float], Array | None],
+    converges: Callable[[float, Array], bool],
+) -> StartTable | None:
+    """
+    Return the table over adjacent pieces of a branch, in ascending order; None if there are none.
+
+    ``solution_at`` gives the free unknowns at an input. ``converges`` says whether Newton's method
+    converges fast enough from free unknowns.
+    """
+    ends, rows = [], []
+    for piece in pieces:
+        for end, row in _fit_rows(piece, solution_at, converges, 0):
+            ends.append(end)
+            rows.append(row)
+    if not any(row[3] for row in rows):
+        return None
+    # A piece without a fit has a row from which no start is near enough.
+    width = max(map(len, rows))
+    return StartTable(ends, [row + (0.0,) * (width - len(row)) for row in rows])
+
+
+def _fit_rows(
+    piece: StartRow,
+    solution_at: Callable[[float], Array | None],
+    converges: Callable[[float, Array], bool],
+    depth: int,
+) -> Iterator[tuple[float, tuple[float, ...]]]:
+    """Yield the end and the numbers of each row of a piece."""
+    import numpy as np  # local import: sources of linkages need only the table
+
+    low, high, folds = piece
+    begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
+
+    def input_at(part: float) -> float:
+        return begin + length * (part * part if folds else part)
+
+    solutions = [solution_at(input_at(part)) for part in _THIRDS]
+    known = [each for each in solutions if each is not None]
+    if len(known) == len(solutions) and length:
+        values = np.array(known)
+        size = float(np.abs(values - values[0]).max())
+        cubics = np.linalg.solve(np.vander(_THIRDS, increasing=True), values)
+        cubics = _round_binary(cubics, size or 1.0, _DIGITS)
+        if all(converges(input_at(part), np.power(part, range(4)) @ cubics) for part in _TRIED):
+            farthest = min(2.0**-10, ldexp(1.0, frexp(size or 1.0)[1] - 4))
+            start = _round_binary(begin, length, _INPUT_DIGITS) if folds else begin
+            head = (
+                start,
+                _round_binary(1.0 / length, 1.0 / length, _DIGITS),
+                float(bool(folds)),
+                farthest,
+            )
+            yield high, (*head, *cubics.T.ravel().tolist())
+            return
+    if depth == _DEEPEST or not length:
+        yield high, (begin, 0.0, 0.0, 0.0)
+        return
+    middle = _round_binary(input_at(0.5), length, _INPUT_DIGITS)
+    for part in (StartRow(low, middle, min(folds, 0.0)), StartRow(middle, high, max(folds, 0.0))):
+        yield from _fit_rows(part, solution_at, converges, depth + 1)
+
+
+def _round_binary(values: Any, size: float, digits: int) -> Any:
+    """Return numbers with as many binary digits as one of a size has."""
+    import numpy as np  # local import: as above
+
+    unit = ldexp(1.0, frexp(size)[1] - digits)
+    rounded = np.round(values / unit) * unit
+    return rounded if rounded.ndim else float(rounded)

@@ -1,0 +1,295 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Checks of a linkage before it is solved: each refuses a definition that cannot work."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import combinations
+from math import hypot, inf, isfinite, isnan
+from typing import Any
+
+from linkage_ros.errors import DefinitionError, LinkageError, list_names, quote
+from linkage_ros.kinematics.plane.linkage import (
+    GROUND,
+    Input,
+    Limits,
+    Linkage,
+    RevoluteJoint,
+    Slider,
+)
+
+_SHORTEST = 2.0**-511
+"""Least distance of two pins, in [m]: the square of a shorter one would underflow."""
+
+_LEAST_RATIO = 1e-30
+"""Least distance of two pins relative to the linkage; in a shorter one no digit would be left."""
+
+
+PLANAR_ONLY = (
+    'name a planar one; check, solve, draw, compile, urdf, run, simulate, plot, report and '
+    'replay take others'
+)
+"""Remedy where a spatial linkage is of no use."""
+
+
+def check_planar(name: str, linkage: Any) -> None:
+    """Refuse a spatial linkage with a LinkageError."""
+    if not isinstance(linkage, Linkage):
+        raise LinkageError(name, 'is a spatial linkage', PLANAR_ONLY)
+
+
+def check_linkage(linkage: Linkage) -> None:
+    """Refuse a linkage whose parts do not match; the error names the key of the part."""
+    if GROUND not in linkage.links:
+        raise DefinitionError(
+            'links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}'
+        )
+    for name, slider in linkage.sliders.items():
+        _check_slider(linkage, name, slider)
+    _check_points(linkage)
+    if not linkage.inputs:
+        raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
+    for given in linkage.inputs:
+        _check_input(linkage, given)
+    names = [given.joint for given in linkage.inputs]
+    for name in names:
+        if names.count(name) > 1:
+            raise DefinitionError(
+                'input', f'{quote(name)} is named twice', 'give each input its own name'
+            )
+    for name, joint in linkage.joints.items():
+        if isinstance(joint, RevoluteJoint):
+            for end in ('parent', 'child'):
+                _check_link(linkage, f'joints.{name}.{end}', getattr(joint, end))
+        else:
+            _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
+    for name in linkage.ratios:
+        _check_ratio(linkage, name)
+    check_all_limits(linkage)
+    points = {point for carried in linkage.links.values() for point in carried}
+    for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
+        if point not in points:
+            key = 'traced' if point in linkage.traced else 'pose.points'
+            raise DefinitionError(key, f'{quote(point)} is not a point of a link', _one_of(points))
+    for link in linkage.pose.angles if linkage.pose else ():
+        _check_link(linkage, 'pose.angles', link)
+    if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
+        raise DefinitionError(
+            'pose.inputs',
+            f'{len(linkage.pose.inputs)} value(s) for {len(linkage.inputs)} input(s)',
+            'give one for each input',
+        )
+
+
+def _check_points(linkage: Linkage) -> None:
+    # A slider joins links without a shared point, so such a link may have a single point.
+    sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
+    if linkage.ratios:
+        # A gear may have its pin alone.
+        geared = (*linkage.inputs, *(linkage.joints.get(name) for name in linkage.ratios))
+        sliding |= {getattr(joint, end, '') for joint in geared for end in ('parent', 'child')}
+    for name, points in linkage.links.items():
+        # A single pivot is enough for the ground: its frame does not turn.
+        if len(points) < 2 and not (points and (name in sliding or name == GROUND)):
+            raise DefinitionError(
+                f'links.{name}', f'{len(points)} point(s)', 'a link needs two points or more'
+            )
+        for point, place in points.items():
+            if not all(map(isfinite, place)):
+                raise DefinitionError(
+                    f'links.{name}.{point}', f'{place} is not a point', 'write two finite numbers'
+                )
+    for (one, one_points), (other, other_points) in combinations(linkage.links.items(), 2):
+        shared = sorted(set(one_points) & set(other_points))
+        if len(shared) > 1:
+            raise DefinitionError(
+                f'links.{other}',
+                f'shares the points {list_names(shared)} with {one!r}',
+                'two links have one pin between them; rename the points that are not pins',
+            )
+    ends = [point for points in linkage.links.values() for point in points]
+    ends += [slider.point for slider in linkage.sliders.values()]
+    joined = {point for point, count in Counter(ends).items() if count > 1}
+    sizes = (hypot(*place) for points in linkage.links.values() for place in points.values())
+    nearest = max(_SHORTEST, _LEAST_RATIO * max(sizes, default=0.0))
+    for name, points in linkage.links.items():
+        pins = [point for point in points if point in joined]
+        for one, other in combinations(pins, 2):
+            distance = hypot(*(p - q for p, q in zip(points[one], points[other], strict=True)))
+            if not distance:
+                fault, places = f'lies on {one!r}', 'different places'
+            elif distance < nearest:
+                fault = f'{other!r} lies {distance:.3g} m from {one!r}'
+                places = f'places that are at least {nearest:.3g} m apart'
+            else:
+                continue
+            key = f'links.{name}.{other}'
+            raise DefinitionError(key, fault, f'give the two points {places}')
+
+
+def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
+    key = f'sliders.{name}'
+    _check_link(linkage, f'{key}.along', slider.along)
+    points = linkage.links[slider.along]
+    if slider.through not in points:
+        raise DefinitionError(
+            f'{key}.through',
+            f'{quote(slider.through)} is not a point of {slider.along!r}',
+            _one_of(points),
+        )
+    carriers = [link for link, carried in linkage.links.items() if slider.point in carried]
+    if not carriers or slider.along in carriers:
+        raise DefinitionError(
+            f'{key}.point',
+            f'{quote(slider.point)} is named on {list_names(carriers) or "no link"}',
+            f'name a point of a link other than {slider.along!r}',
+        )
+    if slider.block and slider.block not in carriers:
+        raise DefinitionError(
+            f'{key}.block',
+            f'{quote(slider.block)} does not carry {slider.point!r}',
+            _one_of(carriers),
+        )
+    if hypot(*slider.direction) < _SHORTEST or not all(map(isfinite, slider.direction)):
+        raise DefinitionError(
+            f'{key}.direction',
+            f'[{slider.direction[0]:g}, {slider.direction[1]:g}] has no direction',
+            'write for example [1, 0]',
+        )
+
+
+def _check_input(linkage: Linkage, given: Input) -> None:
+    if given.slider:
+        _check_slider_name(linkage, 'input.slider', given.slider)
+        return
+    for end in ('parent', 'child'):
+        _check_link(linkage, f'input.{end}', getattr(given, end))
+    if given.parent == given.child:
+        raise DefinitionError(
+            'input.child', f'{quote(given.child)} is its own parent', 'name two links'
+        )
+    if not set(linkage.links[given.parent]) & set(linkage.links[given.child]):
+        raise DefinitionError(
+            f'links.{given.child}',
+            f'no point is named both on {given.parent!r} and on {given.child!r}',
+            f'name the pin about which {given.joint!r} turns on both',
+        )
+
+
+def _check_ratio(linkage: Linkage, name: str) -> None:
+    """Refuse a joint that cannot follow the other one."""
+    key, given, inputs = f'ratios.{name}', linkage.ratios[name], linkage.inputs
+    names = [one.joint for one in inputs]
+    if name in names:
+        raise DefinitionError(
+            key, f'{quote(name)} is an input, which follows no joint', 'leave one of the two out'
+        )
+    if name not in linkage.joints:
+        free = sorted({*linkage.joints} - {*names})
+        raise DefinitionError(
+            key,
+            f'{quote(name)} is not a published joint',
+            _one_of(free) if free else 'publish it: name it under joints',
+        )
+    if given.of not in (*names, *linkage.joints):
+        choices = {*names, *linkage.joints} - {name}
+        raise DefinitionError(
+            f'{key}.of', f'{quote(given.of)} is not a joint of this linkage', _one_of(choices)
+        )
+    chain = [name]
+    while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
+        chain.append(linkage.ratios[chain[-1]].of)
+    if chain[-1] in chain[:-1]:
+        raise DefinitionError(
+            f'{key}.of', f'{" follows ".join(chain)}', 'let one of them follow an input'
+        )
+    if not given.ratio or not isfinite(given.ratio) or not isfinite(given.offset):
+        raise DefinitionError(
+            f'{key}.ratio',
+            f'{given.ratio:g}, offset {given.offset:g}',
+            'write finite numbers, and a ratio other than 0',
+        )
+    joint = linkage.joints[name]
+    if isinstance(joint, RevoluteJoint):
+        one, other = linkage.links[joint.parent], linkage.links[joint.child]
+        if joint.parent == joint.child or not set(one) & set(other):
+            raise DefinitionError(
+                key,
+                f'{quote(joint.parent)} and {quote(joint.child)} have no common pin about '
+                'which it could turn',
+                'name a joint of two links that share a pin, or of a slider',
+            )
+
+
+def check_all_limits(linkage: Any) -> None:
+    """Refuse limits that allow no motion, and a pose beyond those of its inputs."""
+    for given in linkage.inputs:
+        _check_limits('input', given.limits, given.joint, given.unit)
+    for name, joint in linkage.joints.items():
+        _check_limits(f'joints.{name}', joint.limits, name, joint.unit)
+        ends = (joint.limits.low, joint.limits.high)
+        if isinstance(joint, RevoluteJoint) and ends != (-inf, inf) and inf in map(abs, ends):
+            raise DefinitionError(
+                f'joints.{name}.limits',
+                f'{joint.limits} rad limits the angle on one side, and angles come round to it',
+                'write two finite numbers',
+            )
+    if linkage.pose:
+        for given, value in zip(linkage.inputs, linkage.pose.inputs, strict=False):
+            if not given.limits.low <= value <= given.limits.high:
+                raise DefinitionError(
+                    'pose.inputs',
+                    f'{value:g} {given.unit} is beyond the limits {given.limits} {given.unit} of '
+                    f'{quote(given.joint)}',
+                    'start within the limits, or widen them',
+                )
+
+
+def _check_limits(key: str, limits: Limits, name: str, unit: str) -> None:
+    """Refuse limits that allow no motion."""
+    low, high = limits.low, limits.high
+    if isnan(low) or isnan(high) or low == inf or high == -inf:
+        raise DefinitionError(
+            f'{key}.limits',
+            f'{limits} {unit} of {quote(name)} are not valid limits',
+            'write [low, high]; -.inf or .inf for none on a side',
+        )
+    if low >= high:
+        fault = 'are the same number' if low == high else 'cross'
+        raise DefinitionError(
+            f'{key}.limits',
+            f'{limits} {unit} of {quote(name)} {fault}',
+            'write [low, high], the lower one first',
+        )
+    for what in ('velocity', 'effort'):
+        if not (value := getattr(limits, what)) > 0.0:
+            raise DefinitionError(
+                f'{key}.{what}',
+                f'{value:g} of {quote(name)} allows no motion',
+                'write a number of more than 0, or leave it out',
+            )
+
+
+def _check_slider_name(linkage: Linkage, key: str, name: str) -> None:
+    if name not in linkage.sliders:
+        raise DefinitionError(
+            key,
+            f'{quote(name)} is not a slider',
+            _one_of(linkage.sliders) if linkage.sliders else 'this linkage has none',
+        )
+
+
+def _check_link(linkage: Linkage, key: str, name: str) -> None:
+    if name not in linkage.links:
+        raise DefinitionError(key, f'{quote(name)} is not a link', _one_of(linkage.links))
+
+
+def _one_of(names: object) -> str:
+    return f'name one of {list_names(sorted(names))}'  # type: ignore[call-overload]

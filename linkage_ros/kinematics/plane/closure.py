@@ -1,0 +1,371 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The loop closure of a planar linkage: from its inputs to its joints and its points."""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Sequence
+from typing import overload, TYPE_CHECKING
+
+from linkage_ros.errors import quote
+from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
+from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
+from linkage_ros.kinematics.doubles import to_double
+from linkage_ros.kinematics.limits import without_mirrored, zero_length
+from linkage_ros.kinematics.plane.checks import check_linkage
+from linkage_ros.kinematics.plane.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.plane.plan import SolutionPlan
+from linkage_ros.kinematics.plane.topology import assur_groups, Driven, Dyad, links_of, Structure
+from linkage_ros.kinematics.results import (
+    Acceleration,
+    InputRange,
+    PointMotion,
+    Position,
+    Velocity,
+)
+from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+
+if TYPE_CHECKING:
+    from linkage_ros import InverseClosure, LinkagePage
+    from linkage_ros.kinematics.analysis.crank_branches import CrankBranch, Inverse
+    from linkage_ros.kinematics.analysis.point_tracker import PointTracker
+    from linkage_ros.kinematics.plane.link_frames import LinkFrames
+
+
+class Closure(StepwiseClosure):
+    """
+    A linkage, ready to be solved.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    name
+        Its name, which messages and pictures show; `load` takes it from the file.
+
+    Attributes
+    ----------
+    linkage, name
+        As given.
+    input_names
+        Names of the driven joints, in the order in which `position` takes their values.
+    joint_names
+        Names of the published joints, in the order of `Position.joints`.
+
+    Raises
+    ------
+    DefinitionError
+        If the parts do not form a linkage, or the inputs do not move all of it.
+    TypeError
+        If ``linkage`` is not a `Linkage`.
+
+    """
+
+    linkage: Linkage
+
+    def __init__(self, linkage: Linkage, name: str = '') -> None:
+        if not isinstance(linkage, Linkage):
+            raise TypeError(f'linkage: {quote(linkage)} is not a Linkage; load() reads files')
+        check_linkage(linkage)
+        self.structure: Structure = assur_groups(linkage)
+        planner = SolutionPlan(linkage, self.structure)
+        self._set_linkage(linkage, name, planner.scale)
+        steps = tuple(planner.steps)
+        self._known = planner
+        self.step_groups = tuple(planner.step_groups)
+        self.angles, self.slides = planner.angles, planner.slides
+        self.turns_with = planner.turns_with
+        self.ratio_turns = planner.ratio_turns
+        self._terms = tuple(self._joint_term(joint) for joint in linkage.joints.values())
+        self._point_index = {
+            (link, name): planner.place_point(link, point)
+            for link, points in planner.points.items()
+            for name, point in points.items()
+        }
+        self.steps = steps
+        needed = len(steps)
+        self._more_steps = tuple(planner.steps[needed:])
+        self._inverses: dict[str, Inverse] = {}
+
+    def view(self) -> LinkagePage:
+        """
+        Return the page of `linkage view`, which a notebook shows in a cell.
+
+        Raises
+        ------
+        LinkageError
+            If plotly is not installed.
+
+        """
+        from linkage_ros import LinkagePage  # local import: only a notebook asks for pages
+
+        return LinkagePage(self)
+
+    @overload
+    def driven_by(
+        self, joint: str, /, *, branch: int | None = None, near: float | None = None
+    ) -> InverseClosure: ...
+
+    @overload
+    def driven_by(self, joint: str, other: str, /, *others: str) -> Closure: ...
+
+    def driven_by(
+        self, *joints: str, branch: int | None = None, near: float | None = None
+    ) -> Closure:
+        """
+        Return the linkage with other joints as its inputs.
+
+        With one input the closed form is inverted, along a branch. With several the loops are
+        solved in another order, in the assembly of the pose; some links may have to be iterated.
+
+        Parameters
+        ----------
+        *joints
+            As many joints as there are inputs: published ones; with one input also a coordinate
+            of a traced point, such as ``P.x``; with several also inputs that stay.
+        branch
+            With one input, the number of the branch on which the crank is, as `cranks`
+            returns it. If there is only one branch within the limits, it need not be named.
+        near
+            Instead of the branch a crank on it, in [rad] or [m].
+
+        Raises
+        ------
+        DefinitionError
+            If a joint is unknown or does not move, several branches are within the limits, or the
+            joints do not move all of the linkage.
+
+        """
+        if len(self.input_names) > 1 or len(joints) != 1:
+            from linkage_ros.kinematics.analysis.exchanged_inputs import (
+                exchange_inputs,  # local import: only few ask for it
+            )
+
+            return Closure(exchange_inputs(self, joints, Closure), self.name)
+        from linkage_ros import InverseClosure  # local import: only few ask for it
+
+        inverse = self._joint_inverse(*joints)
+        return InverseClosure(self, inverse, inverse.find_branch(branch, near))
+
+    def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
+        """
+        Return all cranks at which a joint has a value, within the limits.
+
+        Parameters
+        ----------
+        joint
+            As in `driven_by`.
+        value
+            Its value, in [rad] or [m].
+
+        Returns
+        -------
+        cranks : list
+            Pairs of a branch's number and the crank on it, in [rad] or [m].
+
+        Raises
+        ------
+        DefinitionError
+            As `driven_by`.
+
+        """
+        return self._joint_inverse(joint).find_cranks(to_double('value', value))
+
+    def branches(self, joint: str, *, limited: bool = True) -> Sequence[CrankBranch]:
+        """
+        Return the branches of a joint over the single input: on each it moves one way.
+
+        The joint is as in `driven_by`, and so are the errors. If ``limited``, limits of joints cut
+        the branches.
+        """
+        from linkage_ros.kinematics.analysis.crank_branches import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        return (self._joint_inverse(joint) if limited else inverse_of(self, joint, False)).branches
+
+    def _joint_inverse(self, joint: str) -> Inverse:
+        """Return a joint with its branches over the crank; they are made once."""
+        from linkage_ros.kinematics.analysis.crank_branches import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        with BUILD_LOCK:
+            if joint not in self._inverses:
+                self._inverses[joint] = inverse_of(self, joint)
+            return self._inverses[joint]
+
+    def points(self, position: Position) -> dict[tuple[str, str], complex]:
+        """
+        Return every point of every link, by link and name, in the ground's frame.
+
+        Returns
+        -------
+        points : dict
+            For each pair of names the place x + iy, in [m].
+
+        Raises
+        ------
+        ValueError
+            If the linkage has no pose.
+
+        """
+        if not position.status.has_pose:
+            raise ValueError(f'points: {position!r} has none; check its status first')
+        places = self._with_all_points(position).pins
+        return {key: places[i] * self.scale for key, i in self._point_index.items()}
+
+    def named_points(self, position: Position) -> dict[str, complex]:
+        """Return every point by its name, as `Position.points`."""
+        return {point: place for (_, point), place in self.points(position).items()}
+
+    def named_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[str, PointMotion]:
+        """Return `point_motion` by the names of the points."""
+        found = self.point_motion(position, velocity, acceleration)
+        return {point: motion for (_, point), motion in found.items()}
+
+    def point_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[tuple[str, str], PointMotion]:
+        """Return place, velocity and acceleration of every point of every link."""
+        state = self._with_all_points(position)
+        velocities = LinkState(velocity.state.coordinates, list(velocity.state.pins))
+        accelerations = LinkState(acceleration.state.coordinates, list(acceleration.state.pins))
+        for step in self._more_steps:
+            rates = step.rates((), state, velocities)
+            step.accelerations((), rates, state, velocities, accelerations)
+        return {
+            key: PointMotion(
+                *(values.pins[i] * self.scale for values in (state, velocities, accelerations))
+            )
+            for key, i in self._point_index.items()
+        }
+
+    def point_tracker(self, points: Sequence[tuple[str, complex]]) -> PointTracker:
+        """
+        Return a tracker of certain points of links, which computes no others.
+
+        Each point is the name of its link and its place in that link's frame, in [m].
+        """
+        from linkage_ros.kinematics.analysis.point_tracker import (
+            PointTracker,  # local import: only forces need it
+        )
+
+        return PointTracker(self._known, points)
+
+    @BuiltProperty
+    def link_frames(self) -> LinkFrames:
+        """Return the frames of the links and blocks that move."""
+        from linkage_ros.kinematics.plane.link_frames import (
+            LinkFrames,  # local import: only drawings need it
+        )
+
+        return LinkFrames(self.linkage, self.structure, self._known)
+
+    def link_angles(self, position: Position) -> dict[str, float]:
+        """Return the angle of every link to the ground, in [rad], not wrapped."""
+        x = position.state.coordinates
+        return {link: x[angle.coordinate] + angle.constant for link, angle in self.angles.items()}
+
+    def slide_values(self, position: Position) -> dict[str, float]:
+        """Return the slide of every slider, in [m]."""
+        x = position.state.coordinates
+        return {
+            name: self.scale * (slide.sign * x[slide.coordinate] + slide.constant)
+            for name, slide in self.slides.items()
+        }
+
+    def residual(self, position: Position) -> float:
+        """
+        Return the closure error of a closed position, in [m].
+
+        Each link is placed by its own pin or slider and its angle. The result is the largest
+        distance between the two places of a pin, or of a slider's point. Ratios between joints
+        join no places, and are not counted.
+        """
+        points, angles = self.points(position), self.link_angles(position)
+        worst = 0.0
+        for joint in self.structure.joints:
+            if joint.kind == 'R':
+                error = points[joint.link, joint.name] - points[joint.to, joint.name]
+            else:
+                slider = self.linkage.sliders[joint.name]
+                between = points[joint.link, slider.point] - points[joint.to, slider.through]
+                line = complex(*slider.direction) * rect(1.0, angles[joint.to])
+                along = self.slide_values(position)[joint.name]
+                error = between - along * line / abs(line)
+            worst = max(worst, abs(error))
+        return worst
+
+    @BuiltProperty
+    def closing_ranges(self) -> tuple[InputRange, ...]:
+        """
+        Ranges in which a single input closes every loop, without limits; empty for several.
+
+        A cylinder has only the ranges of positive length, unless it starts in the others or is
+        limited to them.
+        """
+        return self.keep_usual(closing_ranges(self))
+
+    @BuiltProperty
+    def zero_length(self) -> float | None:
+        """Slide at which the two pins of a cylinder meet, in [m]; None if there is none."""
+        return zero_length(self.linkage, self.structure)
+
+    @property
+    def slide_bound(self) -> float:
+        """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
+        return sum(link_lengths(self.structure.links))
+
+    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]:
+        """Return the ranges of the first input that a user expects: cylinders of one sign."""
+        return without_mirrored(self.linkage, self.structure, ranges) if ranges else ()
+
+    def needed_groups(self, number: int) -> set[int]:
+        """Return the numbers of a group and of the groups that it starts from."""
+        groups = self.structure.groups
+        owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
+        needed: set[int] = set()
+        asked = [number]
+        while asked:
+            i = asked.pop()
+            if i not in needed:
+                needed.add(i)
+                group = groups[i]
+                if isinstance(group, Driven):
+                    starts = [group.joint.to]
+                elif isinstance(group, Dyad):
+                    starts = [joint.to for joint in group.outer]
+                else:
+                    return set(range(number + 1))
+                asked += [owner[link] for link in starts if link != GROUND]
+        return needed
+
+    def links_of_group(self, number: int) -> list[str]:
+        """Return the links of a group; a block has the name of its slider."""
+        sliders = {block: f'slider {name}' for name, block in self.structure.blocks.items()}
+        links = links_of(self.structure.groups[number])
+        return [sliders.get(link, link) for link in links]
+
+    def _with_all_points(self, position: Position) -> LinkState:
+        """Return a position with all points placed, also those that no loop needs."""
+        state = LinkState(position.state.coordinates, list(position.state.pins))
+        for step in self._more_steps:
+            step.close(state)
+        return state
+
+    def _joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
+        """Return a published joint as factor·(x[i] − x[j]) + constant, in [rad] or [m]."""
+        i, j, factor, constant = self._known.joint_term(joint)
+        unit = self.scale if isinstance(joint, SlideJoint) else 1.0
+        return i, j, factor * unit, constant * unit

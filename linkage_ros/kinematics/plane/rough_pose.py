@@ -1,0 +1,80 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The angles and places of iterated links, guessed from the pose of a file."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from linkage_ros.errors import DefinitionError, list_names
+from linkage_ros.kinematics.plane.linkage import Linkage
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.plane.solved_links import SolvedLinks
+
+
+def guess_unknowns(
+    linkage: Linkage,
+    links: Sequence[str],
+    planner: SolvedLinks,
+    given: Mapping[str, complex],
+    angles: dict[str, float],
+) -> list[float]:
+    """Return angle and place of each link, fitted to the given places of points."""
+    points = planner.points
+
+    def by_slider(link: str) -> float | None:
+        """Return the angle of a link from its slider: by the other link or by the direction."""
+        for name, slider in linkage.sliders.items():
+            block, rail = planner.blocks[name], slider.along
+            ends = slider.through, slider.point
+            if link not in (block, rail):
+                continue
+            turn = slider.angle if link == block else 0.0
+            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
+                along = given[ends[1]] - given[ends[0]]
+                return phase(along / complex(*slider.direction)) + turn
+            if link == block:
+                return angle_of(rail) + turn
+            if block in angles:
+                return angles[block] - slider.angle
+        return None
+
+    def angle_of(link: str) -> float:
+        if link not in angles:
+            known = [name for name in points[link] if name in given]
+            apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
+            if apart:
+                there = given[apart[0]] - given[known[0]]
+                angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
+            else:
+                angle = by_slider(link)
+                if angle is None:
+                    raise DefinitionError(
+                        'pose.points',
+                        f'does not say where {link!r} lies',
+                        f'give two of its points: {list_names(points[link])}',
+                    )
+                angles[link] = angle
+        return angles[link]
+
+    start: list[float] = []
+    for link in links:
+        angle = angle_of(link)
+        known = next((name for name in points[link] if name in given), None)
+        if known is None:
+            raise DefinitionError(
+                'pose.points', f'does not say where {link!r} lies', 'give one of its points'
+            )
+        first = next(iter(points[link].values()))
+        place = given[known] + rect(1.0, angle) * (first - points[link][known])
+        start += (angle, place.real, place.imag)
+    return start

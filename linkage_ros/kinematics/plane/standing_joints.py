@@ -1,0 +1,111 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+Where published joints stand although inputs move: the other kind of singularities.
+
+At a toggle the inputs cannot say how the links move; here the links move and the joints do not
+say so. A single input has such places for each joint: where it turns back. Several inputs have
+them where the Jacobian of all published joints loses rank: its smallest singular value is 0 there.
+C. Gosselin, J. Angeles, Singularity analysis of closed-loop kinematic chains, IEEE Transactions on
+Robotics and Automation 6 (1990), 281–290.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from itertools import product
+from typing import Any
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.analysis.crank_branches import crank_branches, joint_output
+from linkage_ros.kinematics.analysis.singularity_margin import signed_distance
+from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid
+from linkage_ros.kinematics.batch import Array, CODES
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
+import numpy as np
+
+_SAME = 1e-9
+"""Inputs nearer to each other than this are one, in [rad] or [m]."""
+
+_FEW = 3
+"""Most inputs of which a grid is fine enough to search from."""
+
+_NEAR_ZERO, _ZERO = 0.25, 1e-7
+"""Upper bounds of the smallest singular value on the grid next to a zero, and of a zero."""
+
+_ROUNDS = 100
+"""Rounds of the search: each moves on, or halves its steps."""
+
+
+def turning_points(closure: StepwiseClosure) -> dict[str, list[float]]:
+    """Return for each published joint where it turns back over a single input, in its limits."""
+    found: dict[str, list[float]] = {}
+    for name in closure.joint_names:
+        places: list[float] = []
+        with suppress(DefinitionError):  # It does not move.
+            for branch in crank_branches(closure, joint_output(closure, name)):
+                ends = zip((branch.first, branch.last), branch.turns_back, strict=True)
+                for place in (end for end, turns in ends if turns):
+                    if all(abs(signed_distance(closure, place, one)) > _SAME for one in places):
+                        places.append(place)
+        if places:
+            found[name] = sorted(places)
+    return found
+
+
+def find_standing_state(closure: StepwiseClosure) -> tuple[float, ...] | None:
+    """
+    Return inputs at which the Jacobian of the published joints loses rank, in [rad] and [m].
+
+    The search starts where on a grid it is nearest to that. None if it ends elsewhere, and for
+    more than three inputs.
+    """
+    count = len(closure.input_names)
+    if not 1 < count <= _FEW or not closure.joint_names:
+        return None
+    grid = np.array([*inputs_on_grid(closure)])
+    values = _smallest_singular_values(closure, grid)
+    # Symmetrical linkages have several: the first, whatever the last digits are.
+    number = int(np.argmin(values.round(9)))
+    best, least = grid[number], values[number]
+    steps = np.array([np.diff(np.unique(axis)).min(initial=1.0) for axis in grid.T])
+    around = np.array([*product((0, -1, 1), repeat=count)])
+    for _ in range(_ROUNDS if least < _NEAR_ZERO else 0):
+        tried = best + steps * around
+        values = _smallest_singular_values(closure, tried)
+        number = int(np.argmin(values))
+        if values[number] < least:
+            best, least = tried[number], values[number]
+        else:
+            steps *= 0.5
+        if least < _ZERO:
+            return tuple(best.tolist())
+    return None
+
+
+def _smallest_singular_values(closure: StepwiseClosure, inputs: Array) -> Array:
+    """
+    Return the smallest singular value of the Jacobian at inputs (N, inputs).
+
+    Lengths are in units of the linkage's size. It is infinite where there are no rates, or a
+    joint is beyond its limits.
+    """
+    columns: list[Any] = []
+    for number, given in enumerate(closure.linkage.inputs):
+        rates = [0.0] * len(closure.input_names)
+        rates[number] = closure.scale if given.slider else 1.0
+        solved = closure.solve(*inputs.T, rates=rates, derivatives=1)
+        columns.append(solved.velocities)
+    units = np.array([1.0 if turns else closure.scale for turns in closure.turning])
+    jacobians = np.stack(columns, -1).transpose(1, 0, 2) / units[:, None]
+    values = np.full(len(inputs), np.inf)
+    known = np.isin(solved.status, [CODES[Status.CLOSED], CODES[Status.CHANGE_POINT]])
+    values[known] = np.linalg.svd(jacobians[known], compute_uv=False)[:, -1]
+    return values
