@@ -32,7 +32,6 @@ from linkage_ros.kinematics import (
     Status,
     Structure,
 )
-from linkage_ros.kinematics.plane import closure as closure_module
 import numpy as np
 import pytest
 
@@ -75,7 +74,7 @@ def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
         for (_, point), place in exact.points(exact.position(start)).items()
     }
     posed = replace(linkage, assembly={}, pose=AssemblyPose((start,), rough))
-    monkeypatch.setattr(closure_module, 'assur_groups', iterated)
+    monkeypatch.setattr('linkage_ros.kinematics.plane.closure.assur_groups', iterated)
     found = Closure(posed)
     turns = not linkage.inputs[0].slider
     for i in range(-20, 21):

@@ -38,8 +38,6 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.kinematics.compiling import BLOCK, Compiled, CompiledAnswer
-from linkage_ros.kinematics.iterated import newton_group
-from linkage_ros.kinematics.plane import diagonals, dyads, rail
 import numpy as np
 from numpy.typing import NDArray
 import pytest
@@ -345,6 +343,10 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, mon
 
 def test_every_kind_of_step_is_tested():
     steps = [step for name in (*KINDS, *OTHERS) for step in case_of(name)[0].steps]
+    diagonals, dyads, newton_group, rail = (
+        import_module(f'linkage_ros.kinematics.{name}')
+        for name in ('plane.diagonals', 'plane.dyads', 'iterated.newton_group', 'plane.rail')
+    )
     kinds = [
         import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
     ]
