@@ -151,7 +151,7 @@ LIMITS = {
 
 
 def split_limits(values: _Values) -> Limits:
-    """Return the limits of a joint and take their keys out; `kinematics.plane.checks` judges them."""
+    """Return the limits of a joint and take their keys out; `checks` judges them."""
     low, high = values.pop('limits', (-inf, inf))
     return Limits(low, high, values.pop('velocity', inf), values.pop('effort', inf))
 

@@ -48,6 +48,7 @@ from linkage_ros.kinematics.plane.solved_links import (
     Slide,
     SlideLine,
     SolvedLinks,
+    Start,
 )
 from linkage_ros.kinematics.plane.topology import (
     assur_groups,
@@ -86,10 +87,20 @@ class _Hinge(NamedTuple):
 
 
 class SolutionPlan(SolvedLinks):
-    """Makes the steps of a linkage, Assur group after Assur group."""
+    """
+    Makes the steps of a linkage, Assur group after Assur group.
 
-    def __init__(self, linkage: Linkage, structure: Structure) -> None:
-        super().__init__(linkage, structure)
+    ``nominal``, if there is one, determines the assembly and the change points that are passed.
+    """
+
+    def __init__(
+        self,
+        linkage: Linkage,
+        structure: Structure,
+        start: Start | None = None,
+        nominal: SolutionPlan | None = None,
+    ) -> None:
+        super().__init__(linkage, structure, start or Start.alone(linkage, structure))
         self._structure = structure
         self._assembly = dict(linkage.assembly)
         # The dyads that close in two ways; those of the nominal linkage by name, with its steps.
@@ -98,6 +109,7 @@ class SolutionPlan(SolvedLinks):
         self._nominal: dict[str, TwoSided] = {}
         if linkage.nominal is not None:
             nominal = SolutionPlan(linkage.nominal, assur_groups(linkage.nominal))
+        if nominal is not None:
             self._nominal = {
                 one.assembly_key: nominal.two_sided_step(one) for one in nominal.two_ways
             }

@@ -102,13 +102,39 @@ class SlideLine:
     sign: float
 
 
+@dataclass(frozen=True, slots=True)
+class Start:
+    """
+    What is known before the first step of a linkage.
+
+    Alone it is the ground and the inputs. A planar loop of another linkage has the unit, the
+    coordinates and the pins of that, and starts from some of them.
+    """
+
+    scale: float  # Metres in the unit of the lengths
+    inputs: tuple[int, ...]  # Coordinates of the inputs
+    coordinate_count: int
+    pin_count: int
+    # For each coordinate that is a sum of inputs, the factor of each input: +1, −1 or 0. Such an
+    # angle is known with its whole turns; other angles are known only modulo a turn.
+    turns_with: dict[int, tuple[float, ...]]
+
+    @classmethod
+    def alone(cls, linkage: Linkage, structure: Structure) -> Start:
+        """Return the start of a linkage that is no part of another."""
+        count = len(linkage.inputs)
+        turns = {k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)}
+        scale = _find_scale(structure.links.values())
+        return cls(scale, tuple(range(1, 1 + count)), 1 + count, 0, turns)
+
+
 class SolvedLinks:
     """The known links of a linkage; at first the ground."""
 
-    def __init__(self, linkage: Linkage, structure: Structure) -> None:
-        self._linkage = linkage
+    def __init__(self, linkage: Linkage, structure: Structure, start: Start) -> None:
+        self._linkage, self._start = linkage, start
         self.blocks = structure.blocks  # For each slider the link that slides
-        self.scale = _find_scale(structure.links.values())  # Metres in the unit of the lengths
+        self.scale = start.scale
         # Points of every link, in its own frame and in the unit of the lengths.
         self.points = {
             link: {
@@ -126,19 +152,14 @@ class SolvedLinks:
             str, Attachment
         ] = {}  # How each known link except the ground is held
         self.group = 0
-        count = len(linkage.inputs)
-        self.coordinate_count = 1 + count
-        # For each coordinate that is a sum of inputs, the factor of each input: +1, −1 or 0. Such
-        # an angle is known with its whole turns; other angles are known only modulo a turn.
-        self.turns_with = {
-            k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
-        }
+        self.coordinate_count = start.coordinate_count
+        self.turns_with = start.turns_with
         # The coordinates of the joints that follow others, by number among
         # `Linkage.driven_joints`, and the whole turns of a single input after which they repeat; 0
         # if they never do.
         self._followers: dict[int, int] = {}
         self.ratio_turns = 1
-        self.pin_count = 0
+        self.pin_count = start.pin_count
         self._pins: dict[tuple[str, complex], int] = {}
 
     def place_point(self, link: str, point: complex) -> int:
@@ -199,7 +220,7 @@ class SolvedLinks:
         """Return the coordinate of a driven joint; add the step of one that follows another."""
         count = len(self._linkage.inputs)
         if index < count:
-            return 1 + index
+            return self._start.inputs[index]
         if index not in self._followers:
             name, ratio = tuple(self._linkage.ratios.items())[index - count]
             self._add_follower(name, ratio)

@@ -43,6 +43,7 @@ class CarriedPoints:
     """
 
     def __init__(self, linkage: SpaceLinkage, size: float) -> None:
+        self.size = size
         unit = 1.0 / size
         self.places: dict[str, Vector] = {
             name: scale(unit, place) for name, place in linkage.points.items()

@@ -87,8 +87,8 @@ class SpaceClosure(StepwiseClosure):
         check_space_linkage(linkage)
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
-        self.turns_with = {}
         self._plan = plan = SpacePlan(linkage, _add_knot)
+        self.turns_with = plan.turns_with
         self._set_linkage(linkage, name, plan.scale)
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy

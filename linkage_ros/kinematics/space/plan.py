@@ -12,6 +12,7 @@ There are no kinds of mechanisms and no patterns. Two points of one link keep th
 each pair of points on a link is a rod, whatever else joins the link. In the order of the file,
 again and again:
 
+- a planar loop whose inputs are known is solved in its plane, as a planar linkage;
 - a joint whose value is known places its link;
 - a hinge or slide whose link carries a known point is aimed at it;
 - a hinge or slide whose link carries a point at a known distance from a known one is closed; of
@@ -27,6 +28,7 @@ The pose gives the sign of each closed step.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from math import atan2, dist, hypot, lcm, tau
@@ -34,10 +36,13 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.plane.linkage import GROUND
-from linkage_ros.kinematics.plane.solved_links import count_turns
+from linkage_ros.kinematics.plane.plan import SolutionPlan
+from linkage_ros.kinematics.plane.solved_links import count_turns, Start
+from linkage_ros.kinematics.plane.topology import assur_groups, Dyad, Iterated, Structure
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
+from linkage_ros.kinematics.space.planar_loops import find_planar_loops, PlanarLoop
 from linkage_ros.kinematics.space.steps import (
     AimedHinge,
     CarriedPoint,
@@ -120,9 +125,18 @@ class SpacePlan:
         self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
-        known = CarriedPoints(linkage, self.scale)
+        self._known = known = CarriedPoints(linkage, self.scale)
         self.places, self.axes, self.same = known.places, known.axes, known.same
         self.carriers, self.carried = known.carriers, known.carried
+        count = len(linkage.driven)
+        self.turns_with = {
+            k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
+        }
+        """For each coordinate that is a sum of inputs, how often each input is in it."""
+        self.tilt = 0.0
+        """By how much joints of planar loops leave their plane, in [rad]."""
+        self._tried = 0
+        self._spatial: set[frozenset[str]] = set()
         self.state = LinkState([0.0, *map(self.pose_value, linkage.driven)], [])
         """The pose as the steps so far find it."""
         self.frames[GROUND] = 0
@@ -191,6 +205,7 @@ class SpacePlan:
         """Add the next step; False if there is none."""
         return (
             any(map(self._follow, self.linkage.ratios))
+            or self._solve_loop()
             or any(map(self._give, self.linkage.pair_joints))
             or any(map(self._aim, self.linkage.pair_joints))
             or any(map(self._close, self.linkage.pair_joints))
@@ -206,6 +221,65 @@ class SpacePlan:
         joints = self.linkage.pair_joints.values()
         held = {end for joint in joints for end in (joint.parent, joint.child)}
         return not held.isdisjoint(self._unknown_links())
+
+    # Planar loops
+
+    def _solve_loop(self) -> bool:
+        """Solve a planar loop whose inputs are known."""
+        if self._tried == len(self.coordinates):
+            return False
+        self._tried = len(self.coordinates)
+        for loop in find_planar_loops(self.linkage, self._known, self.coordinates):
+            if frozenset(loop.offsets) not in self._spatial:
+                self._spatial.add(frozenset(loop.offsets))
+                # A pose at a toggle is left to the steps in space.
+                with suppress(DefinitionError):
+                    structure = assur_groups(loop.linkage)
+                    # Links that are iterated are a knot.
+                    if not any(isinstance(group, Iterated) for group in structure.groups):
+                        self._add_loop(loop, structure)
+                        return True
+        return False
+
+    def _add_loop(self, loop: PlanarLoop, structure: Structure) -> None:
+        """Add the steps of a planar loop, and the values of its joints."""
+        start = Start.alone(loop.linkage, structure)
+        known = [self.coordinates[name] in self.turns_with for name in loop.inputs]
+        turns = {0: start.turns_with[0]}
+        turns |= {k: start.turns_with[k] for k, turned in enumerate(known, 1) if turned}
+        drawn = SolutionPlan(loop.linkage, structure, replace(start, turns_with=turns))
+        inputs = tuple(self._inner_input(loop, name) for name in loop.inputs)
+        coordinates, pins = self.state
+        within = Start(self.scale, inputs, len(coordinates), len(pins), self.turns_with)
+        planar = SolutionPlan(loop.linkage, structure, within, drawn)
+        for step in planar.steps:
+            self.add_step(step)
+        for name, joint in loop.linkage.joints.items():
+            one, other, factor, constant = planar.joint_term(joint)
+            rest = loop.offsets[name]
+            if not self._slides(name):
+                x = self.state.coordinates
+                off = x[one] - x[other] + constant + rest - self.pose_value(name)
+                rest -= tau * round(off / tau)
+            self.coordinates[name] = self._joint_coordinate(
+                FollowerJoint(name, one, other, factor * constant, factor, rest)
+            )
+        self.tilt = max(self.tilt, loop.tilt)
+        by = list_names(loop.inputs)
+        kinds = ', '.join(group.kind for group in structure.groups if isinstance(group, Dyad))
+        self.end_group('planar loop', loop.links[1:], f'{kinds}, on {loop.links[0]}, by {by}')
+
+    def _inner_input(self, loop: PlanarLoop, name: str) -> int:
+        """Return the coordinate of an input of a planar loop."""
+        index, offset = self.coordinates[name], loop.offsets[name]
+        return self._joint_coordinate(FollowerJoint(name, index, 0, -offset, 1.0, 0.0))
+
+    def _joint_coordinate(self, step: FollowerJoint) -> int:
+        """Return the coordinate that is a joint's value; a step makes one if it has to."""
+        if (step.other, step.constant, step.ratio, step.offset) == (0, 0.0, 1.0, 0.0):
+            return step.one
+        self.add_step(step)
+        return len(self.state.coordinates) - 1
 
     # Joints
 
@@ -287,6 +361,9 @@ class SpacePlan:
         of = self.coordinates[ratio.of]
         self.coordinates[name] = len(self.state.coordinates)
         factor, offset = ratio.ratio * other / own, ratio.offset / own
+        if of in self.turns_with:
+            turns = tuple(factor * each for each in self.turns_with[of])
+            self.turns_with[self.coordinates[name]] = turns
         self.add_step(FollowerJoint(name, of, 0, 0.0, factor, offset))
         self.end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
         return True

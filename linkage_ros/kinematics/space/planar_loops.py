@@ -1,0 +1,418 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Planar loops of a spatial linkage: what moves in one plane, wherever that plane moves.
+
+Hinges along one direction, and slides across it, keep the links that they join in a plane; so do
+rods and struts between such links. The joints of a loop of these depend on the loop's own inputs
+alone, however its links are carried. So each loop is a planar linkage, and is solved as one: with
+drawn assemblies, and with change points that are passed.
+
+Loops are the biconnected components of the graph of links and joints of one direction (J. Hopcroft
+and R. Tarjan, Algorithm 447, Communications of the ACM 16 (1973) 372-378).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from math import asin, cos, dist, sin
+from typing import NamedTuple
+
+from linkage_ros.kinematics.plane.linkage import (
+    AssemblyPose,
+    GROUND,
+    Input,
+    Linkage,
+    Point,
+    Ratio,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
+from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
+from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage
+from linkage_ros.kinematics.space.merged_pose import MERGED
+from linkage_ros.kinematics.space.vectors import cross, dot, length, minus, scale, Vector
+
+PARALLEL = 1e-6
+"""Axes nearer to parallel than this are parallel, in [rad]: CAD rounds."""
+
+Edges = dict[str, tuple[str, str]]
+"""The ends of each joint by its name; those of a rod or strut by its name and the point."""
+
+
+class PlanarLoop(NamedTuple):
+    """
+    A planar loop, as a linkage in its plane.
+
+    The ground of that linkage is the loop's link nearest to the ground. Its hinges have the values
+    of those in space less ``offsets``, in [rad]; its slides and struts have the same values.
+    """
+
+    linkage: Linkage
+    links: tuple[str, ...]
+    offsets: Mapping[str, float]
+    normal: Vector
+    tilt: float  # Largest angle of a joint to the plane, or to its normal, in [rad]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Return the names of the joints that move it."""
+        return tuple(given.joint for given in self.linkage.inputs)
+
+
+class _Part(NamedTuple):
+    """Joints that move in one plane."""
+
+    normal: Vector
+    edges: Edges
+
+
+def find_planar_loops(
+    linkage: SpaceLinkage, carried: CarriedPoints, known: Collection[str]
+) -> Iterator[PlanarLoop]:
+    """Yield the planar loops that joints of known values move, and only they."""
+    order = _links_from_ground(linkage)
+    for normal in _normals(linkage, carried):
+        joints = _joints_across(linkage, carried, normal)
+        rods = _rods_across(linkage, carried, normal, known)
+        for edges in biconnected_components({**joints, **rods}, order):
+            loop = _PlanarModel(linkage, carried, _Part(normal, edges), known, order)
+            if loop.is_moved_by_inputs:
+                yield loop.loop()
+
+
+def _normals(linkage: SpaceLinkage, carried: CarriedPoints) -> list[Vector]:
+    """Return the directions of hinges, parallel ones once, each with its largest part positive."""
+    normals: list[Vector] = []
+    for name in linkage.hinges:
+        axis = carried.axes[name]
+        if not any(_is_parallel(axis, other) for other in normals):
+            normals.append(scale(-1.0 if max(axis, key=abs) < 0.0 else 1.0, axis))
+    return normals
+
+
+def _is_parallel(one: Vector, other: Vector) -> bool:
+    return length(cross(one, other)) < PARALLEL
+
+
+def _joints_across(linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector) -> Edges:
+    """Return the hinges along a direction and the slides across it."""
+    return {
+        name: (joint.parent, joint.child)
+        for name, joint in linkage.pair_joints.items()
+        if (
+            _is_parallel(carried.axes[name], normal)
+            if name in linkage.hinges
+            else abs(dot(carried.axes[name], normal)) < PARALLEL
+        )
+    }
+
+
+def _rods_across(
+    linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector, known: Collection[str]
+) -> Edges:
+    """Return the ends of rods, and of struts of known length that lie across a direction."""
+    joints = linkage.pair_joints.values()
+    held = {end for joint in joints for end in (joint.parent, joint.child)}
+    edges: Edges = {}
+    for link, points in carried.carried.items():
+        if link in held or link == GROUND or len(points) != 2:
+            continue
+        others = [[on for on in carried.carriers[point] if on != link] for point in points]
+        if all(others):
+            edges |= {
+                f'{link}, {point}': (link, on[0]) for point, on in zip(points, others, strict=True)
+            }
+    for name, ends in linkage.struts.items():
+        points = [carried.same[point] for point in ends]
+        one, other = (carried.places[point] for point in points)
+        if name in known and abs(dot(minus(other, one), normal)) < MERGED:
+            edges |= {f'{name}, {point}': (name, carried.carriers[point][0]) for point in points}
+    return edges
+
+
+def _links_from_ground(linkage: SpaceLinkage) -> list[str]:
+    """Return all links, those nearer to the ground first."""
+    order = [GROUND]
+    for link in order:
+        for joint in linkage.pair_joints.values():
+            if link in (joint.parent, joint.child):
+                order += [end for end in (joint.parent, joint.child) if end not in order]
+    return [*order, *(link for link in linkage.link_names if link not in order)]
+
+
+def biconnected_components(edges: Edges, order: Collection[str]) -> list[Edges]:
+    """
+    Return the edges of each biconnected component of a graph that has a circle.
+
+    ``order`` has the vertices in the order in which they are taken as roots.
+    """
+    near: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
+    for edge, (one, other) in edges.items():
+        near[one].append((edge, other))
+        near[other].append((edge, one))
+    depth: dict[str, int] = {}
+    low: dict[str, int] = {}
+    found: list[Edges] = []
+    for root in (one for one in order if one in near):
+        if root in depth:
+            continue
+        depth[root] = low[root] = len(depth)
+        waiting: list[str] = []
+        path = [(root, '', iter(near[root]))]
+        while path:
+            at, by, ways = path[-1]
+            way = next(ways, None)
+            if way is None:
+                path.pop()
+                if path:
+                    top = path[-1][0]
+                    low[top] = min(low[top], low[at])
+                    if low[at] >= depth[top]:
+                        first = waiting.index(by)
+                        found.append({edge: edges[edge] for edge in waiting[first:]})
+                        del waiting[first:]
+                continue
+            edge, other = way
+            if other not in depth:
+                depth[other] = low[other] = len(depth)
+                waiting.append(edge)
+                path.append((other, edge, iter(near[other])))
+            elif edge != by and depth[other] < depth[at]:
+                waiting.append(edge)
+                low[at] = min(low[at], depth[other])
+    return [component for component in found if len(component) > 2]
+
+
+class _Pin(NamedTuple):
+    name: str
+    place: Point  # In the plane, in [m]
+    links: set[str]
+
+
+class _PlanarModel:
+    """
+    A planar linkage made of the joints of a loop.
+
+    Each link has its own frame in the plane. In the pose a link is turned against the one that it
+    hangs on by the value of their hinge, so that hinges have the same values as in space; those of
+    hinges that close a loop may differ by a constant.
+    """
+
+    def __init__(
+        self,
+        linkage: SpaceLinkage,
+        carried: CarriedPoints,
+        part: _Part,
+        known: Collection[str],
+        order: list[str],
+    ) -> None:
+        self._linkage, self._carried, self._edges = linkage, carried, part.edges
+        self._normal = part.normal
+        self._x = unit_across(part.normal)
+        self._y = cross(part.normal, self._x)
+        ends = {end for pair in part.edges.values() for end in pair}
+        self._links = [link for link in order if link in ends]
+        self._struts = [name for name in linkage.struts if name in ends]
+        joints = [name for name in linkage.pair_joints if name in part.edges]
+        self._inputs = [name for name in (*joints, *self._struts) if name in known]
+        self._inputs.sort(key=lambda name: name not in linkage.driven)
+        self._joints = [name for name in joints if name not in known]
+        self._ratios = {
+            name: ratio
+            for name, ratio in linkage.ratios.items()
+            if name in self._joints and ratio.of in self._joints
+        }
+        self._near = MERGED * size_of(linkage)
+        self._pins = self._find_pins()
+
+    @property
+    def is_moved_by_inputs(self) -> bool:
+        """Return whether its links stay in the plane, and its inputs are all its freedoms."""
+        pairs = [self._edges[name] for name in self._linkage.pair_joints if name in self._edges]
+        joined = {self._links[0]}
+        for _ in pairs:
+            joined.update(*(pair for pair in pairs if not joined.isdisjoint(pair)))
+        loose = [link for link in self._links if link not in joined]
+        if any(link in self._linkage.link_names and link in _held(pairs) for link in loose):
+            return False
+        rods = [edge for edge in self._edges if edge not in self._linkage.pair_joints]
+        if any(self._edges[edge][1] not in joined for edge in rods):
+            return False
+        slides = sum(name in self._linkage.slides for name in self._edges)
+        count = sum(len(pin.links) - 1 for pin in self._pins) + slides
+        freedoms = 3 * (len(self._links) - 1) - 2 * count - len(self._struts)
+        # A strut is a rod whose length is known.
+        turned = [name for name in self._inputs if name not in self._struts]
+        return freedoms == len(turned) + len(self._ratios) and bool(self._inputs)
+
+    def _on(self, link: str) -> str:
+        """Return the name of a link in the plane."""
+        return GROUND if link == self._links[0] else link
+
+    def _flat(self, place: Vector) -> Point:
+        return dot(place, self._x), dot(place, self._y)
+
+    def _find_pins(self) -> list[_Pin]:
+        """Return the pins; those of one link in one place are one, as of hinges on one line."""
+        pins: list[_Pin] = []
+        for edge, ends in self._edges.items():
+            if edge in self._linkage.slides:
+                continue
+            held = {self._on(end) for end in ends if end not in self._struts}
+            if edge in self._linkage.hinges:
+                name, place = edge, self._linkage.hinges[edge].at
+            else:
+                name = edge.removeprefix(f'{ends[0]}, ')
+                place = scale(self._carried.size, self._carried.places[name])
+            pin = _Pin(name, self._flat(place), held)
+            for other in [*pins]:
+                if other.name == name or (
+                    dist(other.place, pin.place) < self._near and not held.isdisjoint(other.links)
+                ):
+                    pins.remove(other)
+                    held = held | other.links
+                    pin = _Pin(other.name, other.place, held)
+            pins.append(pin)
+        return pins
+
+    def loop(self) -> PlanarLoop:
+        """Return the loop."""
+        spatial = self._linkage
+        turned = self._pose_angles()
+        places: dict[str, dict[str, Point]] = {self._on(link): {} for link in self._links}
+        for pin in self._pins:
+            for link in pin.links:
+                places[link][pin.name] = pin.place
+        sliders: dict[str, Slider] = {}
+        for name in self._edges:
+            if name in spatial.slides:
+                sliders[name] = self._slider(name, places, turned)
+        for name in self._struts:
+            sliders[name] = self._cylinder(name, places)
+        links: dict[str, dict[str, Point]] = {}
+        for link, points in places.items():
+            first = (0.0, 0.0) if link == GROUND else next(iter(points.values()))
+            links[link] = {
+                name: _turn((x - first[0], y - first[1]), -turned.get(link, 0.0))
+                for name, (x, y) in points.items()
+            }
+        offsets: dict[str, float] = {}
+        made: dict[str, RevoluteJoint | SlideJoint] = {}
+        for name in (*self._inputs, *self._joints):
+            if name in sliders:
+                limits = spatial.pair_joints[name].limits if name in spatial.slides else None
+                made[name] = SlideJoint(name, limits) if limits else SlideJoint(name)
+                offsets[name] = 0.0
+                continue
+            joint = spatial.hinges[name]
+            ends = [self._on(joint.parent), self._on(joint.child)]
+            if dot(self._carried.axes[name], self._normal) < 0.0:
+                ends.reverse()
+            made[name] = RevoluteJoint(ends[0], ends[1], joint.limits)
+            angle = turned.get(ends[1], 0.0) - turned.get(ends[0], 0.0)
+            offsets[name] = joint.value - angle
+        inputs = tuple(Input.from_joint(name, made[name]) for name in self._inputs)
+        pose = AssemblyPose(
+            tuple(spatial.pose_value(name) - offsets[name] for name in self._inputs),
+            {pin.name: pin.place for pin in self._pins},
+            {link: turned.get(link, 0.0) for link in links if link != GROUND},
+        )
+        flat = Linkage(
+            links, inputs, {}, {name: made[name] for name in self._joints}, sliders, pose=pose,
+            ratios={name: self._ratio(of, name, offsets) for name, of in self._ratios.items()},
+        )  # fmt: skip
+        return PlanarLoop(flat, tuple(self._links), offsets, self._normal, self._tilt)
+
+    def _pose_angles(self) -> dict[str, float]:
+        """Return the angle of each link in the pose; hinges that are inputs are met first."""
+        angles = {GROUND: 0.0}
+        joints = [name for name in (*self._inputs, *self._joints) if name not in self._struts]
+        for _ in joints:
+            for name in joints:
+                joint = self._linkage.pair_joints[name]
+                parent, child = self._on(joint.parent), self._on(joint.child)
+                value = 0.0 if name in self._linkage.slides else joint.value
+                if dot(self._carried.axes[name], self._normal) < 0.0:
+                    value = -value
+                if parent in angles and child not in angles:
+                    angles[child] = angles[parent] + value
+                    break
+                if child in angles and parent not in angles:
+                    angles[parent] = angles[child] - value
+                    break
+            else:
+                break
+        return angles
+
+    def _slider(
+        self, name: str, places: dict[str, dict[str, Point]], turned: Mapping[str, float]
+    ) -> Slider:
+        """Return a slide as a slider, and add its points to its links."""
+        joint = self._linkage.slides[name]
+        along, block = self._on(joint.parent), self._on(joint.child)
+        # A pin of the block, since no link has two points in one place.
+        point = next((pin for pin in places[block] if pin not in places[along]), '')
+        if not point:
+            point = f'{name} block'
+            places[block][point] = next(iter({**places[block], **places[along]}.values()))
+        x, y = places[block][point]
+        ux, uy = self._flat(self._carried.axes[name])
+        places[along][f'{name} zero'] = (x - joint.value * ux, y - joint.value * uy)
+        angle = turned.get(along, 0.0)
+        direction = _turn((ux, uy), -angle)
+        return Slider(
+            point, along, f'{name} zero', direction, block, turned.get(block, 0.0) - angle
+        )
+
+    def _cylinder(self, name: str, places: dict[str, dict[str, Point]]) -> Slider:
+        """Return a strut as a rod in a tube."""
+        start, end = (self._pin_of(name, point) for point in self._linkage.struts[name])
+        tube, rod = f'{name} tube', f'{name} rod'
+        places[tube], places[rod] = {start.name: start.place}, {end.name: end.place}
+        way = (end.place[0] - start.place[0], end.place[1] - start.place[1])
+        return Slider(end.name, tube, start.name, way, rod)
+
+    def _pin_of(self, strut: str, point: str) -> _Pin:
+        """Return the pin at an end of a strut; it may be merged with another."""
+        at = self._carried.same[point]
+        place = self._flat(scale(self._carried.size, self._carried.places[at]))
+        link = self._on(self._edges[f'{strut}, {at}'][1])
+        pins = [pin for pin in self._pins if link in pin.links or pin.name == at]
+        return min(pins, key=lambda pin: dist(pin.place, place))
+
+    def _ratio(self, ratio: Ratio, name: str, offsets: Mapping[str, float]) -> Ratio:
+        """Return a ratio between joints of the plane."""
+        rest = ratio.ratio * offsets[ratio.of] + ratio.offset - offsets[name]
+        return replace(ratio, offset=rest)
+
+    @property
+    def _tilt(self) -> float:
+        """Return by how much a joint leaves the plane, in [rad]."""
+        worst = 0.0
+        for name in self._edges:
+            if name in self._linkage.hinges:
+                worst = max(worst, length(cross(self._carried.axes[name], self._normal)))
+            elif name in self._linkage.slides:
+                worst = max(worst, abs(dot(self._carried.axes[name], self._normal)))
+        return asin(worst)
+
+
+def _held(pairs: Collection[tuple[str, str]]) -> set[str]:
+    return {end for pair in pairs for end in pair}
+
+
+def _turn(vector: Point, angle: float) -> Point:
+    """Return a vector turned by an angle; itself for 0."""
+    if not angle:
+        return vector
+    (x, y), c, s = vector, cos(angle), sin(angle)
+    return c * x - s * y, s * x + c * y
