@@ -34,6 +34,11 @@ from linkage_ros.kinematics.plane.dyads.rrr import (
 )
 from linkage_ros.kinematics.plane.dyads.two_sided import TwoSided
 from linkage_ros.kinematics.plane.linkage import Input, Linkage
+from linkage_ros.kinematics.plane.meant_lengths import (
+    four_bar_lengths,
+    rail_lengths,
+    swivel_lengths,
+)
 from linkage_ros.kinematics.plane.rail import (
     CrankRail,
     FreeRail,
@@ -211,6 +216,10 @@ class SolutionPlan(SolvedLinks):
         one_arm = self.pin_vector(one, first.name, closing)
         other_arm = self.pin_vector(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
+        hinge = self._find_hinge(first.name, second.name)
+        if hinge is not None:
+            a, b, c, d = four_bar_lengths(hinge.a, b, c, hinge.d)
+            hinge = hinge._replace(a=a, d=d)
 
         def make_diagonal(
             a: float, d: float, arms: tuple[int, int], angle: float, turns_known: bool
@@ -219,7 +228,7 @@ class SolutionPlan(SolvedLinks):
             return crank_diagonal(a, b, c, d, arms, angle, turns_known, crosses)
 
         diagonal, base, upright = self._make_diagonal(
-            dyad, (abs(b - c), b + c, 4.0 * b * c), make_diagonal
+            dyad, hinge, (abs(b - c), b + c, 4.0 * b * c), make_diagonal
         )
         kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.passes_fold(diagonal) else RRRDyad
         self._add_two_sided(dyad, kind(diagonal, b, c, 1), diagonal, upright)
@@ -246,7 +255,13 @@ class SolutionPlan(SolvedLinks):
             crosses = self._change_points(dyad)
             return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
 
-        diagonal, base, upright = self._make_diagonal(dyad, (abs(offset), inf, inf), make_diagonal)
+        hinge = self._find_hinge(first.name, second.name)
+        if hinge is not None:
+            a, d, offset = swivel_lengths(hinge.a, hinge.d, offset)
+            hinge = hinge._replace(a=a, d=d)
+        diagonal, base, upright = self._make_diagonal(
+            dyad, hinge, (abs(offset), inf, inf), make_diagonal
+        )
         self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), diagonal, upright)
         k = self.new_coordinates(2)
         self.angles[rail] = _link_angle(k, base, line.direction)
@@ -415,13 +430,13 @@ class SolutionPlan(SolvedLinks):
     def _make_diagonal(
         self,
         dyad: Dyad,
+        hinge: _Hinge | None,
         limits: tuple[float, float, float],
         make_diagonal: Callable[..., CrankDiagonal],
     ) -> tuple[AnyDiagonal, Angle, int]:
         """Return the diagonal of a dyad, the zero of its directions, and its upright sign."""
-        first, second = (outer.name for outer in dyad.outer)
-        hinge = self._find_hinge(first, second)
         if hinge is None:
+            first, second = (outer.name for outer in dyad.outer)
             ends = self.place_pin(first), self.place_pin(second)
             return FreeDiagonal(ends, limits), _LEVEL, 1
         turns_known = self._driven_only(hinge.arms)
@@ -473,6 +488,9 @@ class SolutionPlan(SolvedLinks):
                 angle = self.angles[link]
                 arm = self.pin_vector(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
+                if length < inf:
+                    length, height = rail_lengths(abs(arm), length, place.imag)
+                    place = complex(place.real, height)
                 arms = angle.coordinate, base.coordinate
                 rail = CrankRail(arm, place, length, arms)
                 # As for a parallelogram: both roots change their sign with a whole turn.

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, list_names, quote
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.merged_pose import MERGED
@@ -160,10 +160,6 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             'input', f'{given}: {list_names(freedom.free)} {stay} free',
             f'{away}drive another joint, or hold what is free',
         )  # fmt: skip
-    for name in linkage.driven:
-        followed = any(ratio.of == name for ratio in linkage.ratios.values())
-        if name in linkage.pair_joints and not followed and _is_in_no_loop(linkage, name):
-            raise DefinitionError('input', f'{quote(name)} is in no loop', 'leave its link out')
     if freedom.dependent and not freedom.mobility:
         raise DefinitionError(
             'input', f'{given}: the linkage is over-constrained, and cannot move',
@@ -182,18 +178,6 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             f'no step finds {list_names(unknown or plan.lost)}',
             'let each hang on hinges and slides that lead to the ground, or drive other joints',
         )
-
-
-def _is_in_no_loop(linkage: SpaceLinkage, name: str) -> bool:
-    """Return whether nothing but a joint leads from its child to its parent."""
-    joint, reached = linkage.pair_joints[name], {linkage.pair_joints[name].child}
-    ways = [{one.parent, one.child} for one in linkage.pair_joints.values() if one is not joint]
-    for point in (*linkage.points, *linkage.struts):
-        ends = linkage.struts.get(point, (point,))
-        ways.append({link for link, of in linkage.links.items() if not set(ends).isdisjoint(of)})
-    for _ in linkage.link_names:
-        reached.update(*(way for way in ways if not way.isdisjoint(reached)))
-    return joint.parent not in reached
 
 
 def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[str]) -> bool:

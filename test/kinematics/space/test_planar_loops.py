@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+Planar loops of spatial linkages: in any plane, on any link, through their change points.
+
+The linkages are those of `flat_linkages`, whose links all lie in line at some angles of the crank.
+They are put into random planes, their coordinates rounded to some digits, on none to two hips.
+"""
+
+from math import pi, tau
+import os
+import random
+from typing import NamedTuple
+
+from linkage_ros.kinematics import (
+    Closure,
+    GROUND,
+    Linkage,
+    links_by_point,
+    SpaceClosure,
+    SpaceLinkage,
+    SpatialJoint,
+    Status,
+)
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from ..flat_linkages import FLAT, Flat
+
+Array = NDArray[np.float64]
+
+STATES = int(os.environ.get('LINKAGE_STATES', '1200'))
+"""Number of states of each linkage; `make test_all` takes more."""
+
+BESIDE = [10.0**-digits for digits in range(1, 16)]
+
+
+class Placed(NamedTuple):
+    """A planar linkage in space: its plane on the base, and the base on hips."""
+
+    closure: SpaceClosure
+    axes: Array  # Rows: x and y of the plane, and its normal, as the base stands in the pose
+    origin: Array
+    hips: list[tuple[Array, Array]]  # Axis and a place on it, in the pose
+    start: float  # Angle of the crank in the pose
+    height: float  # Largest height over the plane, of rounded coordinates
+
+    def base(self, hips: list[float]) -> tuple[Array, Array]:
+        """Return how the base has turned and moved from the pose."""
+        turn, shift = np.eye(3), np.zeros(3)
+        for (axis, at), value in zip(self.hips, hips, strict=True):
+            one = rotation(axis, value)
+            turn, shift = turn @ one, turn @ (at - one @ at) + shift
+        return turn, shift
+
+    def flat(self, place: tuple[float, ...], hips: list[float]) -> complex:
+        """Return a place in the plane; its height must be that of the pose."""
+        turn, shift = self.base(hips)
+        x, y, height = self.axes @ (turn.T @ (np.array(place) - shift) - self.origin)
+        assert abs(height) < self.height
+        return complex(x, y)
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def random_axes(rng: random.Random) -> Array:
+    if rng.random() < 0.2:
+        return np.roll(np.eye(3), rng.randrange(3), axis=0)
+    return np.linalg.qr(np.array([[rng.gauss(0, 1) for _ in range(3)] for _ in range(3)]))[0].T
+
+
+def place_in_space(made: Flat, rng: random.Random, digits: int, hips: int) -> Placed:
+    """Return a planar linkage in a random plane, drawn at a random angle of its crank."""
+    linkage, plane = made.linkage, Closure(made.linkage)
+    while True:
+        start = rng.uniform(-pi, pi)
+        position = plane.position(start)
+        if position.status is Status.CLOSED and abs(np.sin(start)) > 0.2:
+            break
+    axes, origin = random_axes(rng), np.array([rng.uniform(-1, 1) for _ in range(3)])
+    axes[2] = np.cross(axes[0], axes[1])
+
+    def lift(place: complex) -> tuple[float, ...]:
+        spot = origin + place.real * axes[0] + place.imag * axes[1]
+        return tuple(float(f'{value:.{digits}g}') for value in spot)
+
+    places = {name: place for (_, name), place in plane.points(position).items()}
+    angles = plane.link_angles(position)
+    base = 'base' if hips else GROUND
+    on = {link: base if link == GROUND else link for link in linkage.links}
+    normal = tuple(map(float, axes[2]))
+    hinges: dict[str, SpatialJoint] = {}
+    for pin, links in links_by_point(linkage.links).items():
+        for other in links[1:]:
+            at = lift(places[pin])
+            hinges[f'{pin} {other}'] = SpatialJoint(on[links[0]], on[other], normal, at)
+    slides = {}
+    for name, slider in linkage.sliders.items():
+        (carrier,) = (link for link, points in linkage.links.items() if slider.point in points)
+        way = complex(*slider.direction) * np.exp(1j * angles[slider.along])
+        axis = tuple(float(way.real * x + way.imag * y) for x, y in zip(*axes[:2], strict=True))
+        hinges[f'{name} pin'] = SpatialJoint(
+            on[carrier], f'{name} block', normal, lift(places[slider.point])
+        )
+        slides[name] = SpatialJoint(on[slider.along], f'{name} block', axis)
+    carried = [(np.array([rng.gauss(0, 1) for _ in range(3)]), origin + 0.5 * axes[k])
+               for k in range(hips)]  # fmt: skip
+    links = [GROUND, *(f'hip {number}' for number in range(1, hips)), base]
+    legs = {
+        f'hip {number} joint': SpatialJoint(
+            links[number], links[number + 1], tuple(map(float, axis)), tuple(map(float, at))
+        )
+        for number, (axis, at) in enumerate(carried)
+    }
+    crank = next(name for name in hinges if name == 'O crank')
+    space = SpaceLinkage(
+        points={name: lift(place) for name, place in places.items()},
+        links={on[link]: tuple(points) for link, points in linkage.links.items()},
+        hinges={**legs, **hinges},
+        slides=slides,
+        struts={},
+        driven=(*legs, crank),
+        published=tuple(name for name in (*hinges, *slides) if name != crank),
+    )
+    height = 1e-12 + 40.0 * 10.0**-digits
+    return Placed(SpaceClosure(space), axes, origin, carried, made.sign * start, height)
+
+
+def flat_places(placed: Placed, crank: float, hips: list[float]) -> dict[str, complex]:
+    position = placed.closure.position(*hips, crank - placed.start)
+    assert position.status.has_pose, (position, crank)
+    assert placed.closure.residual(position) < placed.height
+    points = placed.closure.points(position)
+    return {name: placed.flat(place, hips) for name, place in points.items()}
+
+
+def mirrored(kind: str, linkage: Linkage, at: dict[str, complex]) -> dict[str, complex]:
+    """Return the places in the other assembly at the same angle of the crank."""
+    if kind == 'RRP':
+        level = at['B'].imag
+        return {**at, 'B': complex(2.0 * at['A'].real - at['B'].real, level)}
+    line = at['D'] - at['A']
+    unit = line / abs(line)
+    moved = {'B', 'Q', 'T'} - {*linkage.links[GROUND], *linkage.links['crank']}
+    return {
+        name: at['A'] + unit * ((place - at['A']) / unit).conjugate() if name in moved else place
+        for name, place in at.items()
+    }
+
+
+@pytest.mark.parametrize('hips', [0, 1, 2])
+@pytest.mark.parametrize('kind', FLAT)
+def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
+    rng = random.Random(f'{kind} {hips}')
+    made: Flat = FLAT[kind](rng)
+    plane, placed = Closure(made.linkage), place_in_space(made, rng, 17, hips)
+    turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
+    step = 2.0 * tau / STATES
+    # No state lies at a change point, which the steps pass in the middle.
+    cranks = [0.37 * step + step * number for number in range(STATES)]
+    before: list[dict[str, complex]] = []
+    for crank in cranks:
+        if not plane.position(made.sign * crank).status.has_pose:
+            before = []
+            continue
+        here = flat_places(placed, crank, turned)
+        if len(before) == 2:
+            other = mirrored(kind, made.linkage, here)
+            ahead = {name: 2.0 * before[1][name] - before[0][name] for name in here}
+            off, off_other = (
+                max(abs(at[name] - ahead[name]) for name in here) for at in (here, other)
+            )
+            assert off < max(off_other, 4.0 * step * step), crank
+        before = [*before[-1:], here]
+
+
+@pytest.mark.parametrize('kind', FLAT)
+@pytest.mark.parametrize('digits', [17, 15, 13, 11])
+def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
+    rng = random.Random(f'{kind} {digits}')
+    for hips in range(3):
+        made: Flat = FLAT[kind](rng)
+        while digits < 15 and len(made.at) + 2 * len(made.meets) < 2:
+            # So rounded, only lengths that are equal in pairs are known to have been equal.
+            made = FLAT[kind](rng)
+        plane, placed = Closure(made.linkage), place_in_space(made, rng, digits, hips)
+        turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
+        for _ in range(STATES // 4):
+            crank = rng.uniform(-tau, tau)
+            expected = plane.position(made.sign * crank)
+            if (
+                expected.status.has_rates
+                and plane.singularity_margin(expected).transmission_angle > 1e-3
+            ):
+                places = flat_places(placed, crank, turned)
+                for name, place in places.items():
+                    assert abs(place - expected.points[name]) < 1e5 * placed.height, (crank, name)
+
+
+@pytest.mark.parametrize('hips', [0, 2])
+@pytest.mark.parametrize('kind', FLAT)
+def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
+    rng = random.Random(f'{kind} {hips}')
+    made: Flat = FLAT[kind](rng)
+    placed = place_in_space(made, rng, 17, hips)
+    turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
+    plane = Closure(made.linkage)
+    for at in made.at:
+        for apart in (*BESIDE, *(-one for one in BESIDE)):
+            places = flat_places(placed, at + apart, turned)
+            expected = plane.position(made.sign * (at + apart)).points
+            for name, place in places.items():
+                assert abs(place - expected[name]) < 1e-12, (at, apart, name)
