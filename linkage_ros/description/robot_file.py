@@ -9,9 +9,9 @@
 Read a robot whose URDF has loops as a spatial linkage: its tree, and what closes it.
 
 A loop leads from an end of what closes it up the tree to the common ancestor, and down to the
-other end. The joints on such ways are the linkage. All others are left out, and what hangs on them
-stands still in its own loops: the topmost link of each loop is the ground. Joints keep their
-names, signs and zeroes.
+other end. The joints on such ways are the linkage, and inputs above them. All others are left out,
+and what hangs on them stands still in its own loops: the topmost link of each loop is the ground,
+unless an input carries it. Joints keep their names, signs and zeroes.
 
 The pose has the values of joints that are told, or else 0. If the loops miss it by rounding, the
 joints that are not driven are moved until they close (Newton's method, damped): no length changes.
@@ -185,6 +185,12 @@ class _Robot:
         self._ratios = dict(self._find_ratios())
         groups = self._find_groups()
         groups = [group for group in groups if group[1]] or groups
+        tied = set().union(*(names for names, _ in groups))
+        moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
+        self._carriers = [name for name in self._driven if name in moving and name not in tied]
+        """Inputs in no loop, which carry the loops beyond them."""
+        if groups:
+            groups += [({name}, []) for name in self._carriers]
         # The other leg of a robot, which another linkage may move, is left out.
         chosen = [group for group in groups if not self._driven or group[0] & {*self._driven}]
         self._loops = [loop for _, loops in chosen for loop in loops]
@@ -193,7 +199,6 @@ class _Robot:
         looped = {name for loop in self._loops for name in self._names_of(loop)}
         self.needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
         """Joints that follow others in loops, which may move them as well."""
-        moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
         kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
         self._check(moving, known, kept, told)
@@ -481,7 +486,9 @@ class _Robot:
         on = {self._urdf.root: GROUND}
         for joint in joints.values():
             own = f'{GROUND}_link' if joint.child == GROUND else joint.child
-            still = on[joint.parent] if joint.kind == 'fixed' else GROUND
+            above = self._above[joint.child]
+            is_carried = any(one.name in self._carriers for one in above)
+            still = on[joint.parent] if is_carried or joint.kind == 'fixed' else GROUND
             on[joint.child] = own if joint.name in self._moving else still
         for loop in self._loops:
             if loop.kind == 'fixed':

@@ -123,6 +123,13 @@ CHOICES = {
         {'input': ['shoulder', 'counterweight']},
         [(('link', (0, 0, 1.2)), ('forearm', (-0.3, 0.1, 0.05)))], 0.5,
     ),
+    'turntable': (
+        {'input': ['yaw', 'upper', 'lever']},
+        [(('rod1', (0, 0, 1.1)), ('triangle', (-0.25, 0, 0.1))),
+         (('rod2', (1.2, 0, 0)), ('hand', (0.1, 0, 0.3))),
+         (('rod3', (0, 0, 1.1)), ('forearm', (-0.35, 0, 0)))],
+        0.9,
+    ),
 }  # fmt: skip
 """For each robot what is told, the places of its loops, and how far its inputs go."""
 
