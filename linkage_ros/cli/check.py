@@ -363,6 +363,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'robot_open_by_m': linkage.open_by,
         'robot_turned_by_rad': linkage.turned_by,
         'merged_by_m': linkage.merged_by,
+        'tilted_by_rad': closure.tilt,
         'left_out': list(linkage.left_out),
         'groups': [group._asdict() for group in closure.groups],
         **tables_json(tables[1:]),

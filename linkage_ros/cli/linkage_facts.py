@@ -76,6 +76,9 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
     if account['merged_by_m']:
         apart = units.format_length(account['merged_by_m'], '.2g')
         yield 'merged', f'places of the pose that are up to {apart} apart'
+    if tilted_by := account['tilted_by_rad']:
+        tilt = f'{units.convert(tilted_by):.2g} {units.angle}'
+        yield 'parallel', f'axes of planar loops that are up to {tilt} apart'
     if account['left_out']:
         yield 'left out, in no loop', ', '.join(account['left_out'])
     yield from _reach_facts(account, units)

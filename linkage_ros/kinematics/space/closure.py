@@ -100,6 +100,8 @@ class SpaceClosure(StepwiseClosure):
         self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
         """Rods that may turn about themselves."""
+        self.tilt = plan.tilt
+        """By how much axes of planar loops are not parallel, in [rad]."""
         self._error_line = StraightLine(self._list_errors, lambda: None)
         self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
         self.ratio_turns = plan.ratio_turns

@@ -44,6 +44,9 @@ from linkage_ros.kinematics.space.vectors import cross, dot, length, minus, scal
 PARALLEL = 1e-6
 """Axes nearer to parallel than this are parallel, in [rad]: CAD rounds."""
 
+_ROUNDED = 1e-15
+"""Angles between axes that are rounding, in [rad]."""
+
 Edges = dict[str, tuple[str, str]]
 """The ends of each joint by its name; those of a rod or strut by its name and the point."""
 
@@ -403,7 +406,7 @@ class _PlanarModel:
                 worst = max(worst, length(cross(self._carried.axes[name], self._normal)))
             elif name in self._linkage.slides:
                 worst = max(worst, abs(dot(self._carried.axes[name], self._normal)))
-        return asin(worst)
+        return asin(worst) if worst > _ROUNDED else 0.0
 
 
 def _held(pairs: Collection[tuple[str, str]]) -> set[str]:

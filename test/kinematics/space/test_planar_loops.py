@@ -221,3 +221,29 @@ def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
             expected = plane.position(made.sign * (at + apart)).points
             for name, place in places.items():
                 assert abs(place - expected[name]) < 1e-12, (at, apart, name)
+
+
+def tilted(angle: float) -> SpaceClosure:
+    """Return a parallelogram one of whose axes is tilted."""
+    axis = (0.0, 1.0, 0.0)
+    hinges = {
+        'driver': SpatialJoint(GROUND, 'crank', axis, (0.0, 0.0, 0.0)),
+        'coupler': SpatialJoint('crank', 'rod', axis, (0.1, 0.0, 0.2)),
+        'end': SpatialJoint('rod', 'rocker', (angle, 1.0, 0.0), (1.1, 0.0, 0.2)),
+        'driven': SpatialJoint(GROUND, 'rocker', axis, (1.0, 0.0, 0.0)),
+    }
+    return SpaceClosure(SpaceLinkage({}, {}, hinges, {}, {}, ('driver',), ('driven',)))
+
+
+@pytest.mark.parametrize('angle', [0.0, 1e-18, 1e-12, 1e-9, 0.9e-6])
+def test_axes_that_are_nearly_parallel_are_parallel_and_told(angle):
+    closure = tilted(angle)
+    assert closure.groups[0].kind == 'planar loop'
+    assert closure.tilt == pytest.approx(angle, rel=1e-6, abs=1e-15)
+    for driver in np.linspace(0.1, 6.1, 40).tolist():
+        (driven,) = closure.position(driver).joints
+        assert abs(np.remainder(driven - driver + pi, tau) - pi) < 1e-14 + angle
+
+
+def test_axes_further_apart_make_a_spatial_loop():
+    assert {group.kind for group in tilted(1e-5).groups}.isdisjoint({'planar loop'})
