@@ -50,10 +50,10 @@ from linkage_ros.kinematics.plane.sides import closing_name, SIDES, telling_part
 from linkage_ros.kinematics.plane.solved_links import (
     Angle,
     Attachment,
+    PlanStart,
     Slide,
     SlideLine,
     SolvedLinks,
-    Start,
 )
 from linkage_ros.kinematics.plane.topology import (
     assur_groups,
@@ -102,10 +102,10 @@ class SolutionPlan(SolvedLinks):
         self,
         linkage: Linkage,
         structure: Structure,
-        start: Start | None = None,
+        start: PlanStart | None = None,
         nominal: SolutionPlan | None = None,
     ) -> None:
-        super().__init__(linkage, structure, start or Start.alone(linkage, structure))
+        super().__init__(linkage, structure, start or PlanStart.alone(linkage, structure))
         self._structure = structure
         self._assembly = dict(linkage.assembly)
         # The dyads that close in two ways; those of the nominal linkage by name, with its steps.

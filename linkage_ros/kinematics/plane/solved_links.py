@@ -103,7 +103,7 @@ class SlideLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class PlanStart:
     """
     What is known before the first step of a linkage.
 
@@ -120,7 +120,7 @@ class Start:
     turns_with: dict[int, tuple[float, ...]]
 
     @classmethod
-    def alone(cls, linkage: Linkage, structure: Structure) -> Start:
+    def alone(cls, linkage: Linkage, structure: Structure) -> PlanStart:
         """Return the start of a linkage that is no part of another."""
         count = len(linkage.inputs)
         turns = {k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)}
@@ -131,7 +131,7 @@ class Start:
 class SolvedLinks:
     """The known links of a linkage; at first the ground."""
 
-    def __init__(self, linkage: Linkage, structure: Structure, start: Start) -> None:
+    def __init__(self, linkage: Linkage, structure: Structure, start: PlanStart) -> None:
         self._linkage, self._start = linkage, start
         self.blocks = structure.blocks  # For each slider the link that slides
         self.scale = start.scale

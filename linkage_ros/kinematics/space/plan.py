@@ -37,7 +37,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.plane.plan import SolutionPlan
-from linkage_ros.kinematics.plane.solved_links import count_turns, Start
+from linkage_ros.kinematics.plane.solved_links import count_turns, PlanStart
 from linkage_ros.kinematics.plane.topology import assur_groups, Dyad, Iterated, Structure
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
@@ -243,14 +243,14 @@ class SpacePlan:
 
     def _add_loop(self, loop: PlanarLoop, structure: Structure) -> None:
         """Add the steps of a planar loop, and the values of its joints."""
-        start = Start.alone(loop.linkage, structure)
+        start = PlanStart.alone(loop.linkage, structure)
         known = [self.coordinates[name] in self.turns_with for name in loop.inputs]
         turns = {0: start.turns_with[0]}
         turns |= {k: start.turns_with[k] for k, turned in enumerate(known, 1) if turned}
         drawn = SolutionPlan(loop.linkage, structure, replace(start, turns_with=turns))
         inputs = tuple(self._inner_input(loop, name) for name in loop.inputs)
         coordinates, pins = self.state
-        within = Start(self.scale, inputs, len(coordinates), len(pins), self.turns_with)
+        within = PlanStart(self.scale, inputs, len(coordinates), len(pins), self.turns_with)
         planar = SolutionPlan(loop.linkage, structure, within, drawn)
         for step in planar.steps:
             self.add_step(step)

@@ -71,7 +71,7 @@ class PlanarLoop(NamedTuple):
         return tuple(given.joint for given in self.linkage.inputs)
 
 
-class _Part(NamedTuple):
+class _FlatJoints(NamedTuple):
     """Joints that move in one plane."""
 
     normal: Vector
@@ -87,7 +87,7 @@ def find_planar_loops(
         joints = _joints_across(linkage, carried, normal)
         rods = _rods_across(linkage, carried, normal, known)
         for edges in biconnected_components({**joints, **rods}, order):
-            loop = _PlanarModel(linkage, carried, _Part(normal, edges), known, order)
+            loop = _PlanarModel(linkage, carried, _FlatJoints(normal, edges), known, order)
             if loop.is_moved_by_inputs:
                 yield loop.loop()
 
@@ -214,7 +214,7 @@ class _PlanarModel:
         self,
         linkage: SpaceLinkage,
         carried: CarriedPoints,
-        part: _Part,
+        part: _FlatJoints,
         known: Collection[str],
         order: list[str],
     ) -> None:
@@ -245,7 +245,7 @@ class _PlanarModel:
         for _ in pairs:
             joined.update(*(pair for pair in pairs if not joined.isdisjoint(pair)))
         loose = [link for link in self._links if link not in joined]
-        if any(link in self._linkage.link_names and link in _held(pairs) for link in loose):
+        if any(link in self._linkage.link_names and link in _ends_of(pairs) for link in loose):
             return False
         rods = [edge for edge in self._edges if edge not in self._linkage.pair_joints]
         if any(self._edges[edge][1] not in joined for edge in rods):
@@ -257,7 +257,7 @@ class _PlanarModel:
         turned = [name for name in self._inputs if name not in self._struts]
         return freedoms == len(turned) + len(self._ratios) and bool(self._inputs)
 
-    def _on(self, link: str) -> str:
+    def _flat_name(self, link: str) -> str:
         """Return the name of a link in the plane."""
         return GROUND if link == self._links[0] else link
 
@@ -270,7 +270,7 @@ class _PlanarModel:
         for edge, ends in self._edges.items():
             if edge in self._linkage.slides:
                 continue
-            held = {self._on(end) for end in ends if end not in self._struts}
+            held = {self._flat_name(end) for end in ends if end not in self._struts}
             if edge in self._linkage.hinges:
                 name, place = edge, self._linkage.hinges[edge].at
             else:
@@ -291,7 +291,7 @@ class _PlanarModel:
         """Return the loop."""
         spatial = self._linkage
         turned = self._pose_angles()
-        places: dict[str, dict[str, Point]] = {self._on(link): {} for link in self._links}
+        places: dict[str, dict[str, Point]] = {self._flat_name(link): {} for link in self._links}
         for pin in self._pins:
             for link in pin.links:
                 places[link][pin.name] = pin.place
@@ -317,7 +317,7 @@ class _PlanarModel:
                 offsets[name] = 0.0
                 continue
             joint = spatial.hinges[name]
-            ends = [self._on(joint.parent), self._on(joint.child)]
+            ends = [self._flat_name(joint.parent), self._flat_name(joint.child)]
             if dot(self._carried.axes[name], self._normal) < 0.0:
                 ends.reverse()
             made[name] = RevoluteJoint(ends[0], ends[1], joint.limits)
@@ -342,7 +342,7 @@ class _PlanarModel:
         for _ in joints:
             for name in joints:
                 joint = self._linkage.pair_joints[name]
-                parent, child = self._on(joint.parent), self._on(joint.child)
+                parent, child = self._flat_name(joint.parent), self._flat_name(joint.child)
                 value = 0.0 if name in self._linkage.slides else joint.value
                 if dot(self._carried.axes[name], self._normal) < 0.0:
                     value = -value
@@ -361,7 +361,7 @@ class _PlanarModel:
     ) -> Slider:
         """Return a slide as a slider, and add its points to its links."""
         joint = self._linkage.slides[name]
-        along, block = self._on(joint.parent), self._on(joint.child)
+        along, block = self._flat_name(joint.parent), self._flat_name(joint.child)
         # A pin of the block, since no link has two points in one place.
         point = next((pin for pin in places[block] if pin not in places[along]), '')
         if not point:
@@ -388,7 +388,7 @@ class _PlanarModel:
         """Return the pin at an end of a strut; it may be merged with another."""
         at = self._carried.same[point]
         place = self._flat(scale(self._carried.size, self._carried.places[at]))
-        link = self._on(self._edges[f'{strut}, {at}'][1])
+        link = self._flat_name(self._edges[f'{strut}, {at}'][1])
         pins = [pin for pin in self._pins if link in pin.links or pin.name == at]
         return min(pins, key=lambda pin: dist(pin.place, place))
 
@@ -409,7 +409,7 @@ class _PlanarModel:
         return asin(worst) if worst > _ROUNDED else 0.0
 
 
-def _held(pairs: Collection[tuple[str, str]]) -> set[str]:
+def _ends_of(pairs: Collection[tuple[str, str]]) -> set[str]:
     return {end for pair in pairs for end in pair}
 
 
