@@ -10,6 +10,7 @@
 
 from collections.abc import Sequence
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from random import Random
 import subprocess
@@ -17,7 +18,10 @@ import sys
 from typing import Any, NamedTuple
 
 import linkage_ros as lr
+from linkage_ros.description import parse_yaml, read_any_closure
 from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics.compiling import Compiled
+from linkage_ros.resources import named_file
 from linkage_ros.tools.models.source_code import Subject, write_arrays
 import numpy as np
 import pytest
@@ -176,6 +180,33 @@ def test_a_module_has_what_is_asked_for(derivatives):
     assert np.ravel(groups) == pytest.approx(steps[: 1 + derivatives], rel=1e-14)
 
 
+@pytest.mark.parametrize('limits', [(-0.1, 0.9), (-0.9, 0.1)])
+def test_where_one_width_has_no_cell_narrower_ones_count_or_none(limits):
+    """Next to the end of an ankle's motion only narrow cells are proven, and then none."""
+    text = named_file('ankle_motors', 'linkages').read_text('utf-8')
+    text = text.replace('[-0.6, 0.6]', f'[{limits[0]}, {limits[1]}]')
+    closure = read_any_closure(parse_yaml(text.encode(), 'ankle.yaml'))
+    (grid,), random = closure.grids, Random(str(limits))
+    cells, width = grid.fill(), grid.widths[0]
+    places = {key[1:] for key in cells if key[0] == 0}
+    box = product(*(range(min(axis), max(axis) + 1) for axis in zip(*places, strict=True)))
+    given = [
+        tuple(
+            random.uniform(max(limits[0], x - 0.5 * width), min(limits[1], x + 0.5 * width))
+            for x in (home + width * k for home, k in zip(grid.home, place, strict=True))
+        )
+        for place in box
+        if place not in places
+        for _ in range(100)
+    ]
+    status, joints = module_of(subject(closure, 0))['position'](np.array(given))
+    decided = [Compiled(closure, 0).fast(*inputs) for inputs in given]
+    assert [NUMBERS[number] == 'CLOSED' for number in status] == [*map(bool, decided)]
+    assert sum(map(bool, decided)) > 0.9 * len(given)
+    for found, values in zip(joints, decided, strict=True):
+        assert not values or found == pytest.approx(values[0], rel=1e-14)
+
+
 def test_a_module_needs_nothing_but_array_api_compat():
     lines = write_arrays(subject(closure_of('ankle_motors'))).splitlines()
     assert [line for line in lines if 'import ' in line] == [
@@ -279,6 +310,65 @@ def test_a_library_has_the_numbers_of_the_steps_and_their_gradients(library, nam
     # Whatever has no values has the gradient 0: a sum over states stays a number.
     without = [index for index, one in enumerate(found.told) if not one.values]
     assert (found.gradients[without] == 0.0).all()
+
+
+KITE = 'four_bar: {a: 1, b: 2, c: 2, d: 1, assembly: left}'
+GRADIENTS = """
+import sys
+import numpy as np
+import linkage as module
+
+library, given = sys.argv[1], np.load('given.npy')
+if library == 'jax':
+    import jax
+    jax.config.update('jax_enable_x64', True)
+    slopes = jax.vmap(jax.jacrev(lambda inputs: module.velocity(inputs, 1.0 + 0.0 * inputs)[1:]))
+    gradients = slopes(jax.numpy.asarray(given))
+else:
+    import torch
+    inputs = torch.tensor(given, requires_grad=True)
+    gradients = [
+        np.stack([
+            torch.autograd.grad(each[:, k].sum(), inputs, retain_graph=True)[0].numpy()
+            for k in range(each.shape[1])
+        ], axis=1)
+        for each in module.velocity(inputs, torch.ones_like(inputs))[1:]
+    ]
+np.save('gradients.npy', np.concatenate(gradients, axis=1))
+"""
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize(
+    ('make', 'given'),
+    [
+        # No direction leads from pin to pin where they meet, at 0: quotients and an angle fail.
+        (
+            lambda: read_any_closure(parse_yaml(KITE.encode(), 'kite.yaml')),
+            [(x,) for x in (0.0, 1e-200, 0.3, 2.0, -3.0)],
+        ),
+        # No motor turns the foot as far: there a root fails.
+        (lambda: closure_of('ankle'), [(5.05, -2.5), (5.3, 1.4), (0.1, 0.2), (-0.3, 0.1)]),
+    ],
+    ids=['kite', 'ankle'],
+)
+def test_what_fails_beside_the_path_of_a_state_leaves_its_gradient(library, make, given, tmp_path):
+    closure = make()
+    assert [closure.position(*state).status.has_pose for state in given].count(False) == 2
+    (tmp_path / 'linkage.py').write_text(write_arrays(subject(closure, 1)))
+    np.save(tmp_path / 'given.npy', given)
+    command = [sys.executable, '-c', GRADIENTS, library]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = np.load(tmp_path / 'gradients.npy')
+    assert (found[:2] == 0.0).all()
+    still = [1.0] * len(closure.input_names) + [0.0] * len(closure.input_names)
+    for state, gradient in zip(given[2:], found[2:], strict=True):
+        for k, step in enumerate(BESIDE * np.eye(len(state))):
+            after, before = (plain(closure, (*(state + side), *still)) for side in (step, -step))
+            slopes = np.subtract(after.values, before.values)[: gradient.shape[0]] / (2.0 * BESIDE)
+            assert gradient[:, k] == pytest.approx(slopes, abs=1e-7)
 
 
 COMPILED = """

@@ -372,3 +372,75 @@ def test_struts_and_slides_drive_linkages_of_any_size(power):
     q = pushed.position(0.55 * size)['q']
     x, z = turned(q, size, half, 0.0)
     assert hypot(x - 0.55 * size, z) == pytest.approx(hypot(half, half), rel=1e-12)
+
+
+CYLINDER = """
+points: {{a: [1, 0, 0], b: [0, 0, 2]}}
+links: {{ground: [a], arm: [b], {carrying_a}: [a], {carrying_b}: [b]}}
+hinges:
+  arm_joint: {{parent: ground, child: arm, at: [0, 0, 0], axis: [0, 1, 0]}}
+  foot: {{parent: ground, child: {carrying_a}, at: [1, 0, 0], axis: [0, 1, 0]}}
+slides:
+  s: {{parent: barrel, child: piston, axis: {axis}, value: 0.5, limits: [0.2, 0.8]}}
+input: [s]
+"""
+
+
+@pytest.mark.parametrize('beside', [0.0, 0.5])
+@pytest.mark.parametrize('turned_round', [False, True])
+@pytest.mark.parametrize('value', [0.25, 0.4, 0.5, 0.75])
+def test_a_slide_between_two_moving_links_is_as_long_as_its_value_says(
+    beside, turned_round, value
+):
+    """The axis leads from the point of the parent to that of the child, or past it."""
+    way = np.array([-1.0, 0.0, 2.0 + beside])
+    links = {'carrying_a': 'barrel', 'carrying_b': 'piston'}
+    if turned_round:
+        links = {'carrying_a': 'piston', 'carrying_b': 'barrel'}
+        way = -way
+    text = CYLINDER.format(axis=way.tolist(), **links)
+    q = read_any_closure(parse_yaml(text.encode(), 'x.yaml')).position(value)['arm_joint']
+    rod = np.array([1.0, 0.0, -2.0] if turned_round else [-1.0, 0.0, 2.0])
+    along = rod @ way / np.linalg.norm(way)
+    moved = hypot(along + value - 0.5, sqrt(max(0.0, rod @ rod - along**2)))
+    x, z = turned(q, 0.0, 2.0, 0.0)
+    assert hypot(x - 1.0, z) == pytest.approx(moved, rel=1e-14)
+    assert hypot(x, z) == pytest.approx(2.0, rel=1e-15)
+
+
+TRIPOD = """
+points: {p0: [0, 0, 0], p1: [2, 0, 0], p2: [0.5, 1.5, 0], x: [0.8, 0.5, 1.2]}
+links: {ground: [p0, p1, p2], rod0: [p0, x], rod1: [p1, x], barrel: [p2], piston: [x]}
+hinges:
+  u: {parent: ground, child: cross, at: [0.5, 1.5, 0], axis: [1, 0, 0]}
+  w: {parent: cross, child: barrel, at: [0.5, 1.5, 0], axis: [0, 1.2, 1]}
+slides: {s: {parent: barrel, child: piston, axis: [0.3, -1, 1.2], value: 0.5}}
+input: [s]
+traced: [x]
+"""
+
+
+def test_a_point_at_three_distances_is_as_far_from_a_toggle_as_its_planes_are_apart():
+    """It turns about the line of the ends of two rods; the third ends in the ground's plane."""
+    closure = read_any_closure(parse_yaml(TRIPOD.encode(), 'x.yaml'))
+    assert closure.groups[0].kind == 'three distances'
+    radius, drawn = hypot(0.5, 1.2), sqrt(0.3**2 + 1.0 + 1.2**2)
+    ends = [0.5 - drawn + hypot(0.3, radius + side * 1.5) for side in (-1.0, 1.0)]
+    (whole,) = closure.closing_ranges
+    assert [whole.lowest, whole.highest] == pytest.approx(ends, abs=1e-13)
+    singular = closure.singular_inputs
+    assert [one.status for one in singular] == [Status.TOGGLE] * 2
+    assert [one.value for one in singular] == pytest.approx(ends, abs=1e-13)
+    for part in np.linspace(0.01, 0.99, 25).tolist():
+        value = ends[0] + part * (ends[1] - ends[0])
+        size = drawn + value - 0.5
+        # |x − p2|² = 0.3² + r² + 1.5² − 3·r·cos of the angle between the planes
+        angle = acos((0.3**2 + radius**2 + 1.5**2 - size**2) / (3.0 * radius))
+        position = closure.position(value)
+        x = radius * cos(angle), radius * sin(angle)
+        assert closure.points(position)['x'] == pytest.approx((0.8, *x), abs=1e-13)
+        margin = closure.singularity_margin(position)
+        assert margin.transmission_angle == pytest.approx(min(angle, pi - angle), abs=1e-12)
+        assert margin.toggle_distance == pytest.approx(
+            min(value - ends[0], ends[1] - value), abs=1e-12
+        )
