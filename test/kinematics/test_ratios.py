@@ -490,6 +490,23 @@ def test_wrong_ratios(_: str, key: str, ratios: dict[str, Ratio], reason: str) -
     assert '\n' not in str(caught.value)
 
 
+@pytest.mark.parametrize('ratio', [-0.6667, 1.0, 2.0])
+def test_a_joint_follows_no_other_of_its_links(ratio: float) -> None:
+    """A link that turns by a part of its own angle is locked, whatever it is called."""
+    linkage = two_four_bars(Ratio('rocker_joint', 1.0))
+    gear = linkage.joints['gear_joint']
+    assert isinstance(gear, RevoluteJoint)
+    twins = {'twin': gear, 'reversed': RevoluteJoint(gear.child, gear.parent)}
+    for name in twins:
+        for ratios in (
+            {'gear_joint': Ratio(name, ratio)},
+            {'gear_joint': Ratio('out_joint', 1.0), 'out_joint': Ratio(name, ratio)},
+        ):
+            with pytest.raises(DefinitionError, match=f"'{name}' moves the same links") as caught:
+                Closure(replace(linkage, joints=linkage.joints | twins, ratios=ratios))
+            assert caught.value.where == 'ratios.gear_joint.of'
+
+
 def test_ratio_that_a_linkage_does_not_need() -> None:
     """A rocker cannot follow its crank: the coupler holds it."""
     linkage = replace(two_four_bars(Ratio('rocker_joint', 1.0)), ratios={})

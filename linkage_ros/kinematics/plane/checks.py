@@ -226,6 +226,20 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
                 'which it could turn',
                 'name a joint of two links that share a pin, or of a slider',
             )
+    for other in chain[1:]:
+        if _moved_parts(linkage, other) == _moved_parts(linkage, name):
+            raise DefinitionError(
+                f'{key}.of',
+                f'{quote(other)} moves the same links as {quote(name)}, and a ratio locks them',
+                'name a joint of other links',
+            )
+
+
+def _moved_parts(linkage: Linkage, name: str) -> set[str]:
+    """Return the two links that a joint turns, or the slider that it moves."""
+    given = (Input.from_joint(*named) for named in linkage.joints.items())
+    joint = next(one for one in (*linkage.inputs, *given) if one.joint == name)
+    return {joint.slider} if joint.slider else {joint.parent, joint.child}
 
 
 def check_all_limits(linkage: Any) -> None:
