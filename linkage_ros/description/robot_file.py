@@ -240,7 +240,7 @@ class _Robot:
                 raise DefinitionError(key, f'there is no moving joint {quote(name)}', remedy)
         for name in self._driven or ('',):
             if name not in known:
-                reason = f'{self._urdf.file} does not say which joint drives it'
+                reason = 'the robot does not say which joint drives it'
                 reason = f'{quote(name)} is in no loop' if name else reason
                 remedy = f'name one of {list_names(name for name in moving if name in known)}'
                 raise DefinitionError('input', reason, remedy)
@@ -477,8 +477,7 @@ class _Robot:
             (open_by, 'm', _MET * self._size), (turned_by, 'rad', _MET),
         ):  # fmt: skip
             if apart > most:
-                file = self._urdf.file
-                reason = f'the loop {worst} of {file} is open by {apart:.3g} {unit} in the pose'
+                reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
                 raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
         as_told = values
         values, _ = self._meet(values, free, ratios)

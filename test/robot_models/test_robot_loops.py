@@ -513,7 +513,7 @@ def angle_between(kind, rpy):
 def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind):
     for _ in range(12):
         rpy = TURNS.uniform(0.4, 3.0, 3) * TURNS.choice([-1, 1], 3)
-        with pytest.raises(LinkageError, match=r'the loop loop of .* is open by') as caught:
+        with pytest.raises(LinkageError, match='the loop loop is open by') as caught:
             read(tmp_path, WELDED % CLOSED_BY.format(kind, *rpy), input='q1')
         told = float(re.search(r'open by (\S+) rad', str(caught.value))[1])
         assert told == pytest.approx(angle_between(kind, rpy), abs=6e-3)
