@@ -8,8 +8,9 @@
 """
 Planar loops of spatial linkages: in any plane, on any link, through their change points.
 
-The linkages are those of `flat_linkages`, whose links all lie in line at some angles of the crank.
-They are put into random planes, their coordinates rounded to some digits, on none to two hips.
+The linkages are those of the gallery, and those of `flat_linkages`, whose links all lie in line at
+some angles of the crank. They are put into random planes, on none to two hips, their coordinates
+rounded to some digits.
 """
 
 from math import pi, tau
@@ -32,6 +33,8 @@ from numpy.typing import NDArray
 import pytest
 
 from ..flat_linkages import FLAT, Flat
+from ..test_gallery import closure_of as planar_closure, inputs_of, KINDS
+from ...support.scenes import size_of
 
 Array = NDArray[np.float64]
 
@@ -48,7 +51,6 @@ class Placed(NamedTuple):
     axes: Array  # Rows: x and y of the plane, and its normal, as the base stands in the pose
     origin: Array
     hips: list[tuple[Array, Array]]  # Axis and a place on it, in the pose
-    start: float  # Angle of the crank in the pose
     height: float  # Largest height over the plane, of rounded coordinates
 
     def base(self, hips: list[float]) -> tuple[Array, Array]:
@@ -79,14 +81,11 @@ def random_axes(rng: random.Random) -> Array:
     return np.linalg.qr(np.array([[rng.gauss(0, 1) for _ in range(3)] for _ in range(3)]))[0].T
 
 
-def place_in_space(made: Flat, rng: random.Random, digits: int, hips: int) -> Placed:
-    """Return a planar linkage in a random plane, drawn at a random angle of its crank."""
-    linkage, plane = made.linkage, Closure(made.linkage)
-    while True:
-        start = rng.uniform(-pi, pi)
-        position = plane.position(start)
-        if position.status is Status.CLOSED and abs(np.sin(start)) > 0.2:
-            break
+def place_in_space(
+    plane: Closure, start: tuple[float, ...], rng: random.Random, digits: int, hips: int
+) -> Placed:
+    """Return a planar linkage in a random plane, drawn at some inputs, which have its values."""
+    linkage, position = plane.linkage, plane.position(*start)
     axes, origin = random_axes(rng), np.array([rng.uniform(-1, 1) for _ in range(3)])
     axes[2] = np.cross(axes[0], axes[1])
 
@@ -94,27 +93,47 @@ def place_in_space(made: Flat, rng: random.Random, digits: int, hips: int) -> Pl
         spot = origin + place.real * axes[0] + place.imag * axes[1]
         return tuple(float(f'{value:.{digits}g}') for value in spot)
 
-    places = {name: place for (_, name), place in plane.points(position).items()}
-    angles = plane.link_angles(position)
+    places, angles = plane.points(position), plane.link_angles(position)
     base = 'base' if hips else GROUND
     on = {link: base if link == GROUND else link for link in linkage.links}
     normal = tuple(map(float, axes[2]))
+    back = tuple(map(float, -axes[2]))
+    turned = {frozenset((i.parent, i.child)): i for i in linkage.inputs if not i.slider}
+    values = dict(zip(plane.input_names, start, strict=True))
     hinges: dict[str, SpatialJoint] = {}
     for pin, links in links_by_point(linkage.links).items():
-        for other in links[1:]:
-            at = lift(places[pin])
-            hinges[f'{pin} {other}'] = SpatialJoint(on[links[0]], on[other], normal, at)
-    slides = {}
+        pairs = [(links[0], other) for other in links[1:]]
+        for pair in turned:
+            if pair <= {*links}:  # The input is a hinge of its own.
+                one, other = pair
+                pairs = [(one, other), *((one, link) for link in links if link not in pair)]
+        for one, other in pairs:
+            at, given = lift(places[one, pin]), turned.get(frozenset((one, other)))
+            if given is None:
+                hinges[f'{pin} {one} {other}'] = SpatialJoint(on[one], on[other], normal, at)
+                continue
+            ends, axis = (on[given.parent], on[given.child]), normal
+            if given.child == GROUND:
+                ends, axis = (ends[1], ends[0]), back
+            value = values[given.joint]
+            hinges[given.joint] = SpatialJoint(*ends, axis, at, value)
+    slides, slid = {}, {given.slider: given.joint for given in linkage.inputs if given.slider}
     for name, slider in linkage.sliders.items():
-        (carrier,) = (link for link, points in linkage.links.items() if slider.point in points)
-        way = complex(*slider.direction) * np.exp(1j * angles[slider.along])
+        carrier = next(link for link, points in linkage.links.items() if slider.point in points)
+        way = slider.unit * np.exp(1j * angles[slider.along])
         axis = tuple(float(way.real * x + way.imag * y) for x, y in zip(*axes[:2], strict=True))
-        hinges[f'{name} pin'] = SpatialJoint(
-            on[carrier], f'{name} block', normal, lift(places[slider.point])
+        block = slider.block or f'{name} block'
+        if not slider.block:
+            at = lift(places[carrier, slider.point])
+            hinges[f'{name} pin'] = SpatialJoint(on[carrier], block, normal, at)
+        value = plane.slide_values(position)[name]
+        slides[slid.get(name, name)] = SpatialJoint(
+            on[slider.along], on.get(block, block), axis, value=value
         )
-        slides[name] = SpatialJoint(on[slider.along], f'{name} block', axis)
-    carried = [(np.array([rng.gauss(0, 1) for _ in range(3)]), origin + 0.5 * axes[k])
-               for k in range(hips)]  # fmt: skip
+    carried = [
+        (np.array([rng.gauss(0, 1) for _ in range(3)]), origin + 0.5 * axes[number])
+        for number in range(hips)
+    ]
     links = [GROUND, *(f'hip {number}' for number in range(1, hips)), base]
     legs = {
         f'hip {number} joint': SpatialJoint(
@@ -122,23 +141,34 @@ def place_in_space(made: Flat, rng: random.Random, digits: int, hips: int) -> Pl
         )
         for number, (axis, at) in enumerate(carried)
     }
-    crank = next(name for name in hinges if name == 'O crank')
+    driven = (*legs, *plane.input_names)
     space = SpaceLinkage(
-        points={name: lift(place) for name, place in places.items()},
+        points={name: lift(place) for (_, name), place in places.items()},
         links={on[link]: tuple(points) for link, points in linkage.links.items()},
         hinges={**legs, **hinges},
         slides=slides,
         struts={},
-        driven=(*legs, crank),
-        published=tuple(name for name in (*hinges, *slides) if name != crank),
+        driven=driven,
+        published=tuple(name for name in (*hinges, *slides) if name not in driven),
     )
     height = 1e-12 + 40.0 * 10.0**-digits
-    return Placed(SpaceClosure(space), axes, origin, carried, made.sign * start, height)
+    return Placed(SpaceClosure(space), axes, origin, carried, height)
 
 
-def flat_places(placed: Placed, crank: float, hips: list[float]) -> dict[str, complex]:
-    position = placed.closure.position(*hips, crank - placed.start)
-    assert position.status.has_pose, (position, crank)
+def start_of(plane: Closure, rng: random.Random) -> tuple[float, ...]:
+    """Return inputs away from toggles and change points."""
+    while True:
+        start = (rng.uniform(-pi, pi),)
+        position = plane.position(*start)
+        if position.status is Status.CLOSED and abs(np.sin(start[0])) > 0.2:
+            return start
+
+
+def flat_places(
+    placed: Placed, inputs: tuple[float, ...], hips: list[float]
+) -> dict[str, complex]:
+    position = placed.closure.position(*hips, *inputs)
+    assert position.status.has_pose, (position, inputs)
     assert placed.closure.residual(position) < placed.height
     points = placed.closure.points(position)
     return {name: placed.flat(place, hips) for name, place in points.items()}
@@ -163,7 +193,8 @@ def mirrored(kind: str, linkage: Linkage, at: dict[str, complex]) -> dict[str, c
 def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
     rng = random.Random(f'{kind} {hips}')
     made: Flat = FLAT[kind](rng)
-    plane, placed = Closure(made.linkage), place_in_space(made, rng, 17, hips)
+    plane = Closure(made.linkage)
+    placed = place_in_space(plane, start_of(plane, rng), rng, 17, hips)
     turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
     step = 2.0 * tau / STATES
     # No state lies at a change point, which the steps pass in the middle.
@@ -173,7 +204,7 @@ def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
         if not plane.position(made.sign * crank).status.has_pose:
             before = []
             continue
-        here = flat_places(placed, crank, turned)
+        here = flat_places(placed, (made.sign * crank,), turned)
         if len(before) == 2:
             other = mirrored(kind, made.linkage, here)
             ahead = {name: 2.0 * before[1][name] - before[0][name] for name in here}
@@ -193,7 +224,8 @@ def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
         while digits < 15 and len(made.at) + 2 * len(made.meets) < 2:
             # So rounded, only lengths that are equal in pairs are known to have been equal.
             made = FLAT[kind](rng)
-        plane, placed = Closure(made.linkage), place_in_space(made, rng, digits, hips)
+        plane = Closure(made.linkage)
+        placed = place_in_space(plane, start_of(plane, rng), rng, digits, hips)
         turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
         for _ in range(STATES // 4):
             crank = rng.uniform(-tau, tau)
@@ -202,7 +234,7 @@ def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
                 expected.status.has_rates
                 and plane.singularity_margin(expected).transmission_angle > 1e-3
             ):
-                places = flat_places(placed, crank, turned)
+                places = flat_places(placed, (made.sign * crank,), turned)
                 for name, place in places.items():
                     assert abs(place - expected.points[name]) < 1e5 * placed.height, (crank, name)
 
@@ -212,12 +244,12 @@ def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
 def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
     rng = random.Random(f'{kind} {hips}')
     made: Flat = FLAT[kind](rng)
-    placed = place_in_space(made, rng, 17, hips)
-    turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
     plane = Closure(made.linkage)
+    placed = place_in_space(plane, start_of(plane, rng), rng, 17, hips)
+    turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
     for at in made.at:
         for apart in (*BESIDE, *(-one for one in BESIDE)):
-            places = flat_places(placed, at + apart, turned)
+            places = flat_places(placed, (made.sign * (at + apart),), turned)
             expected = plane.position(made.sign * (at + apart)).points
             for name, place in places.items():
                 assert abs(place - expected[name]) < 1e-12, (at, apart, name)
@@ -247,3 +279,24 @@ def test_axes_that_are_nearly_parallel_are_parallel_and_told(angle):
 
 def test_axes_further_apart_make_a_spatial_loop():
     assert {group.kind for group in tilted(1e-5).groups}.isdisjoint({'planar loop'})
+
+
+GALLERY = [name for name in KINDS if name not in ('class_3', 'gripper')]
+"""Linkages of the gallery without links that are iterated, and without gears."""
+
+
+@pytest.mark.parametrize('hips', [0, 1])
+@pytest.mark.parametrize('name', GALLERY)
+def test_linkage_of_the_gallery_in_space_is_the_planar_one(name, hips):
+    rng = random.Random(f'{name} {hips}')
+    plane = planar_closure(name)
+    start, *others = [
+        inputs for inputs in inputs_of(plane, name, 60) if plane.position(*inputs).status.has_rates
+    ][7:]
+    placed = place_in_space(plane, start, rng, 17, hips)
+    assert [group.kind for group in placed.closure.groups].count('planar loop') > 0
+    turned = [rng.uniform(-1.0, 1.0) for _ in range(hips)]
+    for inputs in others:
+        expected = plane.position(*inputs).points
+        for point, place in flat_places(placed, inputs, turned).items():
+            assert abs(place - expected[point]) < 1e-12 * size_of(plane), (inputs, point)
