@@ -19,11 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import chain, product
-from math import prod
+from itertools import chain
 from typing import Any
 
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Grid, StartTable, Status
 from linkage_ros.kinematics.compiling import (
     DecisionBranch,
@@ -46,9 +44,6 @@ from linkage_ros.tools.models.source_code.source import (
     Subject,
     UNDECIDED,
 )
-
-_MOST_PLACES = 1 << 16
-"""Most places for cells of one width."""
 
 _COARSE = 64
 """Rounding errors of 1 within which Newton's method ends at any precision."""
@@ -178,13 +173,12 @@ class ArrayModule(PythonModule):
 
     def write_grid(self, name: str, grid: Grid) -> list[str]:
         cells = self.list_cells(grid)
-        levels = _dense_levels([key for key, _ in cells])
         columns = zip(*(numbers for _, numbers in cells), strict=True)
         return [
             f'_{name}_levels = (',
             *(
-                f'    ({self.write_constant(grid.widths[level])}, {lows}, {counts}, {places}),'
-                for level, lows, counts, places in levels
+                f'    ({self.write_constant(grid.widths[level])}, {first}, {axes}),'
+                for level, first, axes in _ranked_levels([key for key, _ in cells])
             ),
             ')',
             f'_{name}_columns = (',
@@ -195,15 +189,18 @@ class ArrayModule(PythonModule):
             f'def {name}(xp, *inputs):',
             f'    home = ({self.write_list(grid.home)},)',
             '    cell = -xp.ones_like(inputs[0], dtype=xp.int32)',
-            f'    for width, lows, counts, places in _{name}_levels:',
-            '        within, at = cell < 0, 0',
-            '        for x, middle, low, count in zip(inputs, home, lows, counts):',
+            f'    for width, first, axes in _{name}_levels:',
+            '        within, rank = cell < 0, 0',
+            '        for x, middle, (low, count, known) in zip(inputs, home, axes):',
             '            key = xp.round((x - middle) / width) - low',
             '            within = within & (key >= 0.0) & (key < count)',
-            '            at = at * count + xp.astype(xp.clip(key, 0.0, count - 1.0), xp.int32)',
-            '        places = xp.asarray(places, dtype=xp.int32, device=device(cell))',
-            '        known = xp.reshape(xp.take(places, xp.reshape(at, (-1,))), at.shape)',
-            '        cell = xp.where(within, known, cell)',
+            '            at = rank * count + xp.astype(xp.clip(key, 0.0, count - 1.0), xp.int32)',
+            '            codes = xp.asarray(known, dtype=xp.int32, device=device(cell))',
+            '            rank = xp.astype(xp.searchsorted(codes, at), xp.int32)',
+            '            rank = xp.clip(rank, 0, len(known) - 1)',
+            '            there = xp.reshape(xp.take(codes, xp.reshape(rank, (-1,))), rank.shape)',
+            '            within = within & (there == at)',
+            '        cell = xp.where(within, first + rank, cell)',
             '    found = cell >= 0',
             f'    row = _take(xp, _{name}_columns, xp.where(found, cell, 0), inputs[0])',
             '    return row, found',
@@ -212,23 +209,25 @@ class ArrayModule(PythonModule):
         ]
 
 
-def _dense_levels(
+def _ranked_levels(
     keys: Sequence[tuple[int, ...]],
-) -> Iterator[tuple[int, tuple[int, ...], tuple[int, ...], tuple[int, ...]]]:
-    """Yield each level with its lowest places, their counts, and the cells' numbers or −1."""
-    numbers = {key: number for number, key in enumerate(keys)}
+) -> Iterator[tuple[int, int, tuple[tuple[int, int, tuple[int, ...]], ...]]]:
+    """
+    Yield each level of sorted cells, the number of its first cell, and its axes.
+
+    An axis has the lowest place, the count of places, and the sorted codes of cells by their
+    places so far. A code is the rank of the one before, times that count, plus the place.
+    """
     for level in sorted({key[0] for key in keys}):
-        places = zip(*(key[1:] for key in keys if key[0] == level), strict=True)
-        spans = [range(min(axis), max(axis) + 1) for axis in map(list, places)]
-        if prod(map(len, spans)) > _MOST_PLACES:
-            raise DefinitionError(
-                'input',
-                f'{len(spans)} inputs move links that close only together, and the smallest '
-                'cells within their limits lie too far apart for arrays',
-                'give these inputs narrower limits',
-            )
-        dense = tuple(numbers.get((level, *place), -1) for place in product(*spans))
-        yield level, tuple(span[0] for span in spans), tuple(map(len, spans)), dense
+        places = [key[1:] for key in keys if key[0] == level]
+        ranks, axes = [0] * len(places), []
+        for axis in map(list, zip(*places, strict=True)):
+            low, count = min(axis), max(axis) - min(axis) + 1
+            codes = [rank * count + at - low for rank, at in zip(ranks, axis, strict=True)]
+            known = {code: rank for rank, code in enumerate(sorted({*codes}))}
+            ranks = [known[code] for code in codes]
+            axes.append((low, count, tuple(known)))
+        yield level, next(k for k, key in enumerate(keys) if key[0] == level), tuple(axes)
 
 
 class _MaskedWriter(TextWriter):
