@@ -226,11 +226,11 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
                 'which it could turn',
                 'name a joint of two links that share a pin, or of a slider',
             )
-    for other in chain[1:]:
-        if _moved_parts(linkage, other) == _moved_parts(linkage, name):
+    for leader in chain[1:]:
+        if _moved_parts(linkage, leader) == _moved_parts(linkage, name):
             raise DefinitionError(
                 f'{key}.of',
-                f'{quote(other)} moves the same links as {quote(name)}, and a ratio locks them',
+                f'{quote(leader)} moves the same links as {quote(name)}, and a ratio locks them',
                 'name a joint of other links',
             )
 

@@ -24,6 +24,7 @@ from linkage_ros.kinematics.space.vectors import (
     dot,
     drop_rounding,
     GROUND_FRAME,
+    length,
     minus,
     plus,
     scale,
@@ -44,6 +45,8 @@ class CarriedPoints:
 
     def __init__(self, linkage: SpaceLinkage, size: float) -> None:
         self.size = size
+        joints = linkage.pair_joints.values()
+        self._held = {end for joint in joints for end in (joint.parent, joint.child)}
         unit = 1.0 / size
         self.places: dict[str, Vector] = {
             name: scale(unit, place) for name, place in linkage.points.items()
@@ -68,6 +71,24 @@ class CarriedPoints:
             if joint.parent != GROUND and self.carried[joint.parent]:
                 self._add_beside(name, joint.parent)
         self._merge_points()
+
+    @property
+    def rods(self) -> list[str]:
+        """Return the links of points on one line that no joint holds: they may spin."""
+        return [
+            link
+            for link, points in self.carried.items()
+            if link not in self._held and link != GROUND and not self._spans(points)
+        ]
+
+    def _spans(self, points: list[str]) -> bool:
+        """Return whether points do not lie on one line."""
+        start, *others = (self.places[point] for point in points)
+        arms = [minus(other, start) for other in others]
+        return any(
+            length(cross(one, other)) > 1e-3 * length(one) * length(other)
+            for one, other in combinations(arms, 2)
+        )
 
     def _add_beside(self, slide: str, tube: str) -> None:
         """Add points of a tube by which it is turned to where its slide ends."""

@@ -22,6 +22,7 @@ from linkage_ros.kinematics.arithmetic import remainder
 from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.plane.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
+from linkage_ros.kinematics.space.carried_points import CarriedPoints
 from linkage_ros.kinematics.space.linkage import (
     check_space_linkage,
     size_of,
@@ -39,6 +40,7 @@ from linkage_ros.kinematics.space.vectors import (
     SpaceFrame,
     Vector,
 )
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
@@ -49,6 +51,9 @@ Quaternion = tuple[float, float, float, float]
 
 _MET = 1e-4
 """Largest gap of a redundant equation, relative to the size: CAD rounds."""
+
+_BESIDE = 0.01
+"""How far beside a change point the degrees of freedom are judged, in [rad] or [m]."""
 
 _STATES = 64
 """Number of states over the inputs in which redundant equations are checked."""
@@ -88,15 +93,17 @@ class SpaceClosure(StepwiseClosure):
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
         self._plan = plan = SpacePlan(linkage, _add_knot)
-        self.turns_with = plan.turns_with
-        self._set_linkage(linkage, name, plan.scale)
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy
             find_freedom,  # local import: it loads numpy
         )
 
-        self.freedom: Freedom = find_freedom(linkage, plan)
-        check_freedom(linkage, plan, self.freedom)
+        freedom = find_freedom(linkage, plan.carried_points)
+        at_change_point = freedom.free and plan.finds_all
+        if not at_change_point:
+            check_freedom(linkage, plan, freedom)
+        self.turns_with = plan.turns_with
+        self._set_linkage(linkage, name, plan.scale)
         self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
         """Rods that may turn about themselves."""
@@ -108,6 +115,41 @@ class SpaceClosure(StepwiseClosure):
         self._terms = tuple(
             (plan.coordinates[name], 0, plan.scale if isinstance(joint, SlideJoint) else 1.0, 0.0)
             for name, joint in linkage.joints.items()
+        )
+        if at_change_point:
+            freedom = self._freedom_beside_pose() or freedom
+            check_freedom(linkage, plan, freedom)
+        self.freedom: Freedom = freedom
+
+    def _freedom_beside_pose(self) -> Freedom | None:
+        """Return the degrees of freedom beside a pose that is a change point."""
+        from linkage_ros.kinematics.space.freedom import (
+            find_freedom,  # local import: it loads numpy
+        )
+
+        beside = (value + _BESIDE for value in self.linkage.pose.inputs)
+        position = self.close_unlimited(*beside)
+        if position.status is not Status.CLOSED:
+            return None
+        moved = self._redraw(position)
+        return find_freedom(moved, CarriedPoints(moved, self.scale))
+
+    def _redraw(self, position: Position) -> SpaceLinkage:
+        """Return the linkage with the places and axes of a position as its pose."""
+        plan, state = self._plan, position.state
+
+        def redraw(joint: SpatialJoint) -> SpatialJoint:
+            drawn, frame = plan.pose_frames[joint.parent], state.pins[plan.frames[joint.parent]]
+            at = frame.place(drawn.locate(scale(1.0 / self.scale, joint.at)))
+            axis = frame.turn(drawn.resolve(joint.axis))
+            return replace(joint, at=scale(self.scale, at), axis=axis)
+
+        linkage = self.linkage
+        return replace(
+            linkage,
+            points=self.points(position),
+            hinges={name: redraw(joint) for name, joint in linkage.hinges.items()},
+            slides={name: redraw(joint) for name, joint in linkage.slides.items()},
         )
 
     def driven_by(self, *joints: str) -> SpaceClosure:

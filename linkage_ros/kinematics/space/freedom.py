@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.batch import Array
+from linkage_ros.kinematics.space.carried_points import CarriedPoints
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint
 from linkage_ros.kinematics.space.merged_pose import MERGED
 from linkage_ros.kinematics.space.plan import SpacePlan
@@ -48,8 +49,8 @@ class Freedom(NamedTuple):
 class _MotionEquations:
     """The linear equations of the spins and velocities of all links; a motion has six numbers."""
 
-    def __init__(self, linkage: SpaceLinkage, plan: SpacePlan) -> None:
-        self._linkage, self._plan = linkage, plan
+    def __init__(self, linkage: SpaceLinkage, carried: CarriedPoints) -> None:
+        self._linkage, self._carried = linkage, carried
         self._links = {name: number for number, name in enumerate(linkage.link_names)}
         self.size = 6 * len(self._links)
         rows = [np.eye(6, self.size)]  # The ground is the first of the links
@@ -78,34 +79,34 @@ class _MotionEquations:
 
     def rate(self, name: str) -> Array:
         """Return the row of a joint's rate, in the unit of the file."""
-        linkage, plan = self._linkage, self._plan
+        linkage, carried = self._linkage, self._carried
         if name in linkage.struts:
             one, other = linkage.struts[name]
-            between = np.subtract(plan.places[other], plan.places[one])
+            between = np.subtract(carried.places[other], carried.places[one])
             at_other, at_one = (
-                self.velocity(plan.carriers[plan.same[point]][0], plan.places[point])
+                self.velocity(carried.carriers[carried.same[point]][0], carried.places[point])
                 for point in (other, one)
             )
-            along: Array = plan.scale * between / np.linalg.norm(between)
+            along: Array = carried.size * between / np.linalg.norm(between)
             return np.asarray(along @ (at_other - at_one))
         joint = linkage.pair_joints[name]
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         if name in linkage.hinges:
             return np.asarray(axis @ self._relative_spin(joint))
-        return np.asarray(plan.scale * axis @ self._relative_velocity(joint, ZERO))
+        return np.asarray(carried.size * axis @ self._relative_velocity(joint, ZERO))
 
     def _joint_rows(self, joint: SpatialJoint, turns: bool) -> list[Array]:
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         across = np.eye(3) - np.outer(axis, axis)
         spin = self._relative_spin(joint)
-        velocity = self._relative_velocity(joint, scale(1.0 / self._plan.scale, joint.at))
+        velocity = self._relative_velocity(joint, scale(1.0 / self._carried.size, joint.at))
         return [across @ spin, velocity] if turns else [spin, across @ velocity]
 
     def _ball_rows(self, point: str) -> Iterator[Array]:
-        plan, links = self._plan, self._plan.carriers.get(point, [])
+        carried, links = self._carried, self._carried.carriers.get(point, [])
         for link in links[1:]:
-            if not _is_on_hinge(self._linkage, plan, point, {links[0], link}):
-                place = plan.places[point]
+            if not _is_on_hinge(self._linkage, carried, point, {links[0], link}):
+                place = carried.places[point]
                 yield self.velocity(link, place) - self.velocity(links[0], place)
 
     def _relative_spin(self, joint: SpatialJoint) -> Array:
@@ -115,12 +116,12 @@ class _MotionEquations:
         return self.velocity(joint.child, place) - self.velocity(joint.parent, place)
 
 
-def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
+def find_freedom(linkage: SpaceLinkage, carried: CarriedPoints) -> Freedom:
     """Return the degrees of freedom in the pose."""
-    equations = _MotionEquations(linkage, plan)
+    equations = _MotionEquations(linkage, carried)
     inputs = np.vstack([_without_unit(equations.rate(name)) for name in linkage.driven])
     driven = np.vstack([equations.constraints, inputs])
-    rods = plan.rods
+    rods = carried.rods
 
     def judge(tolerance: float) -> Freedom:
         rank, _ = _rank_and_motions(equations.constraints, tolerance)
@@ -132,7 +133,9 @@ def find_freedom(linkage: SpaceLinkage, plan: SpacePlan) -> Freedom:
         free = [
             link
             for link in linkage.link_names
-            if any(moves(equations.velocity(link, plan.places[at])) for at in plan.carried[link])
+            if any(
+                moves(equations.velocity(link, carried.places[at])) for at in carried.carried[link]
+            )
             or (link not in rods and moves(equations.spin(link)))
         ]
         return Freedom(
@@ -180,11 +183,13 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
         )
 
 
-def _is_on_hinge(linkage: SpaceLinkage, plan: SpacePlan, point: str, links: set[str]) -> bool:
+def _is_on_hinge(
+    linkage: SpaceLinkage, carried: CarriedPoints, point: str, links: set[str]
+) -> bool:
     """Return whether a point lies on the axis of a hinge between two links."""
-    place = np.array(plan.places[point])
+    place = np.array(carried.places[point])
     for hinge in linkage.hinges.values():
-        arm = place - np.array(hinge.at) / plan.scale
+        arm = place - np.array(hinge.at) / carried.size
         axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
         if {hinge.parent, hinge.child} == links and np.abs(np.cross(axis, arm)).max() < MERGED:
             return True

@@ -125,7 +125,7 @@ class SpacePlan:
         self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
-        self._known = known = CarriedPoints(linkage, self.scale)
+        self.carried_points = known = CarriedPoints(linkage, self.scale)
         self.places, self.axes, self.same = known.places, known.axes, known.same
         self.carriers, self.carried = known.carriers, known.carried
         count = len(linkage.driven)
@@ -146,7 +146,7 @@ class SpacePlan:
         unknown = self._unknown_links()
         self.idle = tuple(
             link
-            for link in self.rods
+            for link in self.carried_points.rods
             if link in unknown and all(map(self.is_known, self.carried[link]))
         )
         """Rods whose ends are known: nothing holds their turn about themselves."""
@@ -166,24 +166,9 @@ class SpacePlan:
         return len(self.state.pins)
 
     @property
-    def rods(self) -> list[str]:
-        """Return the links of points on one line that no joint holds: they may spin."""
-        joints = self.linkage.pair_joints.values()
-        held = {end for joint in joints for end in (joint.parent, joint.child)}
-        return [
-            link
-            for link, points in self.carried.items()
-            if link not in held and link != GROUND and not self._spans(points)
-        ]
-
-    def _spans(self, points: list[str]) -> bool:
-        """Return whether points do not lie on one line."""
-        start, *others = (self.places[point] for point in points)
-        arms = [minus(other, start) for other in others]
-        return any(
-            length(cross(one, other)) > 1e-3 * length(one) * length(other)
-            for one, other in combinations(arms, 2)
-        )
+    def finds_all(self) -> bool:
+        """Return whether its steps find all links and published joints."""
+        return not self.lost and {*self._unknown_links()} <= {*self.idle}
 
     def _unknown_links(self) -> list[str]:
         return [link for link in self.linkage.link_names if link not in self.frames]
@@ -229,7 +214,7 @@ class SpacePlan:
         if self._tried == len(self.coordinates):
             return False
         self._tried = len(self.coordinates)
-        for loop in find_planar_loops(self.linkage, self._known, self.coordinates):
+        for loop in find_planar_loops(self.linkage, self.carried_points, self.coordinates):
             if frozenset(loop.offsets) not in self._spatial:
                 self._spatial.add(frozenset(loop.offsets))
                 # A pose at a toggle is left to the steps in space.

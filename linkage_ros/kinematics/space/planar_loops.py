@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
-from math import asin, cos, dist, sin
+from math import asin, cos, dist, hypot, sin
 from typing import NamedTuple
 
 from linkage_ros.kinematics.plane.linkage import (
@@ -43,6 +43,9 @@ from linkage_ros.kinematics.space.vectors import cross, dot, length, minus, scal
 
 PARALLEL = 1e-6
 """Axes nearer to parallel than this are parallel, in [rad]: CAD rounds."""
+
+_OPENED = 0.5
+"""By how much the cranks of a parallelogram are turned to tell its assembly, in [rad]."""
 
 _ROUNDED = 1e-15
 """Angles between axes that are rounding, in [rad]."""
@@ -123,11 +126,9 @@ def _rods_across(
     linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector, known: Collection[str]
 ) -> Edges:
     """Return the ends of rods, and of struts of known length that lie across a direction."""
-    joints = linkage.pair_joints.values()
-    held = {end for joint in joints for end in (joint.parent, joint.child)}
     edges: Edges = {}
-    for link, points in carried.carried.items():
-        if link in held or link == GROUND or len(points) != 2:
+    for link in carried.rods:
+        if len(points := carried.carried[link]) != 2:
             continue
         others = [[on for on in carried.carriers[point] if on != link] for point in points]
         if all(others):
@@ -329,11 +330,37 @@ class _PlanarModel:
             {pin.name: pin.place for pin in self._pins},
             {link: turned.get(link, 0.0) for link in links if link != GROUND},
         )
+        pose = self._open_parallelogram(pose, inputs)
         flat = Linkage(
             links, inputs, {}, {name: made[name] for name in self._joints}, sliders, pose=pose,
             ratios={name: self._ratio(of, name, offsets) for name, of in self._ratios.items()},
         )  # fmt: skip
         return PlanarLoop(flat, tuple(self._links), offsets, self._normal, self._tilt)
+
+    def _open_parallelogram(self, pose: AssemblyPose, inputs: tuple[Input, ...]) -> AssemblyPose:
+        """Return a pose that tells the assembly of a parallelogram that is drawn flat."""
+        crank_pins = [pin for pin in self._pins if GROUND in pin.links]
+        others = [pin for pin in self._pins if GROUND not in pin.links]
+        if not (len(self._links) == 4 and len(crank_pins) == len(others) == 2):
+            return pose
+        moved, cranks = dict(pose.points), []
+        for pivot in crank_pins:
+            (crank,) = pivot.links - {GROUND}
+            pin = next(pin for pin in others if crank in pin.links)
+            arm = (pin.place[0] - pivot.place[0], pin.place[1] - pivot.place[1])
+            x, y = _turn(arm, _OPENED)
+            moved[pin.name] = (pivot.place[0] + x, pivot.place[1] + y)
+            cranks.append((crank, arm))
+        (one, arm), (other, other_arm) = cranks
+        if dist(arm, other_arm) > PARALLEL * hypot(*arm):
+            return pose
+        turn = {one: _OPENED, other: _OPENED}
+        values = (
+            value + turn.get(given.child, 0.0) - turn.get(given.parent, 0.0)
+            for value, given in zip(pose.inputs, inputs, strict=True)
+        )
+        angles = {link: angle + turn.get(link, 0.0) for link, angle in pose.angles.items()}
+        return AssemblyPose(tuple(values), moved, angles)
 
     def _pose_angles(self) -> dict[str, float]:
         """Return the angle of each link in the pose; hinges that are inputs are met first."""

@@ -255,6 +255,33 @@ def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
                 assert abs(place - expected[name]) < 1e-12, (at, apart, name)
 
 
+@pytest.mark.parametrize('with_rod', [False, True])
+@pytest.mark.parametrize('crank', [0.0, pi])
+def test_parallelogram_drawn_flat_is_a_parallelogram(crank, with_rod):
+    rng = random.Random(48)
+    for _ in range(5):
+        axes, origin = random_axes(rng), np.array([rng.uniform(-1, 1) for _ in range(3)])
+        normal, (a, d) = tuple(axes[2].tolist()), (rng.uniform(0.1, 0.5), rng.uniform(0.6, 1.5))
+        pivots = [origin, origin + d * axes[0]]
+        pins = [tuple((pivot + a * np.cos(crank) * axes[0]).tolist()) for pivot in pivots]
+        hinges = {
+            name: SpatialJoint(GROUND, link, normal, tuple(pivot.tolist()))
+            for name, link, pivot in zip(('driver', 'driven'), 'ab', pivots, strict=True)
+        }
+        points, links = {}, {}
+        if with_rod:
+            points = dict(zip('pq', pins, strict=True))
+            links = {'a': ('p',), 'b': ('q',), 'rod': ('p', 'q')}
+        else:
+            ends = zip(('first', 'second'), 'ab', pins, strict=True)
+            hinges |= {name: SpatialJoint(link, 'rod', normal, pin) for name, link, pin in ends}
+        linkage = SpaceLinkage(points, links, hinges, {}, {}, ('driver',), ('driven',))
+        closure = SpaceClosure(linkage)
+        for driver in (0.0, *np.linspace(-6.0, 6.0, 40).tolist()):
+            (driven,) = closure.position(driver).joints
+            assert abs(np.remainder(driven - driver + pi, tau) - pi) < 1e-13
+
+
 def tilted(angle: float) -> SpaceClosure:
     """Return a parallelogram one of whose axes is tilted."""
     axis = (0.0, 1.0, 0.0)
