@@ -196,9 +196,7 @@ def _counts_turns(closure: Closure) -> bool:
     """Return whether whole turns of several inputs against each other lead to another pose."""
     if len(closure.linkage.inputs) == 1:
         return False
-    parts = (getattr(step, 'diagonal', getattr(step, 'rail', None)) for step in closure.steps)
-    crossed = (sum(getattr(part, 'crosses', ())) for part in parts)
-    return is_iterated(closure) or any(number == 1 for number in crossed)
+    return is_iterated(closure) or any(sum(step.crosses) == 1 for step in closure.steps)
 
 
 def _examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
@@ -317,11 +315,10 @@ def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> G
         assembly = 'the only one'
         if closes_in_two_ways(group):
             assembly = _assembly_text(group, sides.get(closing_name(group), 'in line with'))
-            parts = (getattr(one, 'diagonal', getattr(one, 'rail', None)) for one in steps)
-            if any(any(getattr(part, 'crosses', ())) for part in parts):
+            if any(any(step.crosses) for step in steps):
                 assembly += ' as drawn, changing at change points'
         return GroupDescription(f'{group.kind} dyad', links, 'closed form', assembly)
-    (equations,) = (step.equation_count for step in steps if hasattr(step, 'equation_count'))
+    (equations,) = (step.equation_count for step in steps if step.iterates)
     method = f"iterated: Newton's method, {equations} equations"
     links = list(group.links)
     return GroupDescription(f'{len(links)} links', links, method, 'as the pose of the file')

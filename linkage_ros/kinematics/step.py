@@ -18,10 +18,13 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, unit_vector
 from linkage_ros.kinematics.status import Status
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.iterated.grid import Grid
 
 
 class LinkState(NamedTuple):
@@ -58,14 +61,45 @@ class PlacedPose(NamedTuple):
 PLACED = PlacedPose()
 
 
-class Step(Protocol):
-    """A part of a linkage that is solved from the coordinates and pins before it."""
+class Span(Protocol):
+    """What says where a dyad folds and stretches: its diagonal, its rail, or its two lines."""
+
+    @property
+    def arms(self) -> tuple[int, ...]:
+        """Return the two coordinates whose difference is its angle, and others; or none."""
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        """Return whether the dyad changes its side where it folds, and where it stretches."""
+
+    @property
+    def singular_angles(self) -> tuple[float, ...]:
+        """Return the angles at which the dyad is singular, in [rad]."""
+
+
+class Step:
+    """
+    A part of a linkage that is solved from the coordinates and pins before it.
+
+    What only some steps can has a default here; a class that can it says so.
+    """
+
+    __slots__ = ()
+
+    has_transmission_angle: ClassVar[bool] = False
+    """Whether it toggles, and `transmission_angle` says how far it is from there."""
+    iterates: ClassVar[bool] = False
+    """Whether Newton's method solves it, and it has a `conditioning`."""
+    follows_branch: ClassVar[bool] = False
+    """Whether it follows the ``branch`` of a single input."""
 
     def close(self, solved: LinkState, /) -> StepPose:
         """Append to the known state; if that is impossible, return a status that says why."""
+        raise NotImplementedError
 
     def rates(self, pose: Any, solved: LinkState, velocities: LinkState, /) -> Any:
         """Append to the rates; return the intermediate values that `accelerations` needs."""
+        raise NotImplementedError
 
     def accelerations(
         self,
@@ -77,9 +111,42 @@ class Step(Protocol):
         /,
     ) -> None:
         """Append to the accelerations."""
+        raise NotImplementedError
+
+    def transmission_angle(self, pose: Any, /) -> float:
+        """Return the angle from a toggle, in [0, π/2] rad."""
+        raise NotImplementedError
+
+    def side_of(self, pose: Any, /) -> float:
+        """Return a number with the sign of the assembly; 0 where it is singular."""
+        raise NotImplementedError
+
+    def conditioning(self, pose: Any, /) -> float:
+        """Return the ratio of the smallest singular value of its Jacobian to the largest."""
+        raise NotImplementedError
+
+    @property
+    def equation_count(self) -> int:
+        """Return the number of equations that it solves at once."""
+        return 0
+
+    @property
+    def grid(self) -> Grid | None:
+        """Return the cells of several inputs, if it has some."""
+        return None
+
+    @property
+    def span(self) -> Span | None:
+        """Return what says where it folds and stretches, if it is a dyad that has it."""
+        return None
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        """Return whether it changes its side where it folds, and where it stretches."""
+        return self.span.crosses if self.span else (False, False)
 
 
-class LinearStep:
+class LinearStep(Step):
     """A step that appends to rates as to accelerations: it is linear, with constant factors."""
 
     __slots__ = ()
@@ -121,7 +188,7 @@ class FixedPoint(LinearStep):
 
 
 @dataclass(frozen=True, slots=True)
-class PointOnLink:
+class PointOnLink(Step):
     """A point at a constant distance from a pin of the same link."""
 
     pin: int  # Index of that pin
@@ -156,7 +223,7 @@ class PointOnLink:
 
 
 @dataclass(frozen=True, slots=True)
-class PointOnRail:
+class PointOnRail(Step):
     """A point that travels along a line of a link."""
 
     pin: int  # Index of the pin that the line starts from

@@ -480,8 +480,7 @@ class StepwiseClosure:
     @property
     def grids(self) -> list[Grid]:
         """Return the cells of links that close only together, by several inputs."""
-        found = (getattr(step, 'grid', None) for step in self.steps)
-        return [grid for grid in found if grid is not None]
+        return [grid for step in self.steps if (grid := step.grid) is not None]
 
     @property
     def makes_cells_in_motion(self) -> bool:

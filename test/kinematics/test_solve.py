@@ -351,7 +351,7 @@ def test_every_kind_of_step_is_tested():
         import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
     ]
     assert {type(step) for step in steps} == classes_with('close', step, newton_group, *kinds)
-    parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
+    parts = [step.span for step in steps]
     wanted = classes_with('diagonal_at', diagonals) | classes_with('pin_at', rail)
     assert {type(part) for part in parts if part is not None} == wanted
 

@@ -40,7 +40,7 @@ from linkage_ros.kinematics.results import (
     Velocity,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Step
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
@@ -69,7 +69,7 @@ class CrankPose(NamedTuple):
     gap: float = 0.0
 
 
-class CrankStep:
+class CrankStep(Step):
     """The first step of compiled code: the crank takes the place of the joint."""
 
     def __init__(self, closure: InverseClosure) -> None:

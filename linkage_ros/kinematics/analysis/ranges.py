@@ -98,7 +98,7 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     intervals = [(-pi, pi)]
     exact = True
     for step in closure.steps:
-        diagonal = getattr(step, 'diagonal', None)
+        diagonal = step.span
         if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):
             found = _crank_intervals(diagonal)
             shifted = [(low - diagonal.offset, high - diagonal.offset) for low, high in found]
@@ -150,12 +150,12 @@ def through_the_end(
 
 def _iterating_steps(closure: LoopClosure) -> dict[int, Any]:
     """Return the steps that iterate, by their numbers."""
-    return {index: step for index, step in enumerate(closure.steps) if hasattr(step, 'branch')}
+    return {index: step for index, step in enumerate(closure.steps) if step.follows_branch}
 
 
 def is_iterated(closure: LoopClosure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
-    return any(hasattr(step, 'conditioning') for step in closure.steps)
+    return any(step.iterates for step in closure.steps)
 
 
 def whole_turns(closure: LoopClosure) -> int:
@@ -314,7 +314,7 @@ def _closing_margin(closure: LoopClosure, value: float) -> float:
     angles = [
         step.transmission_angle(pose)
         for step, pose in zip(closure.steps, position.poses, strict=True)
-        if hasattr(step, 'transmission_angle')
+        if step.has_transmission_angle
     ]
     return min(angles, default=inf)
 

@@ -40,10 +40,10 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
     angle, conditioning, weakest = 0.5 * pi, 1.0, -1
     groups = closure.step_groups
     for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
-        if hasattr(step, 'transmission_angle'):
+        if step.has_transmission_angle:
             angle = min(angle, of_dyad := step.transmission_angle(pose))
             found = sqrt(2.0) * sin(0.5 * of_dyad)
-        elif hasattr(step, 'conditioning'):
+        elif step.iterates:
             found = step.conditioning(pose)
         else:
             continue
@@ -96,7 +96,7 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     # All dyads are evaluated at the same states.
     posed = lru_cache(_STATES)(closure.close_unlimited)
     for index, step in enumerate(closure.steps):
-        if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
+        if not step.has_transmission_angle or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
@@ -122,15 +122,15 @@ def _move_within(closure: LoopClosure, value: float) -> float:
 
 def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
     """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
-    part = getattr(step, 'diagonal', None) or getattr(step, 'rail', step)
-    if not hasattr(part, 'singular_angles') or closure.linkage.ratios:
+    span = step.span
+    if span is None or not span.arms or closure.linkage.ratios:
         return None
-    first, second = part.arms[:2]
+    first, second = span.arms[:2]
     turns = closure.turns_with
     if first not in turns or second not in turns:
         return None
     factor = turns[first][0] - turns[second][0]
-    return [remainder(angle / factor, tau) for angle in part.singular_angles] if factor else []
+    return [remainder(angle / factor, tau) for angle in span.singular_angles] if factor else []
 
 
 def _singular_status(closure: LoopClosure, number: int, place: float) -> Status | None:

@@ -10,10 +10,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from math import inf, isfinite, nan, pi, remainder, tau
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.analysis.ranges import (
@@ -413,22 +413,23 @@ def transmission_angles(sweep: InputSweep) -> dict[int, SweptCurve]:
 
     They are folded into [0, π/2]. Groups that are iterated have none.
     """
-    return _step_extremes(sweep, 'transmission_angle', _SAMPLES)
+    steps = enumerate(sweep.closure.steps)
+    methods = {n: step.transmission_angle for n, step in steps if step.has_transmission_angle}
+    return _step_extremes(sweep, methods, _SAMPLES)
 
 
 def conditioning_curves(sweep: InputSweep) -> dict[int, SweptCurve]:
     """Return the extreme conditioning of each iterated group over the range, by its number."""
-    return _step_extremes(sweep, 'conditioning', _SAMPLES // 4)
+    steps = enumerate(sweep.closure.steps)
+    methods = {n: step.conditioning for n, step in steps if step.iterates}
+    return _step_extremes(sweep, methods, _SAMPLES // 4)
 
 
-def _step_extremes(sweep: InputSweep, name: str, count: int) -> dict[int, SweptCurve]:
-    """Return the extremes of a method of the steps, applied to their poses, by group."""
+def _step_extremes(
+    sweep: InputSweep, methods: Mapping[int, Callable[[Any], float]], count: int
+) -> dict[int, SweptCurve]:
+    """Return the extremes of methods of steps, by their numbers, of their poses; by group."""
     closure = sweep.closure
-    methods = {
-        index: getattr(step, name)
-        for index, step in enumerate(closure.steps)
-        if hasattr(step, name)
-    }
     if not methods:
         return {}
     # One sweep for all steps: otherwise each of n loops would be closed n times.

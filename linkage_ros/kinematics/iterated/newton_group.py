@@ -91,7 +91,7 @@ class IteratedPose(NamedTuple):
     solved: LinkState  # The state that they were appended to
 
 
-class Iteration:
+class Iteration(Step):
     """
     A group of links that Newton's method solves.
 
@@ -102,6 +102,8 @@ class Iteration:
     state at the pose. No slide needs to be longer than ``far`` to stretch a link. Whole turns of a
     single input change nothing if they are ``repeated_turns``; 0 if none are known.
     """
+
+    iterates = follows_branch = True
 
     __slots__ = (
         '_accelerations_line', '_before', '_constraints', '_equations', '_far', '_given_inputs',

@@ -226,11 +226,11 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
                 'which it could turn',
                 'name a joint of two links that share a pin, or of a slider',
             )
-    for leader in chain[1:]:
-        if _moved_parts(linkage, leader) == _moved_parts(linkage, name):
+    for followed in chain[1:]:
+        if _moved_parts(linkage, followed) == _moved_parts(linkage, name):
             raise DefinitionError(
                 f'{key}.of',
-                f'{quote(leader)} moves the same links as {quote(name)}, and a ratio locks them',
+                f'{quote(followed)} moves the same links as {quote(name)}, and a ratio locks them',
                 'name a joint of other links',
             )
 

@@ -37,7 +37,7 @@ from linkage_ros.kinematics.arithmetic import (
     where,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Span
 
 
 class Diagonal(NamedTuple):
@@ -92,7 +92,7 @@ class DiagonalAcceleration(NamedTuple):
     curvature_over_height: float | None
 
 
-class AnyDiagonal(Protocol):
+class AnyDiagonal(Span, Protocol):
     """The interface of a diagonal to a dyad; ``least`` is a constant lower bound of s²."""
 
     least: Fraction
@@ -452,6 +452,7 @@ class FreeDiagonal:
     __slots__ = ('_ends', '_limits')
 
     least = Fraction(0)
+    arms, crosses, singular_angles = (), (False, False), ()
 
     def __init__(self, ends: tuple[int, int], limits: tuple[float, float, float]) -> None:
         self._ends = ends

@@ -231,7 +231,7 @@ class SolutionPlan(SolvedLinks):
             dyad, hinge, (abs(b - c), b + c, 4.0 * b * c), make_diagonal
         )
         kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.passes_fold(diagonal) else RRRDyad
-        self._add_two_sided(dyad, kind(diagonal, b, c, 1), diagonal, upright)
+        self._add_two_sided(dyad, kind(diagonal, b, c, 1), upright)
         k = self.new_coordinates(2)
         self.angles[one] = _link_angle(k, base, one_arm)
         self.angles[other] = _link_angle(k + 1, base, other_arm)
@@ -255,6 +255,7 @@ class SolutionPlan(SolvedLinks):
             crosses = self._change_points(dyad)
             return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
 
+<<<<<<< HEAD
         hinge = self._find_hinge(first.name, second.name)
         if hinge is not None:
             a, d, offset = swivel_lengths(hinge.a, hinge.d, offset)
@@ -263,6 +264,10 @@ class SolutionPlan(SolvedLinks):
             dyad, hinge, (abs(offset), inf, inf), make_diagonal
         )
         self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), diagonal, upright)
+=======
+        diagonal, base, upright = self._make_diagonal(dyad, (abs(offset), inf, inf), make_diagonal)
+        self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), upright)
+>>>>>>> 2c1e7b20 (Steps: what only some can has a default on Step, and none is asked by name)
         k = self.new_coordinates(2)
         self.angles[rail] = _link_angle(k, base, line.direction)
         self.angles[block] = self.angles[rail].rotate_by(line.angle)
@@ -279,7 +284,7 @@ class SolutionPlan(SolvedLinks):
         line = self.slider_line(name, second.to, point)
         base = self.angles[second.to].vector_angle(line.direction)
         rail = self._make_rail(dyad, first.name, second.to, line, abs(arm))
-        self._add_two_sided(dyad, RRPDyad(rail, 1), rail)
+        self._add_two_sided(dyad, RRPDyad(rail, 1))
         k = self.new_coordinates(2)
         self.angles[link] = _link_angle(k, base, arm)
         self.attach_to_pin(link, first)
@@ -453,8 +458,7 @@ class SolutionPlan(SolvedLinks):
         four-bar of such lengths nearly is.
         """
         if self._nominal:
-            nominal: Any = self._nominal[closing_name(dyad)]
-            return getattr(getattr(nominal, 'diagonal', None) or nominal.rail, 'crosses', None)
+            return self._nominal[closing_name(dyad)].crosses
         nearly = nearly_paired(*lengths) if lengths else None
         return nearly.crosses if nearly else None
 
@@ -509,16 +513,14 @@ class SolutionPlan(SolvedLinks):
         """Return whether two coordinates are sums of inputs, so that their turns are known."""
         return set(arms) <= set(self.turns_with)
 
-    def _add_two_sided(
-        self, dyad: Dyad, step: Any, part: AnyDiagonal | Rail | None = None, upright: int = 1
-    ) -> None:
+    def _add_two_sided(self, dyad: Dyad, step: Any, upright: int = 1) -> None:
         """
         Add the step of a dyad that closes in two ways, on the side that the file writes.
 
-        ``part`` is its diagonal or rail, ``upright`` its sign there on the side +1.
+        ``upright`` is the sign of its diagonal or rail on the side +1.
         """
         name, sides = closing_name(dyad), SIDES[dyad.kind]
-        crosses = any(getattr(part, 'crosses', ()))
+        crosses = any(step.crosses)
         first, second = (outer.name for outer in dyad.outer)
         meaning = {
             'RRR': f'the side of {first}→{second}',

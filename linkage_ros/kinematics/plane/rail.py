@@ -35,7 +35,7 @@ from linkage_ros.kinematics.arithmetic import (
     where,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Span
 
 
 class PinOnRail(NamedTuple):
@@ -56,7 +56,7 @@ class PinOnRail(NamedTuple):
     status: Status
 
 
-class Rail(Protocol):
+class Rail(Span, Protocol):
     """The interface of a rail to a dyad."""
 
     def pin_at(self, solved: LinkState, /) -> PinOnRail:
@@ -347,6 +347,8 @@ class FreeRail:
     """
 
     __slots__ = ('_arm', '_back', '_ends', '_link')
+
+    arms, crosses, singular_angles = (), (False, False), ()
 
     def __init__(self, ends: tuple[int, int], link: float, arm: int, unit: complex) -> None:
         self._ends = ends

@@ -115,7 +115,7 @@ def sides_at(closure: PlanarClosure, position: Position) -> dict[str, str]:
     ):
         group = groups[number]
         if isinstance(step, TwoSided) and isinstance(group, Dyad):
-            side = step.side_of(pose)  # type: ignore[attr-defined]  # each such dyad has one
+            side = step.side_of(pose)
             words = SIDES[group.kind].items()
             found |= {closing_name(group): word for word, sign in words if sign * side > 0.0}
     return found

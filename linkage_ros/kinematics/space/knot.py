@@ -29,7 +29,7 @@ from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.knot_equations import KnotEquations
 from linkage_ros.kinematics.space.steps import missing_length
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Step
 
 _APART, _DIGITS = 1e-6, 12
 """Smallest distance of the ends of rods in two solutions, in lengths; and their digits."""
@@ -51,12 +51,14 @@ class KnotPose(NamedTuple):
     before: int  # Number of its coordinates then
 
 
-class Knot:
+class Knot(Step):
     """
     Links on a tree of joints, closed by as many rods as there are unknown joints.
 
     ``start`` has the unknowns in the pose, ``unknown`` the names of these joints.
     """
+
+    iterates = True
 
     def __init__(
         self,

@@ -47,7 +47,7 @@ from linkage_ros.kinematics.space.vectors import (
     ZERO,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinearStep, LinkState, PLACED, StepPose
+from linkage_ros.kinematics.step import LinearStep, LinkState, PLACED, Step, StepPose
 
 
 class Rod(NamedTuple):
@@ -195,7 +195,7 @@ class GroundStep(LinearStep):
 
 
 @dataclass(frozen=True, slots=True)
-class GivenJoint:
+class GivenJoint(Step):
     """A joint whose value is known; its child is placed."""
 
     joint: LowerPair
@@ -225,7 +225,7 @@ class GivenJoint:
 
 
 @dataclass(frozen=True, slots=True)
-class CarriedPoint:
+class CarriedPoint(Step):
     """A point at a place in the frame of a link; or beside another point, which it turns with."""
 
     link: int
@@ -260,8 +260,10 @@ class CarriedPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class ClosedJoint:
+class ClosedJoint(Step):
     """A joint whose child carries a point at a known distance from a known point."""
+
+    has_transmission_angle = True
 
     joint: LowerPair
     place: Vector  # The carried point in the frame of the child
@@ -391,7 +393,7 @@ class ClosedSlide(ClosedJoint):
 
 
 @dataclass(frozen=True, slots=True)
-class AimedHinge:
+class AimedHinge(Step):
     """A hinge whose child carries a point that is known already."""
 
     joint: HingePair
@@ -435,7 +437,7 @@ class AimedHinge:
 
 
 @dataclass(frozen=True, slots=True)
-class FramedLink:
+class FramedLink(Step):
     """A link with three known points: x leads from the first to the second, y to the third."""
 
     points: tuple[int, int, int]
@@ -486,7 +488,7 @@ def frame_of(origin: Vector, one: Vector, other: Vector) -> SpaceFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredHinge:
+class MeasuredHinge(Step):
     """A hinge between two links whose frames are known."""
 
     joint: HingePair
@@ -521,7 +523,7 @@ class MeasuredHinge:
 
 
 @dataclass(frozen=True, slots=True)
-class ResolvedSlides:
+class ResolvedSlides(Step):
     """The slides in a row that lead from a link to a known point: its offset, by directions."""
 
     link: int
@@ -558,7 +560,7 @@ class ResolvedSlides:
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredStrut:
+class MeasuredStrut(Step):
     """The distance of two known points."""
 
     points: tuple[int, int]

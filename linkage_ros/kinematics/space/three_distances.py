@@ -33,7 +33,7 @@ from linkage_ros.kinematics.space.vectors import (
     ZERO,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Step
 
 
 def order_ends(place: Vector, ends: Sequence[Vector]) -> list[int]:
@@ -77,13 +77,15 @@ class MetPose(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ThreeDistances:
+class ThreeDistances(Step):
     """
     A point at known distances from three known points P0, P1, P2.
 
     It lies on a circle about the line P0 P1, which the third rod meets. The assembly is the sign
     of ((P1 − P0) × (P2 − P0))·(X − P0).
     """
+
+    has_transmission_angle = True
 
     to: tuple[int, ...]
     rods: tuple[Rod, ...]

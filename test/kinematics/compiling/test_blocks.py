@@ -152,7 +152,7 @@ def test_random_linkages_of_every_topology_have_them(family):
             closure = Closure(topology.linkage)
         except DefinitionError:  # it closes nowhere, or has two pins in one place
             continue
-        iterated = any(hasattr(step, 'branch') for step in closure.steps)
+        iterated = any(step.follows_branch for step in closure.steps)
         compiled = Compiled(closure, 2)
         for _ in range(3 if iterated else 40):
             inputs = [start + rng.uniform(-1.0, 1.0) for start in topology.start]

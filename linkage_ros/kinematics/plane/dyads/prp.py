@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import atan2, cross_product, phase, ROUNDING, unit_vector
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Step
 
 
 class PRPPose(NamedTuple):
@@ -49,14 +49,26 @@ class PRPPose(NamedTuple):
     units: tuple[complex, complex] = (0j, 0j)  # û1 and û2 of a `PRPDyad`
 
 
-class _CrossingLines:
+class _CrossingLines(Step):
     """Two lines on links of the coordinates ``arms``; at equal ones ``across`` is e^{iδ}."""
 
     __slots__ = ('_across', 'arms')
 
+    has_transmission_angle = True
+
     def __init__(self, arms: tuple[int, int], across: complex) -> None:
         self.arms = arms
         self._across = across
+
+    @property
+    def span(self) -> _CrossingLines:
+        """Return its lines."""
+        return self
+
+    @property
+    def crosses(self) -> tuple[bool, bool]:
+        """Return that neither side is left where the lines are parallel."""
+        return False, False
 
     @property
     def singular_angles(self) -> tuple[float, ...]:

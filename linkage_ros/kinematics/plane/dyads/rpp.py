@@ -28,7 +28,7 @@ from typing import NamedTuple
 from linkage_ros.kinematics.arithmetic import cross_product
 from linkage_ros.kinematics.plane.rail import PinOnRail, Rail
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState
+from linkage_ros.kinematics.step import LinkState, Step
 
 _STILL = (0.0, 0.0)
 
@@ -45,7 +45,7 @@ class RPPPose(NamedTuple):
     pin_on_rail: PinOnRail  # A in the frame of the link that carries the known line
 
 
-class RPPDyad:
+class RPPDyad(Step):
     """
     A link pinned at A on a link that slides on a line.
 
@@ -56,6 +56,8 @@ class RPPDyad:
     """
 
     __slots__ = ('_across', '_inner', '_offsets', '_outer', 'rail')
+
+    has_transmission_angle = True
 
     def __init__(
         self, rail: Rail, inner: complex, outer: complex, offsets: tuple[float, float]
@@ -94,6 +96,11 @@ class RPPDyad:
             pose.pin_on_rail, rates, solved, velocities, accelerations
         )
         self._append_slides(pull, _STILL, accelerations)
+
+    @property
+    def span(self) -> Rail:
+        """Return its rail."""
+        return self.rail
 
     def transmission_angle(self, _pose: RPPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""

@@ -126,6 +126,11 @@ class RPRDyad(TwoSided):
             pose.diagonal.square * (acceleration.relative_acceleration * lean + whirl * bend)
         )
 
+    @property
+    def span(self) -> AnyDiagonal:
+        """Return its diagonal."""
+        return self.diagonal
+
     def side_of(self, pose: RPRPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.slide

@@ -111,6 +111,11 @@ class RRPDyad(TwoSided):
         accelerations.coordinates.append(turn + change)
         accelerations.coordinates.append(pull.real + velocity.imag * link + y * change)
 
+    @property
+    def span(self) -> Rail:
+        """Return its rail."""
+        return self.rail
+
     def side_of(self, pose: RRPPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.along

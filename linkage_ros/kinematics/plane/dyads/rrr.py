@@ -131,6 +131,11 @@ class RRRDyad(TwoSided):
             pose, self._sign, self._difference, rate, acceleration, accelerations
         )
 
+    @property
+    def span(self) -> AnyDiagonal:
+        """Return its diagonal."""
+        return self.diagonal
+
     def side_of(self, pose: RRRPose) -> float:
         """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.cross

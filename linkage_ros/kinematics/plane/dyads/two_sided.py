@@ -13,11 +13,15 @@ from __future__ import annotations
 from copy import copy
 from typing import Any
 
+from linkage_ros.kinematics.step import Step
 
-class TwoSided:
+
+class TwoSided(Step):
     """A dyad that closes in two ways; its sign, +1 or −1, is its assembly."""
 
     __slots__ = ('_sign',)
+
+    has_transmission_angle = True
 
     def __init__(self, sign: int) -> None:
         self._sign = float(sign)
