@@ -363,7 +363,7 @@ def classes_with(method: str, *modules: ModuleType) -> set[type[Any]]:
         for one in vars(module).values()
         if isinstance(one, type)
         and one.__module__ == module.__name__
-        and hasattr(one, method)
+        and getattr(one, method, None) is not getattr(step.Step, method, None)
         and not getattr(one, '_is_protocol', False)
     }
 
