@@ -255,7 +255,6 @@ class SolutionPlan(SolvedLinks):
             crosses = self._change_points(dyad)
             return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
 
-<<<<<<< HEAD
         hinge = self._find_hinge(first.name, second.name)
         if hinge is not None:
             a, d, offset = swivel_lengths(hinge.a, hinge.d, offset)
@@ -263,11 +262,7 @@ class SolutionPlan(SolvedLinks):
         diagonal, base, upright = self._make_diagonal(
             dyad, hinge, (abs(offset), inf, inf), make_diagonal
         )
-        self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), diagonal, upright)
-=======
-        diagonal, base, upright = self._make_diagonal(dyad, (abs(offset), inf, inf), make_diagonal)
         self._add_two_sided(dyad, RPRDyad(diagonal, offset, 1), upright)
->>>>>>> 2c1e7b20 (Steps: what only some can has a default on Step, and none is asked by name)
         k = self.new_coordinates(2)
         self.angles[rail] = _link_angle(k, base, line.direction)
         self.angles[block] = self.angles[rail].rotate_by(line.angle)
