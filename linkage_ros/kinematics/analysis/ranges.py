@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from math import acos, asin, ceil, cos, floor, inf, lcm, pi, remainder, sqrt, tau
 from typing import Any, TYPE_CHECKING
 
@@ -25,7 +26,13 @@ from linkage_ros.kinematics.plane.diagonals import CrankDiagonal
 from linkage_ros.kinematics.plane.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.plane.linkage import Point
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
-from linkage_ros.kinematics.step import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
+from linkage_ros.kinematics.step import (
+    FixedPoint,
+    PLACED,
+    PointOnLink,
+    PointOnRail,
+    RelativeAngle,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.iterated.branch import Branch
@@ -178,13 +185,14 @@ def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputR
     if branch is None:
         return
     after = 1 + max(_iterating_steps(closure))
-    behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
     turning = not closure.linkage.inputs[0].slider
     unit = 1.0 if turning else closure.scale
     low, high, limited, turns, _ = branch.interval
     low, high = (-pi * turns, pi * turns) if turns else (low * unit, high * unit)
     parts = [(low, high)]
-    if behind:
+    poses = closure.close_unlimited(0.5 * (low + high)).poses
+    behind = zip_longest(closure.steps[after:], poses[after:])
+    if not all(pose is PLACED or isinstance(step, _CLOSE_EVERYWHERE) for step, pose in behind):
         count = _SAMPLES * max(1, ceil((high - low) / tau)) if turning else 4 * _SAMPLES
         parts = _search_intervals(closure, low, high, count)
         if turns:

@@ -12,46 +12,39 @@ The solution curve of links that Newton's method solves, followed without jumpin
 The n constraints F(u, x) = 0 on n unknowns u and one input x define a curve of points z = (u, x).
 The curve is followed by its length, so a toggle, where it turns back in x, is not a special point.
 A cell leads from one solution to the next; s is the distance along the tangent at its first node,
-and the cubic c(s) has the places and tangents of both nodes. A cell is accepted only if it is
-proven to hold one piece of curve. Let h be the width of the cell, B the Jacobian at c(h/2) of F
-and of the distance s, and δB a bound, entry by entry, of the change of B within the box around
-the cubic::
+and the cubic c(s) has the places and tangents of both nodes. Let B be the Jacobian of F and of s
+at c(s). A cell is accepted only if the theorem of Kantorovich proves at its quarters that c(s)
+leads to one solution::
 
-    |B⁻¹|·δB contracts: some w > 0 has |B⁻¹|·δB·w ≤ q·w, with q ≤ 0.6
-    |B⁻¹·(F(c(h/2)), 0)| is small compared with the box
+    η·ω ≤ 1/4    η = |B⁻¹·(F, 0)|, the first step of Newton's method    ω a bound of |B⁻¹·B'|
 
-Then B is regular in the whole box, and for each s the box holds at most one solution (Krawczyk's
-test: A. Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, theorem 5.1.8).
-Another assembly cannot be in the box, however near it comes. The bound over the unknowns comes
-from the sines and cosines themselves. The change of the known links within a cell is estimated
-from its ends and its middle, and the residual from the middle, where the residual of a cubic
-through both ends is largest.
+(≤ 1/2 is needed.) Had the cell led to another assembly, its cubic would lie between two solutions,
+and neither would be the only one near it. The bound over the unknowns comes from the lengths of
+the links; how the known links change B with x is estimated from the ends of the cell.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf, nextafter, remainder, sqrt, tau
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import UndecidedError, UNIT_ROUNDOFF
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError, UNIT_ROUNDOFF
+from linkage_ros.kinematics.batch import Array, Mask
 from linkage_ros.kinematics.built_once import BUILD_LOCK
-from linkage_ros.kinematics.iterated.equations import (
-    Array,
-    bound_jacobian_change,
-    Constraint,
-    evaluate_constraints,
-    is_meshed,
-)
 from linkage_ros.kinematics.iterated.start_table import StartRow
+from linkage_ros.kinematics.iterated.straight_line import list_numbers
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 import numpy as np
 
-_CONTRACTS = 0.6
-"""Largest accepted q; the step size aims at two thirds of it."""
+_PROVEN, _AIMED = 0.25, 0.1
+"""Largest η·ω that is accepted, and what the step size aims at: it grows with its 4th power."""
+
+_SECOND = 8.0
+"""How often the next step at most is in the unit of an unknown."""
 
 _LONGEST = 0.25
 _SHORTEST = 2.0**-36
@@ -63,6 +56,12 @@ _MOST_CELLS = 2**13
 _AWAY = 2.0**20
 """In lengths: links that are so far away, on lines that become parallel, do not come back."""
 
+_FAR, _STILL = 2.0**10, 2.0**-46
+"""In lengths: so far away they end where the input moves by less than this part of their way."""
+
+_AWAY_FROM_POSE = 32.0
+"""As often as far as in the pose, or as a length: there no start is looked for at any price."""
+
 _STRAIGHT = 0.25
 """Largest departure of the slope of x from a straight line in a cell, relative to its change."""
 
@@ -72,12 +71,6 @@ _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 _TOOTH = 1.0 / 16.0
 """Largest residual of a ratio at the start of a step, relative to its period; a step that is twice
 as long is off by four times as much, and so is refused before it could reach the next tooth."""
-
-KnownAt = Callable[[float], LinkState | None]
-"""State of the links solved before, at an input; None where they do not close."""
-
-RatesAt = Callable[[float], tuple[LinkState, LinkState] | None]
-"""State of the links solved before and its derivatives by the input; None if there are none."""
 
 _MOST_TURNS = 64
 _MOST_LAPS = 32
@@ -91,6 +84,34 @@ _LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
 
 _NEXT_TO_END = 2.0**-10
 """In [rad] or lengths: how far links may move while the links before are next to a toggle."""
+
+
+class Curve(Protocol):
+    """As many equations as unknowns, which one input moves; a place has the input after these."""
+
+    @property
+    def angles(self) -> Mask:
+        """Return for each unknown whether it is an angle; the others are lengths."""
+
+    def known_at(self, x: float) -> LinkState | None:
+        """Return the state of the links solved before; None where they do not close."""
+
+    def evaluate(self, place: Array) -> tuple[Array, Array] | None:
+        """
+        Return the residuals, and their derivatives by unknowns and input.
+
+        None where the links before have no rates.
+        """
+
+    def bound_changes(self, place: Array) -> Callable[[Array], Array]:
+        """
+        Return a function that bounds the change of the derivatives by unknowns, entry by entry.
+
+        It takes the largest change of each unknown from a place, in either direction.
+        """
+
+    def is_meshed(self, off: Array, part: float) -> bool:
+        """Return whether the residuals of ratios are off by less than a part of their periods."""
 
 
 class BranchNode(NamedTuple):
@@ -148,40 +169,37 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Continuation:
-    """Follows the solutions of constraints while one input changes."""
+    """Follows the solutions of equations while one input changes."""
 
-    constraints: Sequence[Constraint]  # As many equations as there are unknowns
-    # Functions that give the state of the links solved before.
-    known_at: KnownAt
-    rates_at: RatesAt
-    # Returns the residuals, and their derivatives by the unknowns and the input.
-    evaluate: Callable[[list[float], LinkState, LinkState], tuple[Array, Array]]
+    curve: Curve
 
     def first_node(self, unknowns: Array, x: float) -> BranchNode | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
-        system = self._evaluate_system(np.append(unknowns, x))
+        system = self.curve.evaluate(np.append(unknowns, x))
         if system is None:
             return None
         _, slopes = system
         tangent = np.linalg.svd(slopes)[2][-1]
         return BranchNode(np.append(unknowns, x), tangent if tangent[-1] >= 0.0 else -tangent)
 
+    def farthest(self, node: BranchNode) -> float:
+        """Return the largest length among the unknowns."""
+        return float(np.abs(node.place[:-1][~self.curve.angles]).max(initial=0.0))
+
     def is_isolated(self, node: BranchNode, away: Array) -> bool:
         """Return whether a node's solution is the only one at its input within a distance."""
-        solved = self.known_at(float(node.place[-1]))
-        if solved is None:
+        system = self.curve.evaluate(node.place)
+        change = self.curve.bound_changes(node.place)(away)
+        if system is None:
             return False
-        unknowns = node.place[:-1]
-        still = LinkState([0.0] * len(solved[0]), [0j] * len(solved[1]))
-        slopes = np.array(evaluate_constraints(self.constraints, unknowns.tolist(), solved)[1])
-        if not is_meshed(self.constraints, (np.abs(slopes) @ away).tolist(), 0.25):
+        slopes = system[1][:, :-1]
+        if not self.curve.is_meshed(np.abs(slopes) @ away, 0.25):
             return False
         try:
             inverse = np.linalg.inv(slopes)
         except np.linalg.LinAlgError:
             return False
-        change = bound_jacobian_change(self.constraints, unknowns, solved, away, still)
-        return _spectral_bound(np.abs(inverse) @ change) < 1.0
+        return bool((np.abs(inverse) @ change).sum(axis=1).max() < 1.0)
 
     def follow_cells(self, node: BranchNode, sign: float, last: float) -> Iterator[Cell]:
         """
@@ -195,8 +213,8 @@ class Continuation:
         step = 2.0**-5
         count = 0
         while sign * (last - node.place[-1]) > 0.0 and count < _MOST_CELLS:
-            far = float(max(np.abs(node.place[1:-1:3]).max(), np.abs(node.place[2:-1:3]).max()))
-            if far > _AWAY:
+            far = self.farthest(node)
+            if far > _AWAY or (far > _FAR and abs(node.tangent[-1]) < _STILL):
                 return
             step = min(step, _LONGEST * max(1.0, far))
             left = sign * (last - node.place[-1])
@@ -245,10 +263,10 @@ class Continuation:
         facing = float(tangent @ end.tangent)
         if facing < 0.5 or cell.width <= 0.0 or not self._turns_at_most_once(cell):
             return None, 0.5
-        contraction = self._contraction_factor(cell)
-        if not contraction <= _CONTRACTS:
-            return None, max(0.1, min(0.5, 0.6 * _CONTRACTS / contraction))
-        return cell, min(2.0, 0.67 * _CONTRACTS / max(contraction, 1e-3))
+        proof = self._proof(cell)
+        if not proof <= _PROVEN:
+            return None, max(0.1, min(0.7, (_AIMED / proof) ** 0.25))
+        return cell, min(2.0, (_AIMED / max(proof, SMALLEST)) ** 0.25)
 
     def _turns_at_most_once(self, cell: Cell) -> bool:
         """Return whether x changes in one direction within a cell, or turns back only once."""
@@ -257,46 +275,59 @@ class Continuation:
         most = max(min(abs(begin), abs(end)), abs(begin - end))
         return bool(abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most)
 
-    def _contraction_factor(self, cell: Cell) -> float:
-        """Return q of a cell; infinite where its middle is a poor approximation."""
-        control = cell.control_points()
-        middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
-        moved = np.abs(control - middle).max(axis=0)
-        at = float(middle[-1])
-        known_rates = self.rates_at(at)
-        if known_rates is None:
-            return inf
-        known, speeds = known_rates
-        n = len(middle) - 1
-        errors, slopes = self._evaluate_constraints(middle, known, speeds)
-        matrix = np.vstack([slopes, cell.begin.tangent])
+    def _proof(self, cell: Cell) -> float:
+        """Return η·ω, the largest at the quarters of a cell; infinite where there is none."""
+        worst, bends = 0.0, None
+        for part in (0.5, 0.25, 0.75):  # Where it fails first
+            place = cell.point_at(part)
+            system = self.curve.evaluate(place)
+            if bends is None and system is not None:
+                bends = self._bends_by_input(cell, place, system[1])
+            if system is None or bends is None:
+                return inf
+            proof = self._proof_at(place, *system, cell.begin.tangent, bends)
+            if not proof <= _PROVEN:
+                return proof
+            worst = max(worst, proof)
+        return worst
+
+    def _bends_by_input(self, cell: Cell, middle: Array, slopes: Array) -> Array | None:
+        """Return how fast the derivatives change with the input, from the ends of a cell."""
+        found = np.zeros_like(slopes)
+        for end in cell[:2]:
+            beside = np.append(middle[:-1], end.place[-1])
+            there, way = self.curve.evaluate(beside), float(abs(end.place[-1] - middle[-1]))
+            if there is None:
+                return None
+            if way:
+                found = np.maximum(found, np.abs(there[1] - slopes) / way)
+        return found
+
+    def _proof_at(
+        self, place: Array, errors: Array, slopes: Array, row: Array, bends: Array
+    ) -> float:
+        """
+        Return η·ω of Kantorovich's theorem at a place, along a row; infinite where there is none.
+
+        As in `GridGroup.proof` the better of two units counts.
+        """
+        n = len(errors)
         try:
-            inverse = np.linalg.inv(matrix)
+            inverse = np.linalg.inv(np.vstack([slopes, row]))
         except np.linalg.LinAlgError:
             return inf
-        off = np.abs(inverse[:, :n] @ errors)
-        moved += 5.0 * off.max()
-        change = np.zeros((n + 1, n + 1))
-        ends = [self.known_at(float(node.place[-1])) for node in cell[:2]]
-        ways = [_state_distances(known, end) for end in ends if end is not None]
-        if len(ways) < 2:
-            return inf
-        largest_change = LinkState(
-            np.max([w[0] for w in ways], axis=0).tolist(),
-            np.max([w[1] for w in ways], axis=0).tolist() if ways[0][1] else [],
-        )
-        change[:n, :n] = bound_jacobian_change(
-            self.constraints, middle[:n], known, moved[:n], largest_change
-        )
-        for node in cell[:2]:
-            system = self._evaluate_system(node.place)
-            if system is None:
-                return inf
-            slope = system[1][:, -1]
-            change[:n, -1] = np.maximum(change[:n, -1], np.abs(slope - slopes[:, -1]))
-        if off.max() > 0.1 * float(np.abs(control[3] - control[0]).max()):
-            return inf
-        return _spectral_bound(np.abs(inverse) @ change)
+        steps = np.abs(inverse[:, :n] @ errors) + SMALLEST
+        inverse, bound_change = np.abs(inverse[:, :n]), self.curve.bound_changes(place)
+
+        def changes_within(units: Array) -> Array:
+            """Return how much the step may change by these changes."""
+            own, by = units[:n], float(units[n])
+            mixed, alone = bends[:, :n] @ own, bends[:, n]
+            return inverse @ (bound_change(own) @ own + by * (2.0 * mixed + by * alone))
+
+        even = np.full(n + 1, steps.max())
+        fitted = steps + _SECOND * changes_within(steps)
+        return min(float((changes_within(units) / units).max()) for units in (even, fitted))
 
     def _fold_cell(self, cell: Cell) -> Cell:
         """Return the part of a cell before the point where x turns back."""
@@ -324,27 +355,27 @@ class Continuation:
         return Cell(cell.begin, end, float(tangent @ (end.place - z)), True)
 
     def _make_node(self, place: Array, ahead: Array) -> BranchNode | None:
-        system = self._evaluate_system(place)
+        system = self.curve.evaluate(place)
         if system is None:
             return None
         right = np.zeros(len(place))
         right[-1] = 1.0
         try:
-            tangent = np.linalg.solve(np.vstack([system[1], ahead]), right)
+            found = np.linalg.solve(np.vstack([system[1], ahead]), right)
         except np.linalg.LinAlgError:
             return None
-        return BranchNode(place, tangent / sqrt(float(tangent @ tangent)))
+        return BranchNode(place, np.asarray(found / sqrt(float(found @ found)), np.float64))
 
     def _correct_onto(self, start: Array, row: Array, goal: float) -> Array | None:
         """Return the solution at which a linear combination of the coordinates has a value."""
         place, last = start, inf
         size = 1.0 + float(np.abs(start).max())
         for _ in range(12):
-            system = self._evaluate_system(place)
+            system = self.curve.evaluate(place)
             if system is None:
                 return None
             errors, slopes = system
-            if last == inf and not is_meshed(self.constraints, np.abs(errors).tolist(), _TOOTH):
+            if last == inf and not self.curve.is_meshed(np.abs(errors), _TOOTH):
                 return None
             right = np.append(-errors, goal - float(row @ place))
             try:
@@ -360,34 +391,17 @@ class Continuation:
             place, last = place + step, length
         return None
 
-    def _evaluate_system(self, place: Array) -> tuple[Array, Array] | None:
-        """Return the residuals, and their derivatives by the unknowns and the input."""
-        known_rates = self.rates_at(float(place[-1]))
-        return None if known_rates is None else self._evaluate_constraints(place, *known_rates)
 
-    def _evaluate_constraints(
-        self, place: Array, solved: LinkState, velocities: LinkState
-    ) -> tuple[Array, Array]:
-        return self.evaluate(place[:-1].tolist(), solved, velocities)
-
-
-def _state_distances(one: LinkState, other: LinkState) -> tuple[list[float], list[float]]:
-    return (
-        [abs(a - b) for a, b in zip(one[0], other[0], strict=True)],
-        [abs(a - b) for a, b in zip(one[1], other[1], strict=True)],
-    )
-
-
-def _spectral_bound(matrix: Array) -> float:
-    """Return an upper bound of the spectral radius of a non-negative matrix."""
-    weights = np.ones(len(matrix))
-    bound = inf
-    for _ in range(12):
-        new = matrix @ weights
-        bound = min(bound, float((new / weights).max()))
-        weights = new + 1e-6 * float(new.max()) + 1e-300
-        weights /= weights.max()
-    return bound
+def is_repeated(one: LinkState | None, other: LinkState | None) -> bool:
+    """Return whether the links before are in one place at two inputs, whole turns apart."""
+    if one is None or other is None:
+        return False
+    # That a slide differs by a whole number of turns by chance is one in 10⁹.
+    angles = [remainder(a - b, tau) for a, b in zip(one[0], other[0], strict=True)]
+    if max(map(abs, angles)) > _SAME * (1.0 + max(map(abs, one[0]))):
+        return False
+    places = zip(list_numbers(one[1]), list_numbers(other[1]), strict=True)
+    return max((abs(a - b) for a, b in places), default=0.0) <= _SAME
 
 
 # The branch of one input is a function of the unwrapped input. It ends where the curve of
@@ -458,9 +472,6 @@ class Branch:
     the input the constraints are the same; 0 if they never are.
     """
 
-    __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_repeated_turns', '_sides',
-                 '_turning', '_turns', '_x', 'interval')  # fmt: skip
-
     def __init__(
         self,
         continuation: Continuation,
@@ -473,11 +484,11 @@ class Branch:
     ) -> None:
         self._repeated_turns = repeated_turns
         self._continuation = continuation
-        self._known_at = continuation.known_at
+        self._known_at = continuation.curve.known_at
         self._turning = turning
         self._far = far
         self._x = x
-        node = continuation.first_node(unknowns, x)
+        self._node = node = continuation.first_node(unknowns, x)
         self._sides = tuple(_BranchSide(node, sign) for sign in (-1.0, 1.0)) if node else ()
         self._turns = 0
         self._gained = np.zeros_like(unknowns)
@@ -512,10 +523,10 @@ class Branch:
         return Start(cell.point_at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
 
     @property
-    def gained_angles(self) -> list[float]:
-        """Return the change of the unknowns' angles before the branch starts again, in [rad]."""
-        gained: list[float] = self._gained[0::3].tolist()
-        return gained
+    def gained(self) -> list[float]:
+        """Return the turns of the unknowns before the branch starts again, in [rad]."""
+        found: list[float] = self._gained.tolist()
+        return found
 
     def unwrap(self, x: float) -> tuple[int, float]:
         """Return how often the branch has started again, and the input without these turns."""
@@ -545,7 +556,7 @@ class Branch:
 
     def pieces(self) -> list[StartRow]:
         """Return the pieces of the branch between the nodes, in ascending order."""
-        if not self._sides:
+        if self._node is None:
             return []
         back, ahead = self._sides
         inputs = [-x for x in reversed(back.inputs)] + [self._x] + ahead.inputs
@@ -558,9 +569,12 @@ class Branch:
             else x
             for k, x in enumerate(inputs)
         ]
+        cells = [*reversed(back.cells), *ahead.cells]
         folds = [-float(cell.folds) for cell in reversed(back.cells)]
         folds += [float(cell.folds) for cell in ahead.cells]
-        return list(map(StartRow, ends, ends[1:], folds))
+        far = _AWAY_FROM_POSE * max(1.0, self._continuation.farthest(self._node))
+        away = [self._continuation.farthest(cell.end) > far for cell in cells]
+        return list(map(StartRow, ends, ends[1:], folds, away))
 
     def nearest_end(self, x: float) -> Array | None:
         """Return the unknowns at the end of the branch that an input lies behind."""
@@ -635,19 +649,11 @@ class Branch:
 
     def _comes_back(self, first: BranchNode, side: _BranchSide) -> bool:
         """Return whether a side has come back; if so, set the turns and the angles gained."""
-        begun, now = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
-        if begun is None or now is None:
-            return False
-        # That a slide differs by a whole number of turns by chance is one in 10⁹.
-        (x, pins), (x_now, pins_now) = begun, now
-        angles = (remainder(a - b, tau) for a, b in zip(x, x_now, strict=True))
-        if max(map(abs, angles)) > _SAME * (1.0 + abs(self._x)):
-            return False
-        if max((abs(a - b) for a, b in zip(pins, pins_now, strict=True)), default=0.0) > _SAME:
+        now = float(side.node.place[-1])
+        if not is_repeated(self._known_at(self._x), self._known_at(now)):
             return False
         moved = side.node.place[:-1] - first.place[:-1]
-        gained = np.zeros_like(moved)
-        gained[0::3] = tau * np.round(moved[0::3] / tau)
+        gained = np.where(self._continuation.curve.angles, tau * np.round(moved / tau), 0.0)
         away = np.abs(moved - gained)
         if not self._continuation.is_isolated(first, away):
             return False

@@ -29,13 +29,9 @@ from linkage_ros.kinematics.plane.linkage import Linkage, Ratio, RevoluteJoint, 
 from linkage_ros.kinematics.plane.solved_links import count_turns
 from linkage_ros.kinematics.plane.topology import Joint
 from linkage_ros.kinematics.step import LinkState
-import numpy as np
-from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.plane.solved_links import SolvedLinks
-
-Array = NDArray[np.floating[Any]]
 
 _WHOLE = 1e-9
 """Farthest that a number of turns, which comes from decimals, is from a whole one."""
@@ -163,7 +159,6 @@ class CoincidentPoints(NamedTuple):
         unknowns: Sequence[float],
         solved: LinkState,
         moved: Sequence[float],
-        known_moved: LinkState,
     ) -> list[list[float]]:
         """Return a bound of the change of the rows; see `bound_jacobian_change`."""
         across, along = [0.0] * len(unknowns), [0.0] * len(unknowns)
@@ -288,15 +283,13 @@ class OnLine(NamedTuple):
         unknowns: Sequence[float],
         solved: LinkState,
         moved: Sequence[float],
-        known_moved: LinkState,
     ) -> list[list[float]]:
         """Return a bound of the change of the row; see `bound_jacobian_change`."""
         row = [0.0] * len(unknowns)
-        turn = self.line.rate(moved, known_moved)
+        turn = moved[3 * self.line.body] if self.line.body >= 0 else 0.0
         far = 0.0
         for end in (self.point, self.through):
             if end.body < 0:
-                far += float(abs(known_moved.pins[end.pin]))
                 continue
             k = 3 * end.body
             reach = abs(end.arm)
@@ -334,11 +327,12 @@ class Geared(NamedTuple):
 
     def bound_change(self, unknowns: Sequence[float], *given: Any) -> list[list[float]]:
         """Return a bound of the change of the row; see `bound_jacobian_change`."""
-        row = np.zeros(len(unknowns))
+        row = [0.0] * len(unknowns)
         for factor, of in self.terms:
             if isinstance(of, OnLine):
-                row += abs(factor) * np.array(of.bound_change(unknowns, *given)[0])
-        return [row.tolist()]
+                (own,) = of.bound_change(unknowns, *given)
+                row = [a + abs(factor) * b for a, b in zip(row, own, strict=True)]
+        return [row]
 
 
 Constraint = CoincidentPoints | Parallel | OnLine | Geared
@@ -361,19 +355,17 @@ def differentiate_constraints(
 
 def bound_jacobian_change(
     constraints: Sequence[Constraint],
-    unknowns: Array,
+    unknowns: Sequence[float],
     solved: LinkState,
-    moved: Array,
-    known_moved: LinkState,
-) -> Array:
+    moved: Sequence[float],
+) -> list[list[float]]:
     """
     Return a bound of the change of the derivatives by the unknowns, entry by entry.
 
-    ``moved`` is the largest change of each unknown, in either direction; ``known_moved`` the
-    largest change of each known coordinate and pin.
+    ``moved`` is the largest change of each unknown, in either direction.
     """
-    given = unknowns.tolist(), solved, moved.tolist(), known_moved
-    return np.array([row for constraint in constraints for row in constraint.bound_change(*given)])
+    given = unknowns, solved, moved
+    return [row for constraint in constraints for row in constraint.bound_change(*given)]
 
 
 def is_meshed(constraints: Sequence[Constraint], off: Sequence[float], part: float) -> bool:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, islice, product
-from math import copysign, inf, isfinite, ldexp, prod, tau
+from math import copysign, inf, isfinite, isinf, ldexp, prod, tau
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.generated_code import define_function
@@ -74,12 +74,17 @@ Key = tuple[int, ...]
 
 
 class GridInput(NamedTuple):
-    """An input: its value in the pose, its limits, and whether it turns without any."""
+    """An input: its value in the pose, its limits, and whether it is an angle."""
 
     home: float
     low: float
     high: float
-    turns: bool
+    is_angle: bool
+
+    @property
+    def turns(self) -> bool:
+        """Return whether it turns without limits."""
+        return self.is_angle and isinf(self.low) and isinf(self.high)
 
 
 def grid_inputs(
@@ -89,8 +94,7 @@ def grid_inputs(
     found = []
     for given, home in zip(inputs, pose, strict=True):
         unit, limits = scale if given.slider else 1.0, given.limits
-        turns = not given.slider and not limits.is_bounded
-        found.append(GridInput(home, limits.low / unit, limits.high / unit, turns))
+        found.append(GridInput(home, limits.low / unit, limits.high / unit, not given.slider))
     return tuple(found)
 
 

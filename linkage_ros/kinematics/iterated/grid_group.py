@@ -14,24 +14,27 @@ derivatives by the inputs. Each is straight-line code, with the steps before the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations_with_replacement, islice
 from math import inf
 from operator import mul
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.iterated.elimination import subtract
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput
+from linkage_ros.kinematics.iterated.group import (
+    compile_later,
+    Equations,
+    GroupPose,
+    IteratedGroup,
+    require_state,
+)
+from linkage_ros.kinematics.iterated.newton_system import NewtonSystem
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
-from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
-
-T = TypeVar('T')
-Solve = Callable[[Sequence[Any]], list[Any]]
 
 _SECOND = 8.0
 """How often the next step at most is in the unit of an unknown."""
@@ -52,43 +55,11 @@ _HALFWAY, _MOST_STEPS = 2.0**-21, 6
 """Sum of the last changes but one, whose square is a rounding; and most steps of the method."""
 
 
-class Equations(Protocol):
-    """As many equations as unknowns, for numbers and symbols; ``known`` has the steps before."""
-
-    def errors(self, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
-        """Return how far each equation is from being met."""
-
-    def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
-        """
-        Return the errors, and a function that solves with the matrix of their derivatives.
-
-        An UndecidedError is raised if that is singular.
-        """
-
-    def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
-        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
-
-    def solve_rates(
-        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the unknowns."""
-
-    def solve_accelerations(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        """Return the accelerations of the unknowns."""
-
-
-class GridGroup:
+class GridGroup(IteratedGroup):
     """
     Equations after the steps ``before``.
 
-    ``start`` has the unknowns in the pose, ``given_inputs`` are all inputs.
+    ``start`` has the free unknowns in the pose, ``given_inputs`` are all inputs.
     """
 
     def __init__(
@@ -96,44 +67,15 @@ class GridGroup:
         equations: Equations,
         before: StepsBefore,
         start: Sequence[float],
+        inputs: Sequence[int],
         given_inputs: Sequence[GridInput],
+        system: NewtonSystem,
     ) -> None:
-        self._given_inputs = given_inputs
-        self._equations, self._before, self._start = equations, before, tuple(start)
+        super().__init__(equations, before, start, inputs)
+        self._given_inputs, self._system = given_inputs, system
         given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
-
-        def compile_later(function: Callable[..., list[float]], *kinds: LinkState) -> StraightLine:
-            return StraightLine(function, lambda: kinds)
-
         self._system_line = compile_later(self._list_system, given, pose)
         self._forms_line = compile_later(self._list_forms, given, pose)
-        self._solution_line = compile_later(self._list_solution, given)
-        self._rates_line = compile_later(self._list_rates, given, pose, given)
-        self._accelerations_line = compile_later(
-            self._list_accelerations, given, pose, given, pose, given
-        )
-
-    @BuiltProperty
-    def inputs(self) -> tuple[int, ...]:
-        """Return the numbers of the inputs that the equations depend on."""
-        tape, count = Tape(), len(self._before.inputs)
-        given: list[Any] = [
-            tape.add_input(f'q{k}', value) for k, value in enumerate(self._before.inputs)
-        ]
-        try:
-            numbers: list[Any] = self._list_system(
-                LinkState(given, []), LinkState([*self._start], [])
-            )
-        except UndecidedError:
-            return tuple(range(count))
-        waiting = [number.operation for number in numbers if hasattr(number, 'operation')]
-        seen: set[Any] = set()
-        while waiting:
-            operation = waiting.pop()
-            if operation not in seen:
-                seen.add(operation)
-                waiting += operation.operands()
-        return tuple(k for k in range(count) if given[k].operation in seen)
 
     @BuiltProperty
     def grid(self) -> Grid:
@@ -157,44 +99,9 @@ class GridGroup:
             most = max(most, count)
         return most
 
-    def solution(self, solved: LinkState) -> Sequence[Any] | None:
-        """Return the unknowns; None where no straight line leads to them."""
-        if has_symbols(solved):
-            return self._straight_solution(solved)
-        return self._solution_line(self._inputs_of(solved))
-
-    def rates(
-        self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> Sequence[Any]:
-        """Return the rates of the unknowns."""
-        found = None
-        if not has_symbols(solved, velocities):
-            pose = LinkState([*unknowns], [])
-            found = self._rates_line(self._inputs_of(solved), pose, self._inputs_of(velocities))
-        return found or self._equations.solve_rates(solved, unknowns, velocities)
-
-    def accelerations(
-        self,
-        solved: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> Sequence[Any]:
-        """Return the accelerations of the unknowns."""
-        found = None
-        if not has_symbols(solved, velocities, changes):
-            known, moving, changing = map(self._inputs_of, (solved, velocities, changes))
-            pose, speeds = LinkState([*unknowns], []), LinkState([*rates], [])
-            found = self._accelerations_line(known, pose, moving, speeds, changing)
-        return found or self._equations.solve_accelerations(
-            solved, unknowns, velocities, rates, changes
-        )
-
-    def _inputs_of(self, state: LinkState) -> LinkState:
-        """Return the inputs of a state, or their derivatives."""
-        end = 1 + len(self._before.inputs)
-        return LinkState(state.coordinates[1:end], [])
+    def close_straight(self, known: LinkState) -> GroupPose:
+        """Return the links as straight lines; an UndecidedError is raised where none is."""
+        return self._pose_at(known, self._straight_solution(known))
 
     def _straight_solution(self, known: LinkState) -> list[Any]:
         """
@@ -215,31 +122,26 @@ class GridGroup:
             raise UndecidedError
         return [subtract(value, change) for value, change in zip(values, step, strict=True)]
 
-    def known_in_pose(self) -> LinkState:
-        """Return the state of the steps before, in the pose."""
-        return _require(self._before.known_at(self._before.inputs))
-
-    def close_slowly(
-        self, solved: LinkState, conditioning: Callable[[Sequence[float]], float]
-    ) -> tuple[Status, Sequence[float]]:
-        """
-        Return status and unknowns where no straight line leads to them, as next to a singularity.
-
-        If they are open, the unknowns are where the way to the inputs ends. ``conditioning`` is
-        that of the equations at unknowns.
-        """
+    def close_slowly(self, solved: LinkState) -> GroupPose:
+        """Return the links where no straight line leads to them, as next to a singularity."""
         inputs = [solved.coordinates[1 + k] for k in self.inputs]
         start = self.grid.find_start(inputs)
         if start is not None and (found := self.solve_from(inputs, start)) is not None:
-            return Status.CLOSED, found
+            return self._pose_at(solved, found)
         turned, gains = self.grid.turn_back(inputs)
         cell, left = self.grid.reach(turned)
-        unknowns = [value + gain for value, gain in zip(cell.unknowns, gains, strict=True)]
-        if not left:
-            regular = conditioning(unknowns) > _SINGULAR
-            return (Status.CLOSED if regular else Status.TOGGLE), unknowns
-        near = left <= _TOGGLE * (1.0 + max(map(abs, turned)))
-        return (Status.TOGGLE if near else Status.OPEN), unknowns
+        values = [value + gain for value, gain in zip(cell.unknowns, gains, strict=True)]
+        unknowns = self._equations.complete(values, solved)
+        if not left and self._system.conditioning(solved, unknowns) > _SINGULAR:
+            return self._pose_at(solved, values)
+        nearest, gap = self._system.nearest(solved, unknowns)
+        if left <= _TOGGLE * (1.0 + max(map(abs, turned))):
+            return GroupPose(Status.TOGGLE, nearest, [0.0] * len(nearest))
+        return GroupPose(Status.OPEN, nearest, (), gap)
+
+    def _pose_at(self, solved: LinkState, values: Sequence[Any]) -> GroupPose:
+        unknowns = self._equations.complete(values, solved)
+        return GroupPose(Status.CLOSED, unknowns, [0.0] * len(unknowns))
 
     # What the grid asks for; inputs on which nothing depends are as in the pose
 
@@ -311,7 +213,10 @@ class GridGroup:
 
     def _list_system(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return a step of Newton's method, the inverse by columns, and bounds by equations."""
-        known, count = _require(self._before.known_at(given.coordinates)), len(pose.coordinates)
+        known, count = (
+            require_state(self._before.known_at(given.coordinates)),
+            len(pose.coordinates),
+        )
         errors, solve = self._equations.linearize(known, pose.coordinates)
         found = solve(errors)
         for k in range(count):
@@ -344,32 +249,3 @@ class GridGroup:
                 alone = zip(squares[one, one], squares[other, other], strict=True)
                 bends += [0.5 * (value - a - b) for value, (a, b) in zip(both, alone, strict=True)]
         return [*slopes, *bends]
-
-    def _list_solution(self, given: LinkState) -> list[Any]:
-        return self._straight_solution(_require(self._before.known_at(given.coordinates)))
-
-    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
-        states = self._before.moving_at(given.coordinates, rates.coordinates)
-        known, velocities = _require(states)
-        return self._equations.solve_rates(known, pose.coordinates, velocities)
-
-    def _list_accelerations(
-        self,
-        given: LinkState,
-        pose: LinkState,
-        rates: LinkState,
-        speeds: LinkState,
-        accelerations: LinkState,
-    ) -> list[Any]:
-        states = self._before.changing_at(*(x.coordinates for x in (given, rates, accelerations)))
-        known, velocities, changes = _require(states)
-        return self._equations.solve_accelerations(
-            known, pose.coordinates, velocities, speeds.coordinates, changes
-        )
-
-
-def _require(found: T | None) -> T:
-    """Return what the steps before have; UndecidedError is raised where they have none."""
-    if found is None:
-        raise UndecidedError
-    return found

@@ -18,6 +18,7 @@ the places are the constants 1 and −1, which the elimination takes first.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import prod
 from typing import Any, NamedTuple
 
@@ -25,16 +26,17 @@ from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.iterated.bend_bounds import ArmSums, list_bounds
 from linkage_ros.kinematics.iterated.elimination import Elimination, is_zero, subtract
 from linkage_ros.kinematics.iterated.equations import (
+    bound_jacobian_change,
     CoincidentPoints,
     Constraint,
     differentiate_constraints,
     End,
     evaluate_constraints,
     GroupMotion,
+    is_meshed,
 )
+from linkage_ros.kinematics.iterated.group import Solve
 from linkage_ros.kinematics.step import LinkState
-
-Solve = Callable[[Sequence[Any]], list[Any]]
 
 
 class _PlacedBody(NamedTuple):
@@ -74,7 +76,12 @@ class GroupEquations:
             for axis in (0, 1)
         ]
 
-    def place_bodies(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
+    @property
+    def angles(self) -> list[bool]:
+        """Return for each of all unknowns whether it is an angle."""
+        return [not k % 3 for k in range(self._count)]
+
+    def complete(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
         """Return all unknowns, from those that are free."""
         unknowns: list[Any] = [0.0] * self._count
         for k, value in zip(self.free, values, strict=True):
@@ -89,13 +96,13 @@ class GroupEquations:
 
     def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:
         """Return how far the equations are from being met."""
-        unknowns = self.place_bodies(values, known)
+        unknowns = self.complete(values, known)
         errors, _ = evaluate_constraints(self._constraints, unknowns, known)
         return [errors[row] for row in self._closing]
 
     def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
         """Return the errors, and a function that solves with the matrix of their derivatives."""
-        unknowns = self.place_bodies(values, known)
+        unknowns = self.complete(values, known)
         errors, jacobian = evaluate_constraints(self._constraints, unknowns, known)
         eliminated = Elimination(jacobian, self._unit_pivots)
         divisors = eliminated.divisors
@@ -113,7 +120,7 @@ class GroupEquations:
 
     def bound_bends(self, number: int, known: LinkState, values: Sequence[Any]) -> list[Any]:
         """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
-        unknowns = self.place_bodies(values, known)
+        unknowns = self.complete(values, known)
         bounds = self._sums.bound_bends(self._closing_constraints[number], unknowns, known)
         return list_bounds(bounds, self.free)
 
@@ -121,7 +128,7 @@ class GroupEquations:
         self, known: LinkState, values: Sequence[Any], velocities: LinkState
     ) -> list[Any]:
         """Return the rates of the free unknowns."""
-        rates = self._all_rates(known, self.place_bodies(values, known), velocities)
+        rates = self._all_rates(known, self.complete(values, known), velocities)
         return [rates[k] for k in self.free]
 
     def solve_accelerations(
@@ -133,10 +140,37 @@ class GroupEquations:
         changes: LinkState,
     ) -> list[Any]:
         """Return the accelerations of the free unknowns."""
-        unknowns, still = self.place_bodies(values, known), [0.0] * self._count
+        unknowns, still = self.complete(values, known), [0.0] * self._count
         rates = self._all_rates(known, unknowns, velocities)
         found = self.solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
         return [found[k] for k in self.free]
+
+    # All equations, as functions of all unknowns; see `BranchGroup` and `NewtonSystem`
+
+    def evaluate(
+        self, known: LinkState, unknowns: Sequence[Any]
+    ) -> tuple[list[Any], list[list[Any]]]:
+        """Return the residuals, and their derivatives by the unknowns, as rows."""
+        return evaluate_constraints(self._constraints, unknowns, known)
+
+    def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
+        """Return the derivatives of the residuals by time while the unknowns stand."""
+        motion = GroupMotion(unknowns, known, [0.0] * self._count, velocities)
+        return differentiate_constraints(self._constraints, motion)
+
+    def error_units(self, _known: LinkState) -> list[float]:
+        """Return for each residual by what it is divided to be a length."""
+        return [1.0] * self._count
+
+    def bound_changes(
+        self, known: LinkState, unknowns: Sequence[float]
+    ) -> Callable[[Sequence[float]], list[list[float]]]:
+        """Return a function that bounds the change of the derivatives by unknowns."""
+        return partial(bound_jacobian_change, self._constraints, unknowns, known)
+
+    def is_meshed(self, off: Sequence[float], part: float) -> bool:
+        """Return whether the residuals of ratios are off by less than a part of their periods."""
+        return is_meshed(self._constraints, off, part)
 
     def _all_rates(
         self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState

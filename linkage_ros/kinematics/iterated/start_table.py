@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.arithmetic import call, sqrt as root_of, where
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.iterated.equations import Array
+    from linkage_ros.kinematics.batch import Array
 
 _DIGITS = 24
 """Binary digits of the numbers of a row, relative to the largest change in it."""
@@ -53,6 +53,7 @@ class StartRow(NamedTuple):
     low: float
     high: float
     folds: float  # −1 or 1 if the branch turns back at the low or the high end, otherwise 0
+    is_away: bool = False  # Whether links are far away there
 
 
 class StartTable:
@@ -99,7 +100,9 @@ def make_start_table(
     """
     ends, rows = [], []
     for piece in pieces:
-        for end, row in _fit_rows(piece, solution_at, converges, 0):
+        # There are hundreds of them, and no motion leads through them.
+        depth = _DEEPEST if piece.is_away else 0
+        for end, row in _fit_rows(piece, solution_at, converges, depth):
             ends.append(end)
             rows.append(row)
     if not any(row[3] for row in rows):
@@ -118,7 +121,7 @@ def _fit_rows(
     """Yield the end and the numbers of each row of a piece."""
     import numpy as np  # local import: sources of linkages need only the table
 
-    low, high, folds = piece
+    low, high, folds, _ = piece
     begin, length = (high, low - high) if folds > 0.0 else (low, high - low)
 
     def input_at(part: float) -> float:

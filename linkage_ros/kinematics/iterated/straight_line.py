@@ -28,14 +28,14 @@ class StraightLine:
     would decide otherwise.
     """
 
-    __slots__ = ('_examples', '_function', '_line')
+    __slots__ = ('_examples', '_line', 'function')
 
     def __init__(
         self,
         function: Callable[..., Sequence[Any]],
         examples: Callable[[], Sequence[LinkState] | None],
     ) -> None:
-        self._function = function
+        self.function = function
         self._examples = examples
         self._line: Callable[..., Any] | None = None
 
@@ -60,7 +60,7 @@ class StraightLine:
         def compute(*numbers: Any) -> Sequence[Any]:
             given = zip(numbers, values, varying, strict=True)
             left = iter([number if varies else value for number, value, varies in given])
-            return self._function(*(_fill_numbers(state, left) for state in states))
+            return self.function(*(_fill_numbers(state, left) for state in states))
 
         try:
             return compile_line(compute, values)

@@ -25,7 +25,7 @@ from linkage_ros.kinematics.plane.topology import Iterated
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.iterated.equations import Array
+    from linkage_ros.kinematics.batch import Array
     from linkage_ros.kinematics.plane.closure import Closure
 
 STARTS = 400
@@ -72,7 +72,7 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
 
 def _search_solutions(step: Iteration) -> list[Array]:
     """Return the solutions at the pose's inputs, first the pose itself."""
-    first = step.solution()
+    first = step.solution
     if first is None:
         return []
     solutions = [first]

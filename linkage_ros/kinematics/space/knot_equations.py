@@ -14,15 +14,16 @@ places on two links. All functions take numbers or symbols, and decide nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations_with_replacement
-from math import hypot, prod
+from math import hypot, inf, prod
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.iterated.elimination import Elimination
-from linkage_ros.kinematics.iterated.grid_group import Solve
+from linkage_ros.kinematics.iterated.group import Solve
+from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (
@@ -37,6 +38,9 @@ from linkage_ros.kinematics.step import LinkState
 
 _AMID = 1.3
 """Longest that a rod may be between two solutions, relative to its length."""
+
+_SHORTEST = 2.0**-6
+"""In lengths: the gap of a shorter rod is measured as that of one of this length."""
 
 _SLID = 0.25
 """How far a slide may move between two solutions, in lengths."""
@@ -91,20 +95,35 @@ class KnotEquations:
         self._movers, self.rods, self.first = tuple(movers), tuple(rods), first
         self._chains = [self._moving_chains(rod) for rod in rods]
         unknown = sorted((one for one in movers if one.unknown >= 0), key=lambda one: one.unknown)
-        self.turns = [not isinstance(one.joint, SlidePair) for one in unknown]
+        self.angles = [not isinstance(one.joint, SlidePair) for one in unknown]
         """For each unknown whether it is an angle."""
+        self.free = range(len(unknown))
+        """The unknowns that are solved for: all."""
+        self._bends_line = StraightLine(self._list_bends, lambda: None)
 
     def solve_rates(
         self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
     ) -> list[float]:
         """Return the rates of the unknowns: (C − B)·(Ċ − Ḃ) = L·L̇ for each rod."""
+        right = self._missing_rates(known, unknowns, velocities)
+        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
+
+    def drift(
+        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
+    ) -> list[float]:
+        """Return the derivatives of the residuals by time while the unknowns stand."""
+        return [-rate for rate in self._missing_rates(known, unknowns, velocities)]
+
+    def _missing_rates(
+        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
+    ) -> list[float]:
+        """Return what the unknowns must add to each rod's (C − B)·(Ċ − Ḃ)."""
         state = self.place_links(known, unknowns)
         still = self.add_motions(state, velocities, [0.0] * len(self.rods))
-        right = [
+        return [
             subtract(rod.rod.power(state, velocities), dot(vector, slip))
             for rod, vector, slip in self._slips(state, still)
         ]
-        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
 
     def solve_accelerations(
         self,
@@ -245,6 +264,45 @@ class KnotEquations:
                     found[one, other] = abs(dot(axis, (0.0, 0.0, 1.0)))
                 axis, other = joint.seat.turn(axis), joint.parent - self.first
         return found
+
+    def complete(self, values: Sequence[float], _known: LinkState) -> list[float]:
+        """Return all unknowns: those that are solved for."""
+        return [*values]
+
+    def error_units(self, known: LinkState) -> list[float]:
+        """Return for each residual by what it is divided to be a length: its rod's length."""
+        return [max(rod.rod.length(known), _SHORTEST) for rod in self.rods]
+
+    def is_meshed(self, _off: Sequence[float], _part: float) -> bool:
+        """Return whether no ratio is off by a tooth: there are none."""
+        return True
+
+    def bound_changes(
+        self, known: LinkState, unknowns: Sequence[float]
+    ) -> Callable[[Sequence[float]], list[list[float]]]:
+        """Return a function that bounds the change of the derivatives by unknowns."""
+        count = len(unknowns)
+        pairs = [*combinations_with_replacement(range(count), 2)]
+        found = self._bends_line(known, LinkState([*unknowns], []))
+        bends = found or [inf] * (count * len(pairs))
+
+        def bound_change(moved: Sequence[float]) -> list[list[float]]:
+            rows = [[0.0] * count for _ in range(count)]
+            for number, row in enumerate(rows):
+                of_row = bends[number * len(pairs) :]
+                for (one, other), bend in zip(pairs, of_row, strict=False):
+                    # The bound of two unknowns is one of both derivatives together.
+                    half = bend if one == other else 0.5 * bend
+                    row[one] += half * moved[other]
+                    if one != other:
+                        row[other] += half * moved[one]
+            return rows
+
+        return bound_change
+
+    def _list_bends(self, known: LinkState, pose: LinkState) -> list[float]:
+        found = (self.bound_bends(k, known, pose.coordinates) for k in range(len(self.rods)))
+        return [bend for bends in found for bend in bends]
 
     def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[float]) -> list[float]:
         """

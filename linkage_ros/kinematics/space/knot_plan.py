@@ -107,7 +107,10 @@ def add_knot(plan: SpacePlan) -> bool:
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
     given = grid_inputs(plan.linkage.inputs, before.inputs, plan.scale)
-    knot = Knot(KnotEquations(movers, rods, first), before, start, given, found.unknown)
+    knot = Knot(
+        KnotEquations(movers, rods, first), before, start, given, found.unknown,
+        (coordinates, first), plan.ratio_turns,
+    )  # fmt: skip
     plan.knots[len(plan.groups)] = knot
     plan.add_step(knot)
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))

@@ -1,0 +1,243 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""What is asked of equations that close only together, and what they answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from linkage_ros.kinematics.arithmetic import UndecidedError
+from linkage_ros.kinematics.compiling import Tape
+from linkage_ros.kinematics.iterated.steps_before import StepsBefore
+from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import LinkState
+
+T = TypeVar('T')
+Solve = Callable[[Sequence[Any]], list[Any]]
+
+
+class GroupPose(NamedTuple):
+    """The unknowns at a state, and what their angles gain by the turns before, in [rad]."""
+
+    status: Status
+    unknowns: Sequence[Any]
+    gained: Sequence[Any]
+    gap: float = 0.0  # If they do not close, in lengths
+
+
+class Equations(Protocol):
+    """
+    As many equations as unknowns, for numbers and symbols; ``known`` has the steps before.
+
+    Those of the ``free`` unknowns close loops; pins may give the others, the places of links.
+    """
+
+    def errors(self, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
+        """Return how far each equation is from being met."""
+
+    def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """
+        Return the errors, and a function that solves with the matrix of their derivatives.
+
+        An UndecidedError is raised if that is singular.
+        """
+
+    def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
+        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
+
+    def solve_rates(
+        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns."""
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns."""
+
+    # The same and those of pins, by all unknowns
+
+    def evaluate(
+        self, known: LinkState, unknowns: Sequence[Any]
+    ) -> tuple[list[Any], list[list[Any]]]:
+        """Return the errors, and their derivatives by the unknowns, as rows."""
+
+    def error_units(self, known: LinkState) -> Sequence[float]:
+        """Return for each error by what it is divided to be a length, in lengths."""
+
+    @property
+    def free(self) -> Sequence[int]:
+        """Return the indices of the unknowns that are solved for."""
+
+    @property
+    def angles(self) -> Sequence[bool]:
+        """Return for each of all unknowns whether it is an angle."""
+
+    def complete(self, values: Sequence[Any], known: LinkState) -> list[Any]:
+        """Return all unknowns, from those that are free."""
+
+    def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
+        """Return the derivatives of the errors by time while the unknowns stand."""
+
+    def bound_changes(
+        self, known: LinkState, unknowns: Sequence[float]
+    ) -> Callable[[Sequence[float]], Sequence[Sequence[float]]]:
+        """
+        Return a function that bounds the change of the derivatives by unknowns, entry by entry.
+
+        It takes the largest change of each unknown, in either direction.
+        """
+
+    def is_meshed(self, off: Sequence[float], part: float) -> bool:
+        """Return whether the errors of ratios are off by less than a part of their periods."""
+
+
+class IteratedGroup:
+    """
+    Equations after the steps ``before``, as a function of the inputs with the numbers ``inputs``.
+
+    ``start`` has unknowns in the pose. What takes numbers is straight-line code, with the steps
+    before in it.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        before: StepsBefore,
+        start: Sequence[float],
+        inputs: Sequence[int],
+    ) -> None:
+        self._equations, self._before, self._start = equations, before, tuple(start)
+        self.inputs = tuple(inputs)
+        given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
+        self._solution_line = compile_later(self._list_solution, given)
+        self._rates_line = compile_later(self._list_rates, given, pose, given)
+        self._accelerations_line = compile_later(
+            self._list_accelerations, given, pose, given, pose, given
+        )
+
+    def close_straight(self, known: LinkState) -> GroupPose:
+        """
+        Return the links as straight lines: without unknowns where they do not close.
+
+        All decisions are by symbols. Where they leave it open how the links lie, `UndecidedError`
+        is raised.
+        """
+        raise NotImplementedError
+
+    def close_slowly(self, known: LinkState) -> GroupPose:
+        """Return the links where straight lines do not lead to them, as next to a toggle."""
+        raise NotImplementedError
+
+    def close(self, solved: LinkState) -> GroupPose:
+        """Return the links."""
+        if has_symbols(solved):
+            return self.close_straight(solved)
+        numbers = self._solution_line(self._inputs_of(solved))
+        if numbers is None:
+            return self.close_slowly(solved)
+        count = len(numbers) // 2
+        return GroupPose(Status.CLOSED, numbers[:count], numbers[count:])
+
+    def rates(
+        self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> Sequence[Any]:
+        """Return the rates of the unknowns."""
+        found = None
+        if not has_symbols(solved, velocities):
+            pose = LinkState([*unknowns], [])
+            found = self._rates_line(self._inputs_of(solved), pose, self._inputs_of(velocities))
+        return found or self._equations.solve_rates(solved, unknowns, velocities)
+
+    def accelerations(
+        self,
+        solved: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> Sequence[Any]:
+        """Return the accelerations of the unknowns."""
+        found = None
+        if not has_symbols(solved, velocities, changes):
+            known, moving, changing = map(self._inputs_of, (solved, velocities, changes))
+            pose, speeds = LinkState([*unknowns], []), LinkState([*rates], [])
+            found = self._accelerations_line(known, pose, moving, speeds, changing)
+        return found or self._equations.solve_accelerations(
+            solved, unknowns, velocities, rates, changes
+        )
+
+    def _inputs_of(self, state: LinkState) -> LinkState:
+        """Return the inputs of a state, or their derivatives."""
+        end = 1 + len(self._before.inputs)
+        return LinkState(state.coordinates[1:end], [])
+
+    def _list_solution(self, given: LinkState) -> list[Any]:
+        known = require_state(self._before.known_at(given.coordinates))
+        pose = self.close_straight(known)
+        if pose.status is not Status.CLOSED:
+            raise UndecidedError
+        return [*pose.unknowns, *pose.gained]
+
+    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
+        states = self._before.moving_at(given.coordinates, rates.coordinates)
+        known, velocities = require_state(states)
+        return self._equations.solve_rates(known, pose.coordinates, velocities)
+
+    def _list_accelerations(
+        self,
+        given: LinkState,
+        pose: LinkState,
+        rates: LinkState,
+        speeds: LinkState,
+        accelerations: LinkState,
+    ) -> list[Any]:
+        states = self._before.changing_at(*(x.coordinates for x in (given, rates, accelerations)))
+        known, velocities, changes = require_state(states)
+        return self._equations.solve_accelerations(
+            known, pose.coordinates, velocities, speeds.coordinates, changes
+        )
+
+
+def find_inputs(
+    equations: Equations, before: StepsBefore, start: Sequence[float]
+) -> tuple[int, ...]:
+    """Return the numbers of the inputs that equations depend on; ``start`` is free unknowns."""
+    tape, count = Tape(), len(before.inputs)
+    given: list[Any] = [tape.add_input(f'q{k}', x) for k, x in enumerate(before.inputs)]
+    try:
+        waiting: list[Any] = equations.errors(require_state(before.known_at(given)), start)
+    except UndecidedError:
+        return tuple(range(count))
+    waiting = [number.operation for number in waiting if hasattr(number, 'operation')]
+    seen: set[Any] = set()
+    while waiting:
+        operation = waiting.pop()
+        if operation not in seen:
+            seen.add(operation)
+            waiting += operation.operands()
+    return tuple(k for k in range(count) if given[k].operation in seen)
+
+
+def compile_later(function: Callable[..., list[float]], *kinds: LinkState) -> StraightLine:
+    """Return a function as straight-line code, compiled at its first call for such states."""
+    return StraightLine(function, lambda: kinds)
+
+
+def require_state(found: T | None) -> T:
+    """Return what the steps before have; UndecidedError is raised where they have none."""
+    if found is None:
+        raise UndecidedError
+    return found
