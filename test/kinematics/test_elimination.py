@@ -9,6 +9,7 @@
 """Elimination without a decision by numbers: its accuracy, its structure, its line of code."""
 
 from collections.abc import Sequence
+from itertools import permutations
 import random
 
 from linkage_ros.kinematics import Closure, Elimination, StartTable
@@ -58,6 +59,24 @@ def test_it_is_as_accurate_as_the_rows_allow(size, zeros):
         rows = random_matrix(rng, size, zeros)
         right = [rng.gauss(0.0, 1.0) for _ in rows]
         assert error_of(rows, right, Elimination(rows, []).solve(right)) < 4.0 * size
+
+
+def test_entries_that_happen_to_be_0_keep_the_rows_of_others():
+    """Slides along the axes: the structure has all entries, the numbers are a permutation."""
+    rng = random.Random(5)
+
+    def solved(*numbers):
+        rows = [list(numbers[3 * k : 3 * k + 3]) for k in range(3)]
+        return Elimination(rows, []).solve(numbers[9:])
+
+    line = compile_line(solved, [rng.gauss(0.0, 1.0) for _ in range(12)])
+    for order in permutations(range(3)):
+        scales = [rng.uniform(0.1, 2.0) for _ in order]
+        entries = [scales[i] * (k == column) for i, column in enumerate(order) for k in range(3)]
+        right = [rng.gauss(0.0, 1.0) for _ in order]
+        (found,) = line(*entries, *right)
+        wanted = [right[order.index(k)] / scales[order.index(k)] for k in range(3)]
+        assert list(found) == pytest.approx(wanted, rel=1e-15)
 
 
 def test_constants_1_are_eliminated_without_rounding():

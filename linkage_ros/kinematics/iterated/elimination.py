@@ -96,9 +96,10 @@ class Elimination:
             pivot, *others = rows
             for other in others:
                 a, b = self._rows[pivot][column], self._rows[other][column]
-                # Where both are 0 the pivot is 0 as well, and nothing is divided by it.
+                # Where both are 0 the rows stay as they are: another one may have the pivot.
                 scale = 1.0 / (sqrt(a * a + b * b) + SMALLEST)
-                self._operate(_RowOperation(pivot, other, a * scale, b * scale), column)
+                along = (a + SMALLEST) * scale
+                self._operate(_RowOperation(pivot, other, along, b * scale), column)
             left.discard(pivot)
             self._pivots.append((pivot, column))
 
