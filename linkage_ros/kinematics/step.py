@@ -18,13 +18,10 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol, TYPE_CHECKING
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, unit_vector
 from linkage_ros.kinematics.status import Status
-
-if TYPE_CHECKING:
-    from linkage_ros.kinematics.iterated.grid import Grid
 
 
 class LinkState(NamedTuple):
@@ -131,8 +128,8 @@ class Step:
         return 0
 
     @property
-    def grid(self) -> Grid | None:
-        """Return the cells of several inputs, if it has some."""
+    def grid(self) -> Any:
+        """Return the `Grid` of several inputs; None if it has none."""
         return None
 
     @property

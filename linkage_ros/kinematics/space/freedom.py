@@ -15,6 +15,7 @@ if its dimensions meet them everywhere.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -57,13 +58,12 @@ class _MotionEquations:
         for name, joint in linkage.pair_joints.items():
             rows += self._joint_rows(joint, name in linkage.hinges)
         self.needed = 6 + 5 * len(linkage.pair_joints)
-        balls = [row for point in linkage.points for row in self._ball_rows(point)]
         ratios = [
             _without_unit(self.rate(name) - ratio.ratio * self.rate(ratio.of))[None]
             for name, ratio in linkage.ratios.items()
         ]
-        self.needed += 3 * len(balls) + len(ratios)
-        self.constraints: Array = np.vstack([*rows, *balls, *ratios])
+        self.needed += len(ratios)
+        self.constraints: Array = np.vstack([*rows, *self._ball_rows(), *ratios])
 
     def spin(self, link: str) -> Array:
         """Return the rows of the spin of a link."""
@@ -71,10 +71,13 @@ class _MotionEquations:
 
     def velocity(self, link: str, place: Vector) -> Array:
         """Return the rows of the velocity of a place on a link: v + ω × place."""
-        x, y, z = place
+        return self._of_link(link, _velocity_rows(place))
+
+    def _of_link(self, link: str, rows: Array) -> Array:
+        """Return rows in the six numbers of a link as rows in those of all."""
         first = 6 * self._links[link]
-        found = np.eye(3, self.size, first + 3)
-        found[:, first:][:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+        found = np.zeros((len(rows), self.size))
+        found[:, first : first + 6] = rows
         return found
 
     def rate(self, name: str) -> Array:
@@ -102,12 +105,19 @@ class _MotionEquations:
         velocity = self._relative_velocity(joint, scale(1.0 / self._carried.size, joint.at))
         return [across @ spin, velocity] if turns else [spin, across @ velocity]
 
-    def _ball_rows(self, point: str) -> Iterator[Array]:
-        carried, links = self._carried, self._carried.carriers.get(point, [])
-        for link in links[1:]:
-            if not _is_on_hinge(self._linkage, carried, point, {links[0], link}):
-                place = carried.places[point]
-                yield self.velocity(link, place) - self.velocity(links[0], place)
+    def _ball_rows(self) -> Iterator[Array]:
+        """Yield the rows of the balls between two links; count all equations as needed ones."""
+        carried, balls = self._carried, defaultdict[tuple[str, str], list[Array]](list)
+        for point in self._linkage.points:
+            first, *others = carried.carriers.get(point) or ('',)
+            for link in others:
+                if not _is_on_hinge(self._linkage, carried, point, {first, link}):
+                    balls[first, link].append(_velocity_rows(carried.places[point]))
+        for (first, link), rows in balls.items():
+            self.needed += 3 * len(rows)
+            # However many balls two links share: as many rows as a motion has numbers.
+            least = _least_rows(np.vstack(rows))
+            yield self._of_link(link, least) - self._of_link(first, least)
 
     def _relative_spin(self, joint: SpatialJoint) -> Array:
         return self.spin(joint.child) - self.spin(joint.parent)
@@ -120,12 +130,15 @@ def find_freedom(linkage: SpaceLinkage, carried: CarriedPoints) -> Freedom:
     """Return the degrees of freedom in the pose."""
     equations = _MotionEquations(linkage, carried)
     inputs = np.vstack([_without_unit(equations.rate(name)) for name in linkage.driven])
-    driven = np.vstack([equations.constraints, inputs])
+    constraints = _least_rows(equations.constraints)
+    of_constraints, of_all = (
+        np.linalg.svd(rows)[1:] for rows in (constraints, np.vstack([constraints, inputs]))
+    )
     rods = carried.rods
 
     def judge(tolerance: float) -> Freedom:
-        rank, _ = _rank_and_motions(equations.constraints, tolerance)
-        locked, motions = _rank_and_motions(driven, tolerance)
+        rank, _ = _rank_and_motions(*of_constraints, tolerance)
+        locked, motions = _rank_and_motions(*of_all, tolerance)
 
         def moves(rows: Array) -> bool:
             return bool(np.abs(rows @ motions).max(initial=0.0) > _MOVES)
@@ -201,8 +214,19 @@ def _without_unit(row: Array) -> Array:
     return row / (np.abs(row).max() or 1.0)
 
 
-def _rank_and_motions(matrix: Array, tolerance: float) -> tuple[int, Array]:
-    """Return the rank of a matrix, and the vectors that it makes 0, as columns."""
-    _, values, rows = np.linalg.svd(matrix)
+def _velocity_rows(place: Vector) -> Array:
+    """Return the rows of the velocity of a place in the six numbers of its link."""
+    x, y, z = place
+    return np.array([[0, z, -y, 1, 0, 0], [-z, 0, x, 0, 1, 0], [y, -x, 0, 0, 0, 1]], dtype=float)
+
+
+def _least_rows(matrix: Array) -> Array:
+    """Return a matrix of the same singular values and motions without more rows than columns."""
+    found: Array = np.linalg.qr(matrix, mode='r') if matrix.shape[0] > matrix.shape[1] else matrix
+    return found
+
+
+def _rank_and_motions(values: Array, rows: Array, tolerance: float) -> tuple[int, Array]:
+    """Return the rank by singular values, and the vectors that the matrix makes 0, as columns."""
     rank = int(np.count_nonzero(values > tolerance * values[0]))
     return rank, rows[rank:].T

@@ -38,6 +38,10 @@ ONE_PLACE = 1e-6
 """Extent of axes that meet in one place but for rounding, in [m]."""
 
 
+_MOST_LINKS, _MOST_POINTS = 120, 10_000
+"""Most links, and most points of all links together: what moves is found in seconds."""
+
+
 @dataclass(frozen=True, slots=True)
 class SpatialJoint:
     """
@@ -169,6 +173,13 @@ class SpaceLinkage:
 
 def check_space_linkage(linkage: SpaceLinkage) -> None:
     """Refuse a linkage whose parts do not match; the error names the key of the part."""
+    links, points_of_all = len(linkage.link_names), sum(map(len, linkage.links.values()))
+    if links > _MOST_LINKS or points_of_all > _MOST_POINTS:
+        raise DefinitionError(
+            'links',
+            f'{links} with {points_of_all} points',
+            f'keep {_MOST_LINKS} links, and {_MOST_POINTS} points of links, at most',
+        )
     for link, points in linkage.links.items():
         for point in points:
             _check_name(f'links.{link}', point, 'point', linkage.points)

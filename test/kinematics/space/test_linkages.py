@@ -13,7 +13,9 @@ from random import Random
 
 import linkage_ros as lr
 from linkage_ros.description import parse_yaml, read_any_closure
-from linkage_ros.kinematics import Status
+from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
+from linkage_ros.kinematics.space.freedom import find_freedom, Freedom
+from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.resources import named_file, spatial_linkage_names
 from mpmath import mp, mpf
 import numpy as np
@@ -444,3 +446,29 @@ def test_a_point_at_three_distances_is_as_far_from_a_toggle_as_its_planes_are_ap
         assert margin.toggle_distance == pytest.approx(
             min(value - ends[0], ends[1] - value), abs=1e-12
         )
+
+
+def sharing_links(links, points):
+    """Return a hinged link, and others that share all of its points."""
+    random = Random(1)
+    places = {f'p{n}': tuple(random.uniform(-1.0, 1.0) for _ in range(3)) for n in range(points)}
+    hinge = SpatialJoint('ground', 'l0', (0.0, 0.0, 1.0))
+    carried = {f'l{n}': tuple(places) for n in range(links)}
+    return SpaceLinkage(places, carried, {'h': hinge}, {}, {}, ('h',), ())
+
+
+@pytest.mark.parametrize('points', [3, 4, 12, 40])
+@pytest.mark.parametrize('links', [2, 3, 8])
+def test_links_that_share_points_are_as_free_as_three_points_leave_them(links, points):
+    """Two bodies with three balls between them are one: whatever is beyond 6 is redundant."""
+    linkage = sharing_links(links, points)
+    freedom = find_freedom(linkage, SpacePlan(linkage, lambda _: False))
+    assert freedom == Freedom(1, (links - 1) * (3 * points - 6), (), 0)
+
+
+@pytest.mark.parametrize(('links', 'points'), [(120, 3), (60, 200)])
+def test_a_linkage_of_too_many_parts_is_refused_in_one_line(links, points):
+    with pytest.raises(lr.DefinitionError) as caught:
+        SpaceClosure(sharing_links(links, points))
+    told = f'links: {links + 1} with {links * points} points; keep 120 links, and 10000 points'
+    assert str(caught.value) == f'{told} of links, at most'
