@@ -182,9 +182,14 @@ from linkage_ros.kinematics.results import (
     SingularityMargin as SingularityMargin,
     Velocity as Velocity,
 )
+from linkage_ros.kinematics.space.carried_points import CarriedPoints as CarriedPoints
 from linkage_ros.kinematics.space.closure import (
     closure_in_pose as closure_in_pose,
     SpaceClosure as SpaceClosure,
+)
+from linkage_ros.kinematics.space.freedom import (
+    find_freedom as find_freedom,
+    Freedom as Freedom,
 )
 from linkage_ros.kinematics.space.linkage import (
     extent_of as extent_of,

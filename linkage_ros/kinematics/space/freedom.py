@@ -222,8 +222,9 @@ def _velocity_rows(place: Vector) -> Array:
 
 def _least_rows(matrix: Array) -> Array:
     """Return a matrix of the same singular values and motions without more rows than columns."""
-    found: Array = np.linalg.qr(matrix, mode='r') if matrix.shape[0] > matrix.shape[1] else matrix
-    return found
+    if matrix.shape[0] <= matrix.shape[1]:
+        return matrix
+    return np.asarray(np.linalg.qr(matrix, mode='r'))
 
 
 def _rank_and_motions(values: Array, rows: Array, tolerance: float) -> tuple[int, Array]:

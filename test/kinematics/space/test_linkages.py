@@ -13,9 +13,15 @@ from random import Random
 
 import linkage_ros as lr
 from linkage_ros.description import parse_yaml, read_any_closure
-from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
-from linkage_ros.kinematics.space.freedom import find_freedom, Freedom
-from linkage_ros.kinematics.space.plan import SpacePlan
+from linkage_ros.kinematics import (
+    CarriedPoints,
+    find_freedom,
+    Freedom,
+    SpaceClosure,
+    SpaceLinkage,
+    SpatialJoint,
+    Status,
+)
 from linkage_ros.resources import named_file, spatial_linkage_names
 from mpmath import mp, mpf
 import numpy as np
@@ -462,7 +468,7 @@ def sharing_links(links, points):
 def test_links_that_share_points_are_as_free_as_three_points_leave_them(links, points):
     """Two bodies with three balls between them are one: whatever is beyond 6 is redundant."""
     linkage = sharing_links(links, points)
-    freedom = find_freedom(linkage, SpacePlan(linkage, lambda _: False))
+    freedom = find_freedom(linkage, CarriedPoints(linkage, 1.0))
     assert freedom == Freedom(1, (links - 1) * (3 * points - 6), (), 0)
 
 
