@@ -226,7 +226,7 @@ class BranchGroup(IteratedGroup):
         gained = [turns * by if by else 0.0 for by in branch.gained]
         return GroupPose(status, self._equations.complete(values, known), gained)
 
-    def close_slowly(self, known: LinkState) -> GroupPose:
+    def _find_slowly(self, known: LinkState) -> GroupPose:
         """Return the links where straight lines do not lead to them, as next to a toggle."""
         x, branch = known.coordinates[1 + self._followed.number], self.branch
         start = None if branch is None else branch.find_start(x)

@@ -122,7 +122,7 @@ class GridGroup(IteratedGroup):
             raise UndecidedError
         return [subtract(value, change) for value, change in zip(values, step, strict=True)]
 
-    def close_slowly(self, solved: LinkState) -> GroupPose:
+    def _find_slowly(self, solved: LinkState) -> GroupPose:
         """Return the links where no straight line leads to them, as next to a singularity."""
         inputs = [solved.coordinates[1 + k] for k in self.inputs]
         start = self.grid.find_start(inputs)

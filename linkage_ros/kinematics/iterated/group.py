@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from linkage_ros.kinematics.arithmetic import UndecidedError
+from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
@@ -21,6 +22,9 @@ from linkage_ros.kinematics.step import LinkState
 
 T = TypeVar('T')
 Solve = Callable[[Sequence[Any]], list[Any]]
+
+_REMEMBERED = 1024
+"""Most states that are kept, of those that straight lines do not lead to."""
 
 
 class GroupPose(NamedTuple):
@@ -121,6 +125,7 @@ class IteratedGroup:
     ) -> None:
         self._equations, self._before, self._start = equations, before, tuple(start)
         self.inputs = tuple(inputs)
+        self._slow: dict[tuple[float, ...], GroupPose] = {}
         given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
         self._solution_line = compile_later(self._list_solution, given)
         self._rates_line = compile_later(self._list_rates, given, pose, given)
@@ -137,19 +142,41 @@ class IteratedGroup:
         """
         raise NotImplementedError
 
-    def close_slowly(self, known: LinkState) -> GroupPose:
-        """Return the links where straight lines do not lead to them, as next to a toggle."""
-        raise NotImplementedError
-
     def close(self, solved: LinkState) -> GroupPose:
         """Return the links."""
         if has_symbols(solved):
             return self.close_straight(solved)
+        pose = self.remembered(solved)
+        if pose is not None:
+            return pose
         numbers = self._solution_line(self._inputs_of(solved))
         if numbers is None:
             return self.close_slowly(solved)
         count = len(numbers) // 2
         return GroupPose(Status.CLOSED, numbers[:count], numbers[count:])
+
+    def remembered(self, solved: LinkState) -> GroupPose | None:
+        """Return the links of a state that straight lines did not lead to before."""
+        return self._slow.get(self._key_of(solved))
+
+    def close_slowly(self, solved: LinkState) -> GroupPose:
+        """
+        Return the links where straight lines do not lead to them, as next to a toggle.
+
+        What is found is kept: a command beyond reach may last.
+        """
+        pose = self._find_slowly(solved)
+        with BUILD_LOCK:
+            if len(self._slow) >= _REMEMBERED:
+                del self._slow[next(iter(self._slow))]
+            self._slow[self._key_of(solved)] = pose
+        return pose
+
+    def _find_slowly(self, solved: LinkState) -> GroupPose:
+        raise NotImplementedError
+
+    def _key_of(self, solved: LinkState) -> tuple[float, ...]:
+        return tuple([solved.coordinates[1 + k] for k in self.inputs])
 
     def rates(
         self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState

@@ -148,8 +148,11 @@ class Iteration(Step):
 
     def close(self, solved: LinkState) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
+        group = self.group
         if has_symbols(solved):
             pose = self._close_straight(solved)
+        elif group is not None and (known := group.remembered(solved)) is not None:
+            pose = known
         elif (values := self._solution_line(solved)) is not None:
             self._append_solution(solved, values)
             return IteratedPose(Status.CLOSED, 0.0, values[: self.equation_count], solved)

@@ -1,0 +1,79 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""A state beyond reach is searched for once, however long its command lasts."""
+
+import random
+
+from linkage_ros.description import load
+from linkage_ros.kinematics import Closure, Status
+from linkage_ros.kinematics.iterated import group
+import pytest
+
+from .defects import defect
+from .platforms import linkage_of, platform
+
+
+def two_motors():
+    return load('ankle_motors'), (3.0, 3.0)
+
+
+def six_legs():
+    return load('hexapod'), (0.002,) * 6
+
+
+def one_crank():
+    return defect('class3_beyond_range'), (6.75324,)
+
+
+def one_slide():
+    closure = Closure(linkage_of(platform(random.Random(11), turning=False), random.Random(3)))
+    return closure, (closure.closing_ranges[0].highest + 0.3,)
+
+
+CASES = [two_motors, six_legs, one_crank, one_slide]
+
+
+def count_searches(monkeypatch):
+    """Return a list that grows by one with each search for a state."""
+    searches = []
+    for kind in group.IteratedGroup.__subclasses__():
+        find = kind._find_slowly
+
+        def search(self, solved, find=find):
+            searches.append(solved)
+            return find(self, solved)
+
+        monkeypatch.setattr(kind, '_find_slowly', search)
+    return searches
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_a_state_beyond_reach_is_searched_for_once(monkeypatch, case):
+    closure, beyond = case()
+    searches = count_searches(monkeypatch)
+    first = closure.close_unlimited(*beyond)
+    assert first.status is Status.OPEN
+    assert first.gap > 0.0
+    count = len(searches)
+    assert count
+    for _ in range(5):
+        assert closure.close_unlimited(*closure.linkage.pose.inputs).status is Status.CLOSED
+        again = closure.close_unlimited(*beyond)
+        assert (again.status, again.gap) == (first.status, first.gap)
+    assert len(searches) == count
+
+
+@pytest.mark.parametrize('case', CASES)
+def test_what_is_no_longer_remembered_is_found_again_to_the_same_bits(monkeypatch, case):
+    monkeypatch.setattr(group, '_REMEMBERED', 2)
+    closure, beyond = case()
+    states = [tuple(value + 0.01 * k for value in beyond) for k in range(5)]
+    gaps = [closure.close_unlimited(*state).gap for state in states]
+    fresh, _ = case()
+    assert [fresh.close_unlimited(*state).gap for state in reversed(states)] == gaps[::-1]
+    assert [closure.close_unlimited(*state).gap for state in states] == gaps
