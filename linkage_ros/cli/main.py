@@ -22,7 +22,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from linkage_ros import __version__
-from linkage_ros.cli.terminal import clean_output, give_up_output
+from linkage_ros.cli.terminal import clean_output, give_up_output, tell_who_waits
 from linkage_ros.errors import (
     decimal_comma,
     did_you_mean,
@@ -212,7 +212,8 @@ def _run_command(arguments: Sequence[str], stop: Event) -> int:
             from linkage_ros.cli.arguments import refuse_existing
 
             refuse_existing(typed)
-            return int(module.run(typed, stop))
+            with tell_who_waits():
+                return int(module.run(typed, stop))
     except LinkageError as error:
         # A command that reads a linkage sets the units in which it shows values.
         told = typed.angles.convert_error(error) if 'angles' in typed else error

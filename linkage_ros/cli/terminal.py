@@ -24,6 +24,7 @@ from typing import Any, TextIO
 
 from linkage_ros.cli.table import Table
 from linkage_ros.errors import escape_unprintable, shorten
+from linkage_ros.progress import progress_told_to
 
 _LONGEST_CELL = 4000
 
@@ -197,7 +198,10 @@ def show_progress(what: str) -> Iterator[ProgressCallback]:
         )
 
         columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(file=sys.__stderr__), transient=True) as bars:
+        with (
+            Progress(*columns, console=Console(file=sys.__stderr__), transient=True) as bars,
+            progress_told_to(None),
+        ):
             task = bars.add_task(what, total=None)
             yield lambda done, of: bars.update(task, completed=done, total=of)
         return
@@ -214,6 +218,22 @@ def show_progress(what: str) -> Iterator[ProgressCallback]:
     yield print_line
     if shown:
         print(f'{what}: ended after {monotonic() - begin:.1f} s', file=sys.stderr, flush=True)
+
+
+@contextmanager
+def tell_who_waits() -> Iterator[None]:
+    """Write a line now and then on standard error on what is computed, and how far that is."""
+    due = monotonic() + FIRST_LINE
+
+    def print_line(what: str, done: int, of: int) -> None:
+        nonlocal due
+        now = monotonic()
+        if now >= due:
+            due = now + _EVERY
+            print(f'{what}: {done}{f" of {of}" if of else ""}', file=sys.stderr, flush=True)
+
+    with progress_told_to(print_line):
+        yield
 
 
 # Output is escaped: a topic's name in a file may contain control characters of the terminal.

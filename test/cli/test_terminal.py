@@ -16,6 +16,7 @@ import pty
 import re
 import subprocess
 import sys
+from threading import Thread
 
 from linkage_ros.cli import (
     FIRST_LINE,
@@ -26,6 +27,8 @@ from linkage_ros.cli import (
     table_text,
     terminal,
 )
+from linkage_ros.cli.main import main
+from linkage_ros.progress import progress_told_to, tell_progress
 import pytest
 
 from .conftest import on_terminal
@@ -138,3 +141,45 @@ def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
     assert capsys.readouterr().err.splitlines() == [
         'parts: 2 of 40', 'parts: 32 of 40', 'parts: ended after 40.0 s',
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('command', 'told'),
+    [
+        ('check class_3', {'turns of a branch followed', 'states examined'}),
+        ('check stephenson_3', {'values of the input tried', 'states examined'}),
+        (
+            'check ankle_motors',
+            {'cells of links that close only together made', 'starts of other assemblies tried'},
+        ),
+        ('solve ankle_motors --at 10 10', {'cells of links that close only together made'}),
+        ('draw class_3 -o x.svg', {'turns of a branch followed'}),
+        ('compile ankle_motors -o x.c', {'cells of links that close only together made'}),
+    ],
+)
+def test_a_command_whose_user_waits_tells_what_it_builds_and_how_far_that_is(
+    command, told, capsys, monkeypatch, tmp_path
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(terminal, 'FIRST_LINE', 0.0)
+    monkeypatch.setattr(terminal, '_EVERY', 0.0)
+    assert main(command.split()) == 0
+    lines = capsys.readouterr().err.splitlines()
+    counted = [re.fullmatch(r'(.*): (\d+)(?: of (\d+))?', line) for line in lines]
+    found = [each.groups() for each in counted if each]
+    assert told <= {what for what, _, _ in found}
+    assert all(int(done) <= int(of) for _, done, of in found if of)
+
+
+def test_progress_is_told_to_the_thread_that_waits_alone():
+    """A tick has a thread of its own, and never writes on what it builds."""
+    heard = []
+    with progress_told_to(lambda *told: heard.append(told)):
+        tell_progress('here', 1, 2)
+        ticking = Thread(target=tell_progress, args=('there', 1))
+        ticking.start()
+        ticking.join()
+        with progress_told_to(None):
+            tell_progress('within a bar', 1)
+    tell_progress('afterwards', 1)
+    assert heard == [('here', 1, 2)]

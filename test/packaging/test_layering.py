@@ -31,6 +31,7 @@ HEIGHTS = (
         'signals',
         'generated_code',
         'processes',
+        'progress',
         'early_signals',
         'dask_workers',
         'workbench',

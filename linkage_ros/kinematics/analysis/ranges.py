@@ -33,6 +33,7 @@ from linkage_ros.kinematics.step import (
     PointOnRail,
     RelativeAngle,
 )
+from linkage_ros.progress import tell_progress
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.iterated.branch import Branch
@@ -279,7 +280,10 @@ def find_intervals(
     low, high = values[0], values[-1]
     known: dict[float, bool] = {}
     if margin is not None:
-        margins = [margin(value) for value in values]
+        margins = []
+        for number, value in enumerate(values):
+            tell_progress('values of the input tried', number, len(values))
+            margins.append(margin(value))
         # Next to zero the margin may round to either side.
         known = {v: m > 0.0 for v, m in zip(values, margins, strict=True) if abs(m) > _ROUNDED}
         values = sorted({*values, *_turning_points(margin, values, margins)})

@@ -40,6 +40,7 @@ from linkage_ros.kinematics.results import (
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
+from linkage_ros.progress import tell_progress
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
@@ -439,7 +440,8 @@ def _step_extremes(
         values = sample_inputs(interval, count)
         for of_step in sampled.values():
             of_step.append(Sampled(interval, values, []))
-        for value in values:
+        for done, value in enumerate(values):
+            tell_progress('states examined', done, len(values))
             position = sweep.position_at(value)
             if position.status.has_pose:
                 closed = value

@@ -38,6 +38,7 @@ from linkage_ros.kinematics.iterated.start_table import StartRow
 from linkage_ros.kinematics.iterated.straight_line import list_numbers
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
+from linkage_ros.progress import tell_progress
 import numpy as np
 
 _PROVEN, _AIMED = 0.25, 0.1
@@ -610,6 +611,7 @@ class Branch:
         if side.end is not None or side.laps >= (_MOST_TURNS if self._turning else _MOST_LAPS):
             return False
         side.laps += 1
+        tell_progress('turns of a branch followed', side.laps)
         if self._turning:
             last = self._x + side.sign * side.laps * tau
         else:

@@ -32,6 +32,7 @@ from linkage_ros.kinematics.arithmetic import call, has_result
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.compiling import compile_line
 from linkage_ros.kinematics.plane.linkage import Input
+from linkage_ros.progress import tell_progress
 
 _WIDTH = 0.125
 """Width of the widest cells, in [rad] or lengths."""
@@ -406,6 +407,7 @@ class Grid:
         """Return a cell that a neighbour leads to, and keep it."""
         cell = None if before.cell is None else self._make_cell(key, before.cell)
         found = _Found(cell, cell or before.last, cell.numbers if cell else None)
+        tell_progress('cells of links that close only together made', len(self._kept))
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[key] = found

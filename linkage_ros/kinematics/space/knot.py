@@ -36,6 +36,7 @@ from linkage_ros.kinematics.space.knot_equations import KnotEquations
 from linkage_ros.kinematics.space.steps import missing_length
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
+from linkage_ros.progress import tell_progress
 import numpy as np
 
 _APART, _DIGITS = 1e-6, 12
@@ -151,7 +152,8 @@ class Knot(Step):
         random, turns = Random(count), self._equations.angles
         known, found = require_state(self._before.known_at(self._before.inputs)), [[*self._start]]
         places = [self._equations.rod_ends(known, self._start)]
-        for _ in range(count):
+        for number in range(count):
+            tell_progress('starts of other assemblies tried', number, count)
             begin = [
                 random.uniform(-pi, pi) if turned else value + random.uniform(-1.0, 1.0)
                 for value, turned in zip(self._start, turns, strict=True)
