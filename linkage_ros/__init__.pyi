@@ -46,6 +46,11 @@ from linkage_ros.kinematics.plane.linkage import (
     SlideJoint as SlideJoint,
     Slider as Slider,
 )
+from linkage_ros.kinematics.space.closure import SpaceClosure as SpaceClosure
+from linkage_ros.kinematics.space.linkage import (
+    SpaceLinkage as SpaceLinkage,
+    SpatialJoint as SpatialJoint,
+)
 from linkage_ros.kinematics.results import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.tick.interpreted_tick import Tick as Tick

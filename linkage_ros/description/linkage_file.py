@@ -61,7 +61,9 @@ def looks_like_linkage(content: Section) -> bool:
     return any(key in content for key in ('links', 'points', *SHORTHANDS))
 
 
-def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -> Closure | Any:
+def load(
+    linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None
+) -> Closure | SpaceClosure:
     """
     Load a linkage as a closure: a `Closure`, or a `SpaceClosure` if it is spatial.
 

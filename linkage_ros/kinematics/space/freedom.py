@@ -75,10 +75,9 @@ class _MotionEquations:
 
     def _of_link(self, link: str, rows: Array) -> Array:
         """Return rows in the six numbers of a link as rows in those of all."""
-        first = 6 * self._links[link]
-        found = np.zeros((len(rows), self.size))
-        found[:, first : first + 6] = rows
-        return found
+        found = np.zeros((len(rows), len(self._links), 6))
+        found[:, self._links[link]] = rows
+        return found.reshape(len(rows), self.size)
 
     def rate(self, name: str) -> Array:
         """Return the row of a joint's rate, in the unit of the file."""

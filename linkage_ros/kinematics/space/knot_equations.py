@@ -289,7 +289,8 @@ class KnotEquations:
         def bound_change(moved: Sequence[float]) -> list[list[float]]:
             rows = [[0.0] * count for _ in range(count)]
             for number, row in enumerate(rows):
-                of_row = bends[number * len(pairs) :]
+                first = number * len(pairs)
+                of_row = bends[first:]
                 for (one, other), bend in zip(pairs, of_row, strict=False):
                     # The bound of two unknowns is one of both derivatives together.
                     half = bend if one == other else 0.5 * bend
