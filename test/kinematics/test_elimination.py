@@ -66,7 +66,7 @@ def test_entries_that_happen_to_be_0_keep_the_rows_of_others():
     rng = random.Random(5)
 
     def solved(*numbers):
-        rows = [list(numbers[k::3]) for k in range(3)]
+        rows = [list(row) for row in zip(*[iter(numbers[:9])] * 3, strict=True)]
         return Elimination(rows, []).solve(numbers[9:])
 
     line = compile_line(solved, [rng.gauss(0.0, 1.0) for _ in range(12)])

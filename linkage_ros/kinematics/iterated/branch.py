@@ -87,7 +87,7 @@ _NEXT_TO_END = 2.0**-10
 """In [rad] or lengths: how far links may move while the links before are next to a toggle."""
 
 
-class Curve(Protocol):
+class BranchCurve(Protocol):
     """As many equations as unknowns, which one input moves; a place has the input after these."""
 
     @property
@@ -172,7 +172,7 @@ class Cell(NamedTuple):
 class Continuation:
     """Follows the solutions of equations while one input changes."""
 
-    curve: Curve
+    curve: BranchCurve
 
     def first_node(self, unknowns: Array, x: float) -> BranchNode | None:
         """Return the node at a solution, with its tangent towards larger inputs."""
@@ -524,7 +524,7 @@ class Branch:
         return Start(cell.point_at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
 
     @property
-    def gained(self) -> list[float]:
+    def gained_angles(self) -> list[float]:
         """Return the turns of the unknowns before the branch starts again, in [rad]."""
         found: list[float] = self._gained.tolist()
         return found

@@ -223,7 +223,7 @@ class BranchGroup(IteratedGroup):
             if not sum(map(abs, step[1:]), abs(step[0])) <= most:
                 raise UndecidedError
             values = [value - change for value, change in zip(values, step, strict=True)]
-        gained = [turns * by if by else 0.0 for by in branch.gained]
+        gained = [turns * by if by else 0.0 for by in branch.gained_angles]
         return GroupPose(status, self._equations.complete(values, known), gained)
 
     def _find_slowly(self, known: LinkState) -> GroupPose:

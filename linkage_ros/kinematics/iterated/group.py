@@ -146,7 +146,7 @@ class IteratedGroup:
         """Return the links."""
         if has_symbols(solved):
             return self.close_straight(solved)
-        pose = self.remembered(solved)
+        pose = self.remembered_pose(solved)
         if pose is not None:
             return pose
         numbers = self._solution_line(self._inputs_of(solved))
@@ -155,7 +155,7 @@ class IteratedGroup:
         count = len(numbers) // 2
         return GroupPose(Status.CLOSED, numbers[:count], numbers[count:])
 
-    def remembered(self, solved: LinkState) -> GroupPose | None:
+    def remembered_pose(self, solved: LinkState) -> GroupPose | None:
         """Return the links of a state that straight lines did not lead to before."""
         return self._slow.get(self._key_of(solved))
 

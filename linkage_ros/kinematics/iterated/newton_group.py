@@ -151,7 +151,7 @@ class Iteration(Step):
         group = self.group
         if has_symbols(solved):
             pose = self._close_straight(solved)
-        elif group is not None and (known := group.remembered(solved)) is not None:
+        elif group is not None and (known := group.remembered_pose(solved)) is not None:
             pose = known
         elif (values := self._solution_line(solved)) is not None:
             self._append_solution(solved, values)
