@@ -11,7 +11,7 @@ import random
 
 from linkage_ros.description import load
 from linkage_ros.kinematics import Closure, Status
-from linkage_ros.kinematics.iterated import group
+from linkage_ros.kinematics.iterated.group import IteratedGroup
 import pytest
 
 from .defects import defect
@@ -41,7 +41,7 @@ CASES = [two_motors, six_legs, one_crank, one_slide]
 def count_searches(monkeypatch):
     """Return a list that grows by one with each search for a state."""
     searches = []
-    for kind in group.IteratedGroup.__subclasses__():
+    for kind in IteratedGroup.__subclasses__():
         find = kind._find_slowly
 
         def search(self, solved, find=find):
@@ -70,7 +70,7 @@ def test_a_state_beyond_reach_is_searched_for_once(monkeypatch, case):
 
 @pytest.mark.parametrize('case', CASES)
 def test_what_is_no_longer_remembered_is_found_again_to_the_same_bits(monkeypatch, case):
-    monkeypatch.setattr(group, '_REMEMBERED', 2)
+    monkeypatch.setattr('linkage_ros.kinematics.iterated.group._REMEMBERED', 2)
     closure, beyond = case()
     states = [tuple(value + 0.01 * k for value in beyond) for k in range(5)]
     gaps = [closure.close_unlimited(*state).gap for state in states]
