@@ -155,8 +155,8 @@ class SceneLinkage:
     @property
     def dependent_joint(self) -> str:
         """Return the dependent joint that samples name instead of the input; '' for none."""
-        name, parameters = self.drive
-        return parameters.joint if name == 'topic' else ''
+        joint: str = self.drive[1].dependent_joint
+        return joint
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,7 @@ from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage, with_rod_joints
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
+from linkage_ros.stages.drives import drive_class
 
 if TYPE_CHECKING:
     from linkage_ros.stages.effects import Effect
@@ -311,8 +312,8 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         content.remove_key(key)
     content.finish(('linkages', *SCENE.entries))
     for scene_linkage in members:
-        drive, _ = scene_linkage.drive
-        if scene.rate == 0.0 and drive != 'topic':
+        drive, parameters = scene_linkage.drive
+        if scene.rate == 0.0 and not parameters.is_measured:
             raise content.error(
                 'rate',
                 f'0 is one tick for every crank sample, and {drive} has none',
@@ -399,7 +400,9 @@ def _read_scene_linkage(
     not_imported = () if source.trust_effects else tuple(name for name in effects if '.' in name)
     types = effect_types(effects, not_imported)
     if published is None:
-        published = drive != 'topic' or any(each.without_inputs for each in types.values())
+        published = not drive_class(drive).is_measured or any(
+            each.without_inputs for each in types.values()
+        )
     if closure is None:
         closure = read_any_closure(linkage_content, publish_inputs=published)
     if source.publishes_model_joints and isinstance(closure, SpaceClosure):
@@ -454,8 +457,8 @@ def _refuse_in_space(
         if effect.is_planar or effect.needs_forces:
             raise effects.error(name, reason, remedy)
     drives = section_with('drive')
-    if drive == 'torque':
-        raise drives.error('drive.torque', reason, 'drive it by topic or at a given motion')
+    if drive_class(drive).gives_torque:
+        raise drives.error(f'drive.{drive}', reason, 'drive it by topic or at a given motion')
     topic = drive_section(drives)
     if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')

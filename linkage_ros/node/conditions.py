@@ -145,15 +145,17 @@ class RunState:
     @property
     def takes_commands(self) -> bool:
         """Whether the drives take commands, which move the inputs, instead of samples of these."""
-        return any(line.scene_linkage.drive[0] == 'torque' for line in self.loop.pipeline.linkages)
+        return any(
+            line.scene_linkage.drive[1].gives_torque for line in self.loop.pipeline.linkages
+        )
 
     @property
     def idle_text(self) -> str:
         """Return what acts on the inputs of torque drives while no command comes."""
         acting = []
         for line in self.loop.pipeline.linkages:
-            name, drive = line.scene_linkage.drive
-            if name != 'torque':
+            _, drive = line.scene_linkage.drive
+            if not drive.gives_torque:
                 continue
             unit = 'N' if line.closure.linkage.inputs[0].slider else 'N·m'
             names = list_names(line.scene_linkage.sampled_joints)

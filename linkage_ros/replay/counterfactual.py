@@ -121,7 +121,7 @@ class Counterfactual:
                 self._unchanged = Rerun(bag, recorded)
         self._shared_faults: set[str] = set()
         # Under torque the linkage moves without commands, too.
-        self._moves_without_samples = scene.linkages[0].drive[0] == 'torque'
+        self._moves_without_samples = scene.linkages[0].drive[1].gives_torque
         if recorded is not None:
             self._shared_faults = {
                 name for name, fault in scene.faults.items() if recorded.faults.get(name) == fault
@@ -379,7 +379,7 @@ def find_crank_topic(
     since the efforts of joint states are not commands. ``messages`` are read only as far as
     needed.
     """
-    drive = scene.linkages[0].drive[0]
+    drive, parameters = scene.linkages[0].drive
     readers = {
         topic: [
             _sample_reader(scene_linkage, scene.dependent_joints)
@@ -387,7 +387,7 @@ def find_crank_topic(
         ]
         for topic in _candidate_topics(bag, drive, run, recorded, typed)
     }
-    if drive == 'torque' and len(readers) == 1:
+    if parameters.gives_torque and len(readers) == 1:
         return next(iter(readers))  # also where no command came: the linkage moved without
     wanting = {topic: set(range(len(scene.linkages))) for topic in readers}
     names: dict[str, None] = {}
@@ -421,7 +421,7 @@ def find_crank_topic(
             f'holds samples of {list_names(inputs)} on {list_names(good, " and ")}',
             'name one with --crank-topic',
         )
-    if drive == 'torque' and not readers:
+    if parameters.gives_torque and not readers:
         raise BagError(
             bag.path,
             'its run took no commands, which a torque drive needs',
@@ -433,7 +433,7 @@ def find_crank_topic(
 def _sample_reader(
     scene_linkage: SceneLinkage, dependent: Collection[str]
 ) -> Callable[[bytes], object]:
-    if scene_linkage.drive[0] == 'torque':
+    if scene_linkage.drive[1].gives_torque:
         return JointEffortReader(scene_linkage.input_names[0], dependent).read
     return JointStateReader(scene_linkage.sampled_joints).read
 

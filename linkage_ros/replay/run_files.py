@@ -54,7 +54,7 @@ def scene_files(
 
 def _scene_folder(scene: Scene, bag: Path | None) -> dict[str, str]:
     """Return the folder for the paths in a scene, relative to the bag: bags are passed on."""
-    if all(scene_linkage.drive[0] != 'bag' for scene_linkage in scene.linkages):
+    if not any(scene_linkage.drive[1].reads_bag for scene_linkage in scene.linkages):
         return {}
     folder = Path(scene.folder).resolve()
     return {'scene_folder': str(folder if bag is None else os.path.relpath(folder, bag.resolve()))}

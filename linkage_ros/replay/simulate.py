@@ -52,7 +52,7 @@ def check_simulated(scene: Scene, seconds: float) -> int:
     many ticks.
     """
     for scene_linkage in scene.linkages:
-        if scene_linkage.drive[0] == 'topic':
+        if scene_linkage.drive[1].is_measured:
             raise scene_linkage.content.error(
                 'drive',
                 'topic waits for samples, and there are none',

@@ -129,7 +129,7 @@ def _lost_state(scene: Scene) -> tuple[str, ...]:
     named = []
     for scene_linkage in scene.linkages:
         drive, parameters = scene_linkage.drive
-        if drive != 'topic' or parameters.cutoff:
+        if not parameters.is_recoverable:
             named.append(drive)
     for scene_linkage in scene.linkages:
         if scene_linkage.loads is not None and scene_linkage.loads.applied.changes_with_time:

@@ -311,7 +311,7 @@ class LinkagePipeline:
 
     def is_idle(self, now: int) -> bool:
         """Return whether a tick at a time, in [ns], would give nothing; False if it may do so."""
-        if self.scene_linkage.drive[0] != 'topic' or any(
+        if self.scene_linkage.drive[1].keeps_state or any(
             sensor.gap is not None for sensor in self._sensor_stages
         ):
             return False

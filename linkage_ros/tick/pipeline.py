@@ -89,9 +89,8 @@ class Pipeline:
                 for linkage in self.linkages
             ]
             self.wrenches = make_wrench_topics(linkages, self.topic)
-        # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._has_state = any(
-            linkage.scene_linkage.drive[0] != 'topic'
+            linkage.scene_linkage.drive[1].keeps_state
             or any(effect.runs_in_gaps for effect in linkage.wanted.effects.values())
             for linkage in self.linkages
         )

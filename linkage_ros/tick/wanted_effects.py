@@ -45,13 +45,13 @@ class WantedEffects:
 def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     """Return the effects of a linkage, and those that they start from."""
     _refuse_not_imported(scene_linkage)
-    drive, drive_parameters = scene_linkage.drive
+    _, drive = scene_linkage.drive
     effects = dict(scene_linkage.effects)
     for effect in scene_linkage.effects.values():
         for also in effect.publishes_with:
             effects.setdefault(also, effect_class(also)())
     named = frozenset(effects)
-    moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
+    moves_by_rates = drive.moves_by_rates
     needs = {
         need
         for effect in effects.values()
@@ -59,7 +59,7 @@ def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     }
     for name in needs.union(*map(needed_effects, needs)):
         effects.setdefault(name, effect_class(name)())
-    computes_forces = drive == 'torque' or any(each.needs_forces for each in effects.values())
+    computes_forces = drive.gives_torque or any(each.needs_forces for each in effects.values())
     _refuse_idle(scene_linkage, computes_forces)
     ordered = {name: effects[name] for name in in_order(effects)}
     return WantedEffects(named, ordered, computes_forces, moves_by_rates)

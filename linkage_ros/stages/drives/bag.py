@@ -203,6 +203,13 @@ class BagDrive(Drive):
     )
     allow_truncated: bool = flag('take a bag whose recording was killed, as far as it goes', False)
 
+    reads_bag = True
+
+    @property
+    def moves_by_rates(self) -> bool:
+        """Return whether the crank moves at its rates between samples."""
+        return self.carry_forward
+
     def build(self, context: Context) -> RecordedPace | FastPace:
         """
         Read the bag and build the drive.

@@ -245,6 +245,14 @@ class Drive(ABC):
         ``offer(sample, now) -> Rejection | None``.
     publishes, message
         Its own topic, and the type of the message: package/msg/Type; '' for none.
+    is_measured
+        Whether its samples say where the inputs are, and it moves them no other way.
+    gives_torque
+        Whether it gives efforts, by which the inputs move.
+    reads_bag
+        Whether its samples come from a bag.
+    keeps_state
+        Whether its crank's state depends on earlier ticks.
 
     """
 
@@ -253,6 +261,25 @@ class Drive(ABC):
     listens_to: ClassVar[str] = ''
     publishes: ClassVar[str] = ''
     message: ClassVar[str] = ''
+    is_measured: ClassVar[bool] = False
+    gives_torque: ClassVar[bool] = False
+    reads_bag: ClassVar[bool] = False
+    keeps_state: ClassVar[bool] = True
+
+    @property
+    def dependent_joint(self) -> str:
+        """Return the dependent joint that samples name instead of the input; '' for none."""
+        return ''
+
+    @property
+    def moves_by_rates(self) -> bool:
+        """Return whether the crank moves at its rates between samples."""
+        return True
+
+    @property
+    def is_recoverable(self) -> bool:
+        """Return whether a run may be replayed from its middle: samples say the state."""
+        return False
 
     @abstractmethod
     def build(self, context: Context) -> Crank:

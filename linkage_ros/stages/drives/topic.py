@@ -95,6 +95,23 @@ class TopicDrive(Drive):
     )
 
     listens_to = 'crank_states'
+    is_measured = True
+    keeps_state = False
+
+    @property
+    def dependent_joint(self) -> str:
+        """Return the dependent joint that samples name instead of the input; '' for none."""
+        return self.joint
+
+    @property
+    def moves_by_rates(self) -> bool:
+        """Return whether the crank moves at its rates between samples."""
+        return self.carry_forward
+
+    @property
+    def is_recoverable(self) -> bool:
+        """Return whether no filter remembers earlier samples."""
+        return not self.cutoff
 
     def build(self, context: Context) -> SampledCrank:
         """

@@ -191,6 +191,7 @@ class TorqueDrive(Drive):
     )
 
     listens_to = 'crank_commands'
+    gives_torque = True
     publishes = '~/motor'
     message = JOINT_STATE_TYPE
 

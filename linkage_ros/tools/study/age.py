@@ -201,7 +201,7 @@ def measure_age_of_command(
         return None
     settings: list[Setting | None] = [own]
     settings.append(measure_setting({'carry_forward': not use.carry_forward}))
-    if name == 'topic' and use.acceleration == 'zero':
+    if use.is_measured and use.acceleration == 'zero':
         differenced = {} if use.carry_forward else {'carry_forward': True}
         settings.append(measure_setting({'acceleration': 'differenced', **differenced}))
     if motion.samples:
@@ -220,8 +220,8 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     names = motion.scene_linkage.sampled_joints
     zeros = (0.0,) * len(names)
     message = JointStateWriter(names).write(BEGIN, zeros, zeros, zeros)
-    name, use = motion.scene_linkage.drive
-    if name != 'topic' or motion.scene_linkage.dependent_joint:
+    _, use = motion.scene_linkage.drive
+    if not use.is_measured or motion.scene_linkage.dependent_joint:
         return Spread(0.0, 0.0, 0.0)
     read, drive = use.reader(motion.context), SampledCrank(use, True)
 

@@ -136,7 +136,7 @@ def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
 
 def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
     effects = {name: own for name, own in scene_linkage.effects.items() if name not in names}
-    has_forces = scene_linkage.drive[0] == 'torque' or any(
+    has_forces = scene_linkage.drive[1].gives_torque or any(
         each.needs_forces for each in effects.values()
     )
     return replace(
@@ -213,7 +213,7 @@ def measure_deliberate(
         feed,
         lambda share: progress(0.5 + 0.5 * share),
     )
-    drifts = any(scene_linkage.drive[0] == 'torque' for scene_linkage in scene.linkages)
+    drifts = any(scene_linkage.drive[1].gives_torque for scene_linkage in scene.linkages)
     after = ticks / (scene.rate or USUAL_RATE) if drifts else None
     knobs = [
         Knob(

@@ -136,7 +136,7 @@ def _measure_errors(
     integrated = sum(motion.path is None for motion in motions)
     progress(0.1)
     for motion in motions:
-        if motion.scene_linkage.drive[0] == 'torque':
+        if motion.scene_linkage.drive[1].gives_torque:
             from linkage_ros.tools.study.drive_step import (
                 measure_drive_step,  # local import: few scenes have forces
             )

@@ -39,7 +39,7 @@ def _samples_and_ticks(
     scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
-    driven = [each for each in motions if each.scene_linkage.drive[0] == 'topic']
+    driven = [each for each in motions if each.scene_linkage.drive[1].is_measured]
     if any(each.scene_linkage.dependent_joint for each in driven):
         yield from turn_crank(scene, Pipeline(scene))
         return
@@ -63,7 +63,7 @@ def _commands_and_ticks(
     scene: Scene, motions: Sequence[LinkageMotion]
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, with the commands that have come since the last one."""
-    driven = [each for each in motions if each.scene_linkage.drive[0] == 'torque']
+    driven = [each for each in motions if each.scene_linkage.drive[1].gives_torque]
     names = [name for each in driven for name in each.context.inputs_in_messages]
     write = JointStateWriter(names).write
     zeros = (0.0,) * len(names)

@@ -81,9 +81,9 @@ def follow_samples(
 
 def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     """Return the good samples of the topic that has most of them."""
-    name, use = motion.scene_linkage.drive
+    _, use = motion.scene_linkage.drive
     read: Any = JointStateReader(motion.context.inputs_in_messages).read
-    if name == 'topic':
+    if use.is_measured:
         read = use.reader(motion.context)
     else:
         use = TopicDrive(max_age=use.max_age)

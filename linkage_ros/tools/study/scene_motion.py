@@ -70,7 +70,7 @@ def without_deliberate(scene: Scene) -> Scene:
     """Return a scene without recording, faults and what its sensors and wear change."""
     members = []
     for scene_linkage in scene.linkages:
-        forced = scene_linkage.drive[0] == 'torque'
+        forced = scene_linkage.drive[1].gives_torque
         kept = {'velocity', 'tolerance', *(('friction',) if forced else ())}
         effects = {name: use for name, use in scene_linkage.effects.items() if name in kept}
         loads = scene_linkage.loads if forced else None
@@ -83,14 +83,14 @@ def _linkage_motion(
 ) -> LinkageMotion:
     scene_linkage, context = linkage.scene_linkage, linkage.context
     motion = LinkageMotion(scene_linkage, linkage.closure, context, None)
-    drive, parameters = scene_linkage.drive
-    if drive == 'torque':
+    _, drive = scene_linkage.drive
+    if drive.gives_torque:
         return _commanded_motion(motion, like, bag, horizon)
-    if drive == 'bag':
-        opened = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
-        fast = scene.rate if parameters.pace == 'fast' else 0.0
-        return follow_samples(motion, opened, parameters.topic, fast)
-    if drive != 'topic':
+    if drive.reads_bag:
+        opened = read_bag(drive.file, allow_truncated=drive.allow_truncated)
+        fast = scene.rate if drive.pace == 'fast' else 0.0
+        return follow_samples(motion, opened, drive.topic, fast)
+    if not drive.is_measured:
         return motion._replace(path=_path_of(linkage))
     if bag is not None:
         return follow_samples(motion, bag)

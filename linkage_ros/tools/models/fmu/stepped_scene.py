@@ -321,7 +321,7 @@ def _refuse_scene(scene: Scene) -> None:
             )
     for scene_linkage in scene.linkages:
         drive, parameters = scene_linkage.drive
-        if drive == 'bag':
+        if parameters.reads_bag:
             raise scene_linkage.content.error(
                 'drive.bag',
                 'the bag does not travel with the scene',

@@ -267,7 +267,7 @@ class SceneRun:
                 linkage, [inputs.index(name) for name in linkage.scene_linkage.sampled_joints]
             )
             for index, linkage in enumerate(pipeline.linkages)
-            if linkage.scene_linkage.drive[0] == 'topic'
+            if linkage.scene_linkage.drive[1].is_measured
         }
         self._first_joints = [
             scene.joint_names.index(linkage.joints[0]) for linkage in self._linkages
