@@ -35,7 +35,9 @@ def refused(linkage: Run, *typed: str) -> str:
     """Return the one line by which a command refuses what was typed."""
     answer = linkage('compile', *typed)
     assert (answer.returncode, answer.stdout) == (2, '')
-    (line,) = answer.stderr.splitlines()
+    # Before it, what takes long tells how far it is.
+    lines = answer.stderr.splitlines()
+    (line,) = (line for line in lines if ' made: ' not in line)
     return line.removeprefix('linkage compile: ')
 
 
