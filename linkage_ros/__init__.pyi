@@ -30,7 +30,6 @@ from linkage_ros.messages.joint_state import (
 )
 from linkage_ros.kinematics.batch import Batch as Batch
 from linkage_ros.kinematics.plane.closure import Closure as Closure
-from linkage_ros.kinematics.analysis.inverse_closure import InverseClosure as InverseClosure
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
     Position as Position,

@@ -75,9 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=partial(read_joint_value, example='NAME=40'),
         default=[],
         metavar='NAME=VALUE',
-        help='solve for every input at which a dependent joint, or a coordinate of a traced point '
-        'such as P.x, has a value; --rate and --acceleration are then for the joint; may be '
-        'repeated; with several inputs, or in space, name as many joints as inputs, which '
+        help='solve for every input at which a joint, a coordinate P.x, a distance A-B of two '
+        'points or the angle LINK.angle of a link has a value; --rate and --acceleration are then '
+        'for it; may be repeated; with several inputs, or in space, name as many as inputs, which '
         'become the inputs',
     )
     parser.add_argument(

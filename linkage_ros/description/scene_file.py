@@ -416,6 +416,8 @@ def _read_scene_linkage(
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
     parts = {**parts_of(linkage), 'left_out': not_imported}
     driven = DRIVE.read(section_with('drive'), 'drive', parts, source.folder)
+    if driven[0] == 'topic' and driven[1].joint:
+        _check_sampled(section_with('drive'), closure, driven[1].joint)
     if source.confinement is not None:
         source.confinement.refuse_drive(section_with('drive'), driven)
     prefix = OF_A_LINKAGE.read_key(section_with('prefix'), 'prefix', parts)
@@ -464,6 +466,15 @@ def _refuse_in_space(
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
     if 'loads' in section_with('loads'):
         raise section_with('loads').error('loads', reason, remedy)
+
+
+def _check_sampled(drives: Section, closure: Closure | SpaceClosure, joint: str) -> None:
+    """Refuse samples of what is neither a joint nor measures the linkage."""
+    try:
+        closure.measuring(joint)
+    except DefinitionError as error:
+        reason = f'{error.where}: {error.reason}'
+        raise drives.error('drive.topic.joint', reason, error.remedy) from None
 
 
 def _is_silent_beyond(content: Section, linkage: Linkage) -> bool:

@@ -22,7 +22,6 @@ from linkage_ros.kinematics.analysis.grashof import (
     GRASHOF as GRASHOF,
     TRIPLE_ROCKERS as TRIPLE_ROCKERS,
 )
-from linkage_ros.kinematics.analysis.inverse_closure import InverseClosure as InverseClosure
 from linkage_ros.kinematics.analysis.pose_view import (
     all_places as all_places,
     LinkageView as LinkageView,

@@ -147,9 +147,6 @@ class LoopClosure(Protocol):
     @property
     def grids(self) -> list[Any]: ...
 
-    @property
-    def program_steps(self) -> tuple[Step, ...]: ...
-
     def slide_reach(self, number: int) -> tuple[float, float]: ...
 
     input_names: tuple[str, ...]

@@ -18,6 +18,7 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import tau
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, unit_vector
@@ -311,3 +312,35 @@ class FollowerJoint(LinearStep):
         """Append the derivative of the value."""
         values = state.coordinates
         values.append(self.ratio * (values[self.one] - values[self.other]))
+
+
+@dataclass(frozen=True, slots=True)
+class TurnsNear:
+    """
+    Whole turns of a link, such that a joint of it is near a value that is linear in the inputs.
+
+    The joint is sign·(x[arm] − x[other]) + constant, the value constant + Σ factor·input.
+    """
+
+    # Indices, among the coordinates, of the angles of this link and of the other one.
+    arm: int
+    other: int
+    sign: float
+    constant: float
+    near: tuple[float, ...]
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Turn the link."""
+        x = solved.coordinates
+        off = self.sign * (x[self.arm] - x[self.other]) + (self.constant - self.near[0])
+        for index, factor in enumerate(self.near[1:], 1):
+            off = off - factor * x[index] if factor else off
+        # Not −0.0 from the turns of one language, and 0.0 from those of another.
+        x[self.arm] = x[self.arm] - self.sign * tau * round(off / tau) + 0.0
+        return PLACED
+
+    def rates(self, _pose: StepPose, _solved: LinkState, _velocities: LinkState) -> None:
+        """Change no rate."""
+
+    def accelerations(self, *_state: Any) -> None:
+        """Change no acceleration."""

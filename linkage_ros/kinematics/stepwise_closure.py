@@ -192,11 +192,6 @@ class StepwiseClosure:
         """Return the state before the first step: the coordinates of the ground and the inputs."""
         return LinkState(self._input_coordinates('inputs', inputs, 0.0, inf) or [], [])
 
-    @property
-    def program_steps(self) -> tuple[Step, ...]:
-        """Return the steps that compiled code runs, from the inputs on."""
-        return self.steps
-
     def close_unlimited(self, *inputs: float) -> Position:
         """Close the loops as `position` does, without limits."""
         return type(self).position(self, *inputs)

@@ -31,10 +31,10 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from linkage_ros.description import load_scene, Scene
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics import InverseClosure, Status
+from linkage_ros.kinematics import Closure, CrankBranch, Status
 from linkage_ros.node.demo_nodes import run_demo_node
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE
-from linkage_ros.stages.drives import sampled_inverse
+from linkage_ros.stages.drives import sampled_branch
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -62,15 +62,14 @@ class CommandRelay:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._inverses: dict[str, tuple[InverseClosure, str]] = {}
+        self._inverses: dict[str, tuple[Closure, CrankBranch, str]] = {}
         for scene_linkage in scene.linkages:
             if scene_linkage.dependent_joint:
-                number = scene_linkage.drive[1].branch
-                inverse = sampled_inverse(
-                    scene_linkage.closure, scene_linkage.dependent_joint, number
-                )
+                closure, joint = scene_linkage.closure, scene_linkage.dependent_joint
+                branch = sampled_branch(closure, joint, scene_linkage.drive[1].branch)
                 self._inverses[scene_linkage.sampled_joints[0]] = (
-                    inverse,
+                    closure.driven_by(joint, branch=branch.number),
+                    branch,
                     scene_linkage.input_names[0],
                 )
         if not self._inverses:
@@ -94,7 +93,7 @@ class CommandRelay:
             for array in (message.position, message.velocity)
         ]
         positions, velocities, _ = self._crank_arrays(known, *rows, [])
-        cranks = [self._inverses[name][1] for name in known]
+        cranks = [self._inverses[name][-1] for name in known]
         return JointState(
             header=message.header, name=cranks, position=positions, velocity=velocities
         )
@@ -123,7 +122,7 @@ class CommandRelay:
                     time_from_start=point.time_from_start,
                 )
             )
-        cranks = [self._inverses[name][1] for name in names]
+        cranks = [self._inverses[name][-1] for name in names]
         return JointTrajectory(header=message.header, joint_names=cranks, points=points)
 
     def _crank_arrays(self, names: Sequence[str], *rows: Sequence[float]) -> list[list[float]]:
@@ -149,12 +148,13 @@ class CommandRelay:
         self, joint: str, value: float, rate: float, change: float
     ) -> tuple[float, float, float]:
         """Return crank, rate and acceleration, NaN where the joint's is NaN."""
-        inverse, _ = self._inverses[joint]
+        inverse, branch, _ = self._inverses[joint]
         position = inverse.position(value)
-        place = f'{joint} at {value:.6g} {inverse.gap_unit}'
-        if not position.status.has_pose:
-            low, high = inverse.input_ranges[0][:2]
-            raise RefusedError(f'{place} is not reached: it goes from {low:.6g} to {high:.6g}')
+        place = f'{joint} at {value:.6g} {inverse.linkage.inputs[0].unit}'
+        # Beyond a toggle of the crank the joint goes on in another assembly.
+        if not position.status.has_pose or branch.distance_beyond(value):
+            ends = f'it goes from {branch.low:.6g} to {branch.high:.6g}'
+            raise RefusedError(f'{place} is not reached: {ends}')
         crank = position.joints[0]
         if position.status is Status.TOGGLE:
             if any(isfinite(one) and one for one in (rate, change)):

@@ -96,7 +96,7 @@ def test_sample_whose_joint_is_not_reached_is_rejected_and_changes_nothing() -> 
 def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
     """Where the rocker turns back, its samples say nothing about the crank's rate."""
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
-    end = LINKAGE.driven_by('rocker_joint', branch=1).branch.high
+    end = LINKAGE.branches('rocker_joint')[0].high
     for stamp, value in ((SECOND, end - 1e-3), (SECOND + MS, end)):
         assert pipeline.offer(joint_message('rocker_joint', stamp, value, 0.0), stamp) is None
     found = pipeline.tick(SECOND + MS)
@@ -107,6 +107,19 @@ def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
         for y in (end - 1e-3, end)
     ]
     assert rate == pytest.approx((cranks[1] - cranks[0]) / 1e-3)
+
+
+@pytest.mark.parametrize('joint', ['P.x', 'O2-B', 'coupler.angle'])
+def test_samples_may_name_a_coordinate_a_distance_or_an_angle(joint: str) -> None:
+    (branch, *_) = LINKAGE.branches(joint)
+    drive = f'drive: {{topic: {{joint: {joint}, branch: {branch.number}}}}}\n'
+    pipeline = pipeline_of(RATES + drive, FILE)
+    value, crank = branch.state_at(0.4)
+    assert pipeline.offer(joint_message(joint, SECOND, value, 0.0), SECOND) is None
+    (found,) = pipeline.tick(SECOND).states[0].crank.angles
+    assert found == pytest.approx(crank, abs=1e-12)
+    moved = LINKAGE.driven_by(joint, branch=branch.number).position(value)
+    assert moved['crank_joint'] == pytest.approx(crank, abs=1e-12)
 
 
 @pytest.mark.parametrize(

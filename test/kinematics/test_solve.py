@@ -224,8 +224,13 @@ As a part of themselves, or of 1 where smaller, and of what they change by as th
 """
 
 
+EXCHANGED = 'four_bar from its rocker'
+
+
 def case_of(name: str) -> tuple[Closure, Inputs]:
     """Return a linkage, and inputs that go a fifth beyond its range."""
+    if name == EXCHANGED:
+        return closure_of('four_bar').driven_by('rocker_joint', branch=2), ((0.7, 2.5),)
     if name in OTHERS:
         linkage, inputs = OTHERS[name]
         return Closure(linkage), inputs
@@ -301,7 +306,7 @@ def neighbours(closure: Closure, state: tuple[float, ...]) -> list[Position]:
 
 
 @pytest.mark.sample(10)
-@pytest.mark.parametrize('name', [*KINDS, *OTHERS])
+@pytest.mark.parametrize('name', [*KINDS, *OTHERS, EXCHANGED])
 def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name):
     closure, inputs = case_of(name)
     met = check(closure, samples(inputs, 500))
@@ -342,7 +347,7 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, mon
 
 
 def test_every_kind_of_step_is_tested():
-    steps = [step for name in (*KINDS, *OTHERS) for step in case_of(name)[0].steps]
+    steps = [step for name in (*KINDS, *OTHERS, EXCHANGED) for step in case_of(name)[0].steps]
     diagonals, dyads, newton_group, rail = (
         import_module(f'linkage_ros.kinematics.{name}')
         for name in ('plane.diagonals', 'plane.dyads', 'iterated.newton_group', 'plane.rail')
@@ -565,7 +570,7 @@ def test_the_unit_of_the_lengths_changes_no_bit(exponent):
             np.testing.assert_array_equal(array, same)
 
 
-@pytest.mark.parametrize('name', [*KINDS, *OTHERS])
+@pytest.mark.parametrize('name', [*KINDS, *OTHERS, EXCHANGED])
 def test_nothing_makes_numpy_warn(name):
     closure, limits = case_of(name)
     angles = np.array([0.0, -0.0, pi, 1e-310, -1e5, nan, inf, limits[0][0], limits[0][1]])

@@ -182,10 +182,9 @@ FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joi
 @pytest.mark.parametrize(
     ('typed', 'status'),
     [
-        ('-0.9', 'OPEN'),  # beyond the limit of the motor, 42.4 degrees
-        ('0.1', 'OPEN'),
+        ('-0.9', 'LIMITED'),  # beyond the limit of the motor, 42.4 degrees
+        ('0.1', 'LIMITED'),
         ('inf', 'INDETERMINATE'),
-        ('1e300', 'OPEN'),
     ],
 )
 def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
@@ -237,7 +236,7 @@ def test_without_a_command_the_actuators_get_none_and_no_earlier_one_comes_back(
         assert (status, allocated) == (0, 0)
     assert given[0][0] == pytest.approx([0.3, 0.0, -2.0], abs=1e-14)
     assert moved[0][0, 0] == pytest.approx(-0.6, abs=1e-14)
-    assert wrong[1] == NUMBERS['OPEN']
+    assert wrong[1] == NUMBERS['LIMITED']
     assert np.isnan(wrong[0][0, [0, 2]]).all()
     assert wrong[0][0, 1] == 0.0
     assert new[0][0, 0] == pytest.approx(0.6, abs=1e-14)
@@ -268,7 +267,7 @@ def test_states_beyond_limits_are_told_and_commands_are_not_taken(programs):
     lines = [*FINGER, 'configure', 'to_joints 0.8 0 0', 'to_actuators -0.8 0 0']
     answers, _ = run(programs('finger'), lines)
     (joints, state, _), (actuators, command, _) = map(numbers_of, answers)
-    assert (state, command) == (NUMBERS['LIMITED'], NUMBERS['OPEN'])
+    assert (state, command) == (NUMBERS['LIMITED'], NUMBERS['LIMITED'])
     assert joints[0, 0] == pytest.approx(-0.8, abs=1e-14)
     assert np.isnan(actuators[0, 0])
 
@@ -363,7 +362,7 @@ REFUSED = {
     '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': ['gripper'],
     '2 for 1 inputs; name 1 different joint': [
         'gripper', '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
-    'left_fnger_joint: is neither a published joint': [
+    'left_fnger_joint: is no joint, and describes no point': [
         'gripper', '--driven-by', 'left_fnger_joint'],
     '--branch: is for planar linkages of one input': [
         'ankle_motors', '--branch', '1', '--driven-by', 'pitch', '--driven-by', 'roll'],

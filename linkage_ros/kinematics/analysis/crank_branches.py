@@ -26,29 +26,17 @@ compiled closed form; two steps are usual. So a crank depends on y and the branc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from math import ceil, floor, inf, isnan, nan, pi, remainder, sin, tan, tau
-from typing import Any, NamedTuple
+from math import atan2, ceil, floor, inf, isnan, nan, pi, remainder, sin, sqrt, tan, tau
+from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, did_you_mean, list_names
+from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.analysis.monotonic_pieces import FARTHEST, monotonic_pieces
 from linkage_ros.kinematics.analysis.sweep_analysis import InputSweep
-from linkage_ros.kinematics.arithmetic import (
-    atan2,
-    call,
-    remainder as nearest_remainder,
-    sqrt,
-    UndecidedError,
-    UNIT_ROUNDOFF,
-    where,
-)
-from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
-from linkage_ros.kinematics.iterated.start_table import StartTable
-from linkage_ros.kinematics.plane.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.results import LoopClosure, PlanarClosure
-from linkage_ros.kinematics.status import Status
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
@@ -77,17 +65,11 @@ _NEAR, _NEARER = 1e-6, 1e-8
 
 
 class Output(NamedTuple):
-    """The output of a branch: a published joint, or a coordinate of a traced point."""
+    """The output of a branch: a published joint."""
 
     name: str
     turning: bool
     wanted: OutputSelection  # Its value, rate and acceleration, each in a group
-    joint: RevoluteJoint | SlideJoint | None  # None for a coordinate
-
-    @property
-    def unit(self) -> str:
-        """Return its unit."""
-        return 'rad' if self.turning else 'm'
 
 
 def joint_output(closure: LoopClosure, name: str) -> Output:
@@ -98,39 +80,7 @@ def joint_output(closure: LoopClosure, name: str) -> Output:
         end = number + 1
         return [part.joints[number:end] for part in motion if part is not None]
 
-    return Output(name, closure.turning[number], joint_values, closure.linkage.joints[name])
-
-
-def output_named(closure: PlanarClosure, name: str) -> Output:
-    """Return the output of a name, such as ``rocker_joint`` or ``P.x``; refuse unknown names."""
-    if name in closure.input_names:
-        raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
-    if name in closure.joint_names:
-        return joint_output(closure, name)
-    point, _, axis = name.rpartition('.')
-    traced = [f'{each}.{way}' for each in closure.linkage.traced for way in 'xy']
-    if name not in traced:
-        known = [joint for joint in closure.joint_names if joint not in closure.input_names]
-        raise DefinitionError(
-            name,
-            'is neither a published joint nor a coordinate of a traced point',
-            did_you_mean(name, [*known, *traced], f'name one of {list_names([*known, *traced])}'),
-        )
-    key = next((link, point) for link, at in closure.linkage.links.items() if point in at)
-
-    def coordinate_values(motion: TracedMotion) -> Sequence[Sequence[float]]:
-        position, velocity, acceleration = motion
-        if not position.status.has_pose:
-            return []
-        places = [closure.points(position)[key]]
-        if velocity is not None:
-            # Its velocity does not depend on the accelerations.
-            known = acceleration or closure.acceleration(position, velocity, 0.0)
-            places += closure.point_motion(position, velocity, known)[key][1:]
-        groups = 3 if acceleration else 2
-        return [[place.real if axis == 'x' else place.imag] for place in places[:groups]]
-
-    return Output(name, False, coordinate_values, None)
+    return Output(name, closure.turning[number], joint_values)
 
 
 class CrankBranch:
@@ -255,9 +205,8 @@ class CrankBranch:
                 crank = self._start_at(self._cubics[i], t)
                 for count in range(1, _STEPS):
                     value, slope = self._evaluate(crank)
-                    try:
-                        step = self._step_from(value, slope, y, i + t) if slope else nan
-                    except UndecidedError:
+                    step = self._step_from(value, slope, y, i + t) if slope else nan
+                    if isnan(step):
                         break
                     crank -= step
                     most = max(most, count)
@@ -265,11 +214,12 @@ class CrankBranch:
                         break
         return most
 
-    def _step_from(self, value: Any, slope: Any, y: Any, place: Any) -> Any:
+    def _step_from(self, value: float, slope: float, y: float, place: float) -> float:
         """
-        Return a step of Newton's method from an output, for numbers and symbols.
+        Return a step of Newton's method from an output.
 
-        Next to a toggle at y₀ it is that for the squares of y − y₀, which the crank goes as.
+        Next to a toggle at y₀ it is that for the squares of y − y₀, which the crank goes as; NaN
+        too near to it.
         """
         step = self._without_turns(value - y) / slope
         if self._far:  # That for tan(u − u₀), with u of the value and u₀ of y
@@ -279,20 +229,21 @@ class CrankBranch:
             inside = place > float(i) if i else place < 1.0
             way, found = self._without_turns(y - end), self._without_turns(value - end)
             if not abs(found) > 0.25 * moved:
-                raise UndecidedError
-            step = where(inside, step * (way + found) / (2.0 * found), step)
+                return nan
+            if inside:
+                step = step * (way + found) / (2.0 * found)
         return step
 
     @staticmethod
-    def _start_at(cubic: Sequence[Any], t: Any) -> Any:
+    def _start_at(cubic: Sequence[float], t: float) -> float:
         p, s, bend, twist = cubic
         return p + t * (s + t * (bend + t * twist))
 
-    def _without_turns(self, difference: Any) -> Any:
+    def _without_turns(self, difference: float) -> float:
         """Return a difference of outputs, without whole turns."""
-        return nearest_remainder(difference, tau) if self.turning else difference
+        return remainder(difference, tau) if self.turning else difference
 
-    def _rise_between(self, low: Any, high: Any) -> Any:
+    def _rise_between(self, low: float, high: float) -> float:
         """Return the rise from one output to another: that of their angles u on a long branch."""
         far = self._far
         return atan2(far * (high - low), far * far + low * high) if far else high - low
@@ -366,7 +317,7 @@ class CrankBranch:
             return self.last + turns, 0.0 if self.turns_back[1] else inf
         cells = self._cells
         place = self._table_parameter(y) * cells
-        # As in `StartTable`: an end belongs to the cell before it.
+        # An end belongs to the cell before it.
         i = min(max(ceil(place) - 1, 0), cells - 1)
         t = place - i
         crank = self._start_at(self._cubics[i], t)
@@ -401,50 +352,23 @@ class CrankBranch:
             return nan, nan
         return crank + turns, slope
 
-    def trace_crank(
-        self, y: Any, evaluate: Callable[[Any], tuple[Any, Any]]
-    ) -> tuple[Status, Any]:
-        """
-        Return status and crank at a symbol, as `find_crank` finds it: a fixed number of steps.
+    def state_at(self, s: float) -> tuple[float, float]:
+        """Return an output and its crank at s of the table, from 0 at ``low`` to 1."""
+        value, _ = self._output_at(s)
+        return value, self.find_crank(value)[0]
 
-        ``evaluate`` gives output and slope at a crank. An UndecidedError is raised next to a
-        toggle of the crank, and where the last step is no rounding.
+    def near_line(self) -> tuple[float, float]:
         """
-        turns = 0.0
-        if self.rise:
-            count = round((y - self.low) / self.rise - 0.5)
-            y, turns = y - self.rise * count, (self.period if self.rises else -self.period) * count
-        elif self.turning:
-            middle = 0.5 * (self.low + self.high)
-            away = abs(y - middle) > 0.5 * (self.high - self.low)
-            y = y - tau * where(away, round((y - middle) / tau), 0.0)
-        below, above = self.low - y, y - self.high
-        if where(below > above, below, above) > self.slack:
-            return Status.OPEN, None
-        low_back, high_back = self.turns_back
-        if (low_back and y <= self._lowest) or (high_back and y >= self._highest):
-            return Status.TOGGLE, None
-        y = where(below > 0.0, self.low, where(above > 0.0, self.high, y))
-        for (_, value), _, moved in self._steep_cells.values():
-            if abs(y - value) < moved:
-                raise UndecidedError
-        place = self._table_parameter(y) * self._cells
-        number, *cubic = (call(self._table, place)[k] for k in range(5))
-        crank, step = self._start_at(cubic, place - number), 0.0
-        for _ in range(self._least_steps):
-            found, slope = evaluate(crank)
-            if not abs(slope) > self.flat:
-                raise UndecidedError
-            step = self._step_from(found, slope, y, place)
-            crank = crank - step
-        if not abs(step) < self._greatest_last:
-            raise UndecidedError
-        return Status.CLOSED, crank + turns + 0.0
+        Return constant and factor of a line c₀ + c₁·y that the crank is within half a turn of.
 
-    @BuiltProperty
-    def _table(self) -> StartTable:
-        rows = [(float(i), *cubic) for i, cubic in enumerate(self._cubics)]
-        return StartTable([number + 1.0 for number, *_ in rows], rows)
+        It is level, unless the crank goes on with the output for a turn or more.
+        """
+        values = [self._output_at(k / self._cells)[0] for k in range(self._cells + 1)]
+        factor = 0.0
+        if self.most - self.least >= 0.999 * tau:
+            factor = (self.last - self.first) / (self.high - self.low)
+        apart = [crank - factor * y for crank, y in zip(self.cranks, values, strict=True)]
+        return 0.5 * (min(apart) + max(apart)), factor
 
     def evaluate(self, crank: float) -> tuple[float, float]:
         """Return the output at a crank of the branch, and its slope there."""
@@ -580,13 +504,15 @@ def inverse_of(closure: PlanarClosure, name: str, limited: bool = True) -> Inver
     """
     Return an output with its branches; limits of joints cut them.
 
-    Several inputs, and an output that is unknown or does not move, raise DefinitionError.
+    Several inputs, and an output that is an input or does not move, raise DefinitionError.
     """
     if len(closure.input_names) > 1:
         raise DefinitionError(
             name, f'there are {len(closure.input_names)} inputs', 'name as many joints'
         )
-    output = output_named(closure, name)
+    if name in closure.input_names:
+        raise DefinitionError(name, 'is an input', 'name a joint that depends on it')
+    output = joint_output(closure, name)
     branches = crank_branches(closure, output, limited=limited)
     if not branches:
         raise DefinitionError(name, 'nothing is within the limits', 'widen the limits')

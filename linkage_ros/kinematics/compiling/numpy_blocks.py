@@ -57,6 +57,7 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     'sqrt': np.sqrt,
     'atan2': np.arctan2,
     'copysign': np.copysign,
+    'round': np.rint,
     'maximum': np.maximum,
     'minimum': np.minimum,
     '<': np.less,

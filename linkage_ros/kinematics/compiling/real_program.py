@@ -303,7 +303,7 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
         ahead = decided if known is None else known
         tape.reset_decisions(ahead)
         state = closure.initial_state(*groups[0])
-        for step in closure.program_steps:
+        for step in closure.steps:
             before = len(tape.decisions)
             try:
                 status = step.close(state).status

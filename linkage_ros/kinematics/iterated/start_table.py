@@ -39,6 +39,9 @@ _INPUT_DIGITS = 38
 _DEEPEST = 12
 """How often a cell of the branch is halved at most."""
 
+_SHORTEST = 2.0**-20
+"""The shortest row that is halved, of the branch: beside some toggles none ever fits."""
+
 _THIRDS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 _TRIED = (0.125, 0.875)
 """Where a cubic goes through the solutions, and where it is farthest from them."""
@@ -99,10 +102,13 @@ def make_start_table(
     converges fast enough from free unknowns.
     """
     ends, rows = [], []
+    shortest = _SHORTEST * (pieces[-1].high - pieces[0].low) if pieces else 0.0
     for piece in pieces:
-        # There are hundreds of them, and no motion leads through them.
-        depth = _DEEPEST if piece.is_away else 0
-        for end, row in _fit_rows(piece, solution_at, converges, depth):
+        # A piece that is shorter from the start is halved a few times. Far away there are hundreds
+        # of pieces, and no motion leads through them: they are not.
+        halvings = 0 if piece.is_away else _DEEPEST
+        shortest_row = min(shortest, 0.25 * (piece.high - piece.low))
+        for end, row in _fit_rows(piece, solution_at, converges, (halvings, shortest_row)):
             ends.append(end)
             rows.append(row)
     if not any(row[3] for row in rows):
@@ -116,9 +122,9 @@ def _fit_rows(
     piece: StartRow,
     solution_at: Callable[[float], Array | None],
     converges: Callable[[float, Array], bool],
-    depth: int,
+    halvings: tuple[int, float],
 ) -> Iterator[tuple[float, tuple[float, ...]]]:
-    """Yield the end and the numbers of each row of a piece."""
+    """Yield the end and the numbers of each row of a piece, halved at most so often and so far."""
     import numpy as np  # local import: sources of linkages need only the table
 
     low, high, folds, _ = piece
@@ -145,12 +151,13 @@ def _fit_rows(
             )
             yield high, (*head, *cubics.T.ravel().tolist())
             return
-    if depth == _DEEPEST or not length:
+    left, shortest = halvings
+    if not left or not length or high - low <= shortest:
         yield high, (begin, 0.0, 0.0, 0.0)
         return
     middle = _round_binary(input_at(0.5), length, _INPUT_DIGITS)
     for part in (StartRow(low, middle, min(folds, 0.0)), StartRow(middle, high, max(folds, 0.0))):
-        yield from _fit_rows(part, solution_at, converges, depth + 1)
+        yield from _fit_rows(part, solution_at, converges, (left - 1, shortest))
 
 
 def _round_binary(values: Any, size: float, digits: int) -> Any:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Sequence
-from typing import overload, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from linkage_ros.errors import quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
@@ -34,7 +34,7 @@ from linkage_ros.kinematics.step import LinkState
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
-    from linkage_ros import InverseClosure, LinkagePage
+    from linkage_ros import LinkagePage
     from linkage_ros.kinematics.analysis.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.analysis.point_tracker import PointTracker
     from linkage_ros.kinematics.plane.link_frames import LinkFrames
@@ -109,31 +109,25 @@ class Closure(StepwiseClosure):
 
         return LinkagePage(self)
 
-    @overload
-    def driven_by(
-        self, joint: str, /, *, branch: int | None = None, near: float | None = None
-    ) -> InverseClosure: ...
-
-    @overload
-    def driven_by(self, joint: str, other: str, /, *others: str) -> Closure: ...
-
     def driven_by(
         self, *joints: str, branch: int | None = None, near: float | None = None
     ) -> Closure:
         """
         Return the linkage with other joints as its inputs.
 
-        With one input the closed form is inverted, along a branch. With several the loops are
-        solved in another order, in the assembly of the pose; some links may have to be iterated.
+        The loops are solved in another order, in the same assembly; some links may have to be
+        iterated. The former inputs are published joints, before the others.
 
         Parameters
         ----------
         *joints
-            As many joints as there are inputs: published ones; with one input also a coordinate
-            of a traced point, such as ``P.x``; with several also inputs that stay.
+            As many as there are inputs: published joints, inputs that stay, coordinates of points
+            such as ``P.x``, distances of points such as ``A-B``, angles of links to the ground
+            such as ``rod.angle``.
         branch
-            With one input, the number of the branch on which the crank is, as `cranks`
-            returns it. If there is only one branch within the limits, it need not be named.
+            With one input, the number of a branch that has the assembly, as `cranks` returns it.
+            If there is only one branch within the limits, it need not be named. With several
+            inputs, the pose has the assembly.
         near
             Instead of the branch a crank on it, in [rad] or [m].
 
@@ -144,16 +138,33 @@ class Closure(StepwiseClosure):
             joints do not move all of the linkage.
 
         """
+        from linkage_ros.kinematics.analysis.exchanged_inputs import (
+            exchange_input,  # local import: only few ask for it
+            exchange_inputs,  # local import: likewise
+        )
+
+        def rebuild(linkage: Linkage) -> Closure:
+            return Closure(linkage, self.name)
+
         if len(self.input_names) > 1 or len(joints) != 1:
-            from linkage_ros.kinematics.analysis.exchanged_inputs import (
-                exchange_inputs,  # local import: only few ask for it
-            )
+            return exchange_inputs(self.measuring(*joints), joints, rebuild)
+        (joint,) = joints
+        on = self.find_branch(joint, branch, near)
+        return exchange_input(self.measuring(joint), joint, on, rebuild)
 
-            return Closure(exchange_inputs(self, joints, Closure), self.name)
-        from linkage_ros import InverseClosure  # local import: only few ask for it
+    def measuring(self, *names: str) -> Closure:
+        """
+        Return the closure with these names among its joints; itself if it has them all.
 
-        inverse = self._joint_inverse(*joints)
-        return InverseClosure(self, inverse, inverse.find_branch(branch, near))
+        Names are as in `driven_by`, and so are the errors.
+        """
+        if {*names} <= {*self.joint_names, *self.input_names}:
+            return self
+        from linkage_ros.kinematics.analysis.measured_points import (
+            with_measured,  # local import: only few ask for it
+        )
+
+        return Closure(with_measured(self.linkage, names), self.name)
 
     def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
         """
@@ -190,7 +201,15 @@ class Closure(StepwiseClosure):
             inverse_of,  # local import: only few ask for it
         )
 
-        return (self._joint_inverse(joint) if limited else inverse_of(self, joint, False)).branches
+        if limited:
+            return self._joint_inverse(joint).branches
+        return inverse_of(self.measuring(joint), joint, False).branches
+
+    def find_branch(
+        self, joint: str, number: int | None = None, near: float | None = None
+    ) -> CrankBranch:
+        """Return the branch of a number, the one nearest a crank, or the only one of a joint."""
+        return self._joint_inverse(joint).find_branch(number, near)
 
     def _joint_inverse(self, joint: str) -> Inverse:
         """Return a joint with its branches over the crank; they are made once."""
@@ -200,7 +219,7 @@ class Closure(StepwiseClosure):
 
         with BUILD_LOCK:
             if joint not in self._inverses:
-                self._inverses[joint] = inverse_of(self, joint)
+                self._inverses[joint] = inverse_of(self.measuring(joint), joint)
             return self._inverses[joint]
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:

@@ -135,13 +135,19 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class RevoluteJoint:
-    """A published angle, ``child`` minus ``parent``, in [rad], as in a URDF."""
+    """
+    A published angle, ``child`` minus ``parent``, in [rad], as in a URDF.
+
+    Its whole turns are as they come, or, if ``near`` is given, such that it is within half a turn
+    of near[0] + near[1]·(first input) + near[2]·(second input) and so on, in [rad].
+    """
 
     unit: ClassVar = 'rad'
 
     parent: str
     child: str
     limits: Limits = NO_LIMITS
+    near: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

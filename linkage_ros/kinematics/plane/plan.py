@@ -128,6 +128,7 @@ class SolutionPlan(SolvedLinks):
             else:
                 self._choose_sides()  # the iteration starts from the links before it
                 self._add_iteration(group)
+            self.turn_joints()
         self._choose_sides()
         for name in self._assembly:
             keys = list_names(repr(one.assembly_key) for one in self.two_ways)

@@ -31,7 +31,14 @@ from linkage_ros.kinematics.plane.linkage import (
     SlideJoint,
 )
 from linkage_ros.kinematics.plane.topology import find_followed_links, Joint, Structure
-from linkage_ros.kinematics.step import FixedPoint, FollowerJoint, PointOnLink, PointOnRail, Step
+from linkage_ros.kinematics.step import (
+    FixedPoint,
+    FollowerJoint,
+    PointOnLink,
+    PointOnRail,
+    Step,
+    TurnsNear,
+)
 
 _MOST_TEETH = 1000
 _ROUNDED = 1e-13
@@ -158,6 +165,8 @@ class SolvedLinks:
         # `Linkage.driven_joints`, and the whole turns of a single input after which they repeat; 0
         # if they never do.
         self._followers: dict[int, int] = {}
+        self._turned: set[str] = set()
+        """The joints whose whole turns are chosen."""
         self.ratio_turns = 1
         self.pin_count = start.pin_count
         self._pins: dict[tuple[str, complex], int] = {}
@@ -246,10 +255,26 @@ class SolvedLinks:
             self.turns_with[self.coordinate_count] = with_input
             self.ratio_turns = lcm(self.ratio_turns, 0 if slides else count_turns(with_input[0]))
         elif turning and (slides or not given.ratio.is_integer()):
-            limits = self._linkage.joints[given.of].limits
-            middle = 0.5 * (limits.low + limits.high) if limits.is_bounded else 0.0
-            step = replace(step, middle=middle)
+            of = self._linkage.joints[given.of]
+            if given.of not in self._turned:
+                middle = 0.5 * (of.limits.low + of.limits.high) if of.limits.is_bounded else 0.0
+                step = replace(step, middle=middle)
         self.add_step(step)
+
+    def turn_joints(self) -> None:
+        """Add the steps that turn the newly known joints near to what the linkage says."""
+        for name, joint in self._linkage.joints.items():
+            if not isinstance(joint, RevoluteJoint) or not joint.near or name in self._turned:
+                continue
+            if not {joint.parent, joint.child} <= {*self.angles}:
+                continue
+            self._turned.add(name)
+            i, j, _, constant = self.joint_term(joint)
+            ends = (i, j, 1.0) if i not in self.turns_with else (j, i, -1.0)
+            if ends[0] not in self.turns_with:
+                units = (self.scale if given.slider else 1.0 for given in self._linkage.inputs)
+                factors = (one * unit for one, unit in zip(joint.near[1:], units, strict=True))
+                self.add_step(TurnsNear(*ends, constant, (joint.near[0], *factors)))
 
     def _number_of(self, joint: str) -> int:
         """Return the number of a joint among `Linkage.driven_joints`; -1 if it is not driven."""

@@ -161,7 +161,8 @@ class SpaceClosure(StepwiseClosure):
         Parameters
         ----------
         *joints
-            As many joints as there are inputs, which may be among them.
+            As many as there are inputs: joints, of which inputs may stay; coordinates of points
+            such as ``P.x``; distances of points such as ``A-B``.
 
         Raises
         ------
@@ -170,14 +171,29 @@ class SpaceClosure(StepwiseClosure):
 
         """
         linkage = self.linkage
-        if len(joints) != len(linkage.driven):
+        if len({*joints}) != len(linkage.driven) or len(joints) != len(linkage.driven):
             raise DefinitionError(
                 ', '.join(joints), f'{len(joints)} for {len(linkage.driven)} inputs',
                 f'name {len(linkage.driven)} different joints',
             )  # fmt: skip
+        linkage = self.measuring(*joints).linkage
         names = dict.fromkeys((*linkage.driven, *linkage.published))
         published = tuple(name for name in names if name not in joints)
         return SpaceClosure(replace(linkage, driven=joints, published=published), self.name)
+
+    def measuring(self, *names: str) -> SpaceClosure:
+        """
+        Return the closure with these names among its joints; itself if it has them all.
+
+        Names are as in `driven_by`, and so are the errors.
+        """
+        if {*names} <= {*self.joint_names, *self.input_names}:
+            return self
+        from linkage_ros.kinematics.space.measured_points import (
+            with_measured,  # local import: only few ask for it
+        )
+
+        return SpaceClosure(with_measured(self.linkage, names), self.name)
 
     def points(self, position: Position) -> dict[str, Vector]:
         """

@@ -13,7 +13,7 @@ from linkage_ros.stages.drives.dependent_samples import (
     crank_of as crank_of,
     DependentSampleReader as DependentSampleReader,
     joint_of as joint_of,
-    sampled_inverse as sampled_inverse,
+    sampled_branch as sampled_branch,
 )
 from linkage_ros.stages.drives.drive import (
     Context as Context,

@@ -19,12 +19,12 @@ from linkage_ros.messages import CrankSample, JointStateReader, Rejection
 from linkage_ros.stages.drives.drive import LARGEST
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics import CrankBranch, InverseClosure
+    from linkage_ros.kinematics import CrankBranch
 
 
-def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure:
+def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
     """
-    Return the closure that a joint drives, on the branch of a number; 0 means the only branch.
+    Return the branch of a joint by its number; 0 means the only branch.
 
     Raise the errors of `Closure.driven_by`, with the key of the scene.
     """
@@ -35,7 +35,7 @@ def sampled_inverse(closure: Closure, joint: str, number: int) -> InverseClosure
             'leave it out, and send the inputs; or name other joints as inputs of the linkage',
         )
     try:
-        return closure.driven_by(joint, branch=number or None)
+        return closure.find_branch(joint, number or None)
     except DefinitionError as error:
         key = 'drive.topic.branch' if number else 'drive.topic.joint'
         raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from math import expm1, isfinite, isnan, nan, remainder, tau
 from typing import Any
 
-from linkage_ros.description import choice, flag, number, part_name, whole_number
+from linkage_ros.description import choice, flag, number, text, whole_number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Input
 from linkage_ros.messages import CrankSample, JointStateReader, NANOSECONDS, Rejection
@@ -80,10 +80,10 @@ class TopicDrive(Drive):
     cutoff: float = number(
         'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
     )
-    joint: str = part_name(
-        'dependent joint that the samples name instead of the input, whose crank is computed; '
-        'absent, they name the input',
-        'joint',
+    joint: str = text(
+        'what the samples name instead of the input, whose crank is computed: a dependent joint, '
+        'a coordinate P.x, a distance A-B of two points, the angle LINK.angle of a link; absent, '
+        'they name the input',
         '',
     )
     branch: int = whole_number(
@@ -136,11 +136,11 @@ class TopicDrive(Drive):
         if self.joint:
             from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
                 DependentSampleReader,
-                sampled_inverse,
+                sampled_branch,
             )
 
-            inverse = sampled_inverse(context.closure, self.joint, self.branch)
-            return DependentSampleReader(inverse.branch, context.prefix + self.joint).read
+            branch = sampled_branch(context.closure, self.joint, self.branch)
+            return DependentSampleReader(branch, context.prefix + self.joint).read
         return JointStateReader(context.inputs_in_messages).read
 
 

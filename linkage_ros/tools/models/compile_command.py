@@ -33,7 +33,7 @@ from linkage_ros.description import (
     read_any_closure,
     write_folder,
 )
-from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quote
+from linkage_ros.errors import DefinitionError, LinkageError, list_names, quote
 from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.ros2_control import commanded_joints, write_package
@@ -69,8 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='JOINT',
-        help='a published joint that is given instead of an input; in a transmission, that is '
-        'commanded; may be repeated: as many as inputs',
+        help='what is given instead of an input: a joint, a coordinate P.x, a distance A-B of two '
+        'points, the angle LINK.angle of a link; in a transmission it is commanded; may be '
+        'repeated: as many as inputs',
     )
     parser.add_argument(
         '--branch',
@@ -84,7 +85,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='0: positions; 1: rates too; 2: accelerations too (default)',
     )  # fmt: skip
     parser.add_argument(
-        '--joints', metavar='NAMES', help='only these joints, with commas between them'
+        '--joints',
+        metavar='NAMES',
+        help='only these joints, or coordinates and so on, with commas between them',
     )
     parser.add_argument(
         '--arrays',
@@ -121,12 +124,13 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
     in_c = output.suffix.lower() in ('.c', '.h')
     if arguments.driven_by:
         closure = _driven_closure(closure, arguments.driven_by, arguments.branch)
+    closure, joints = _requested_joints(closure, arguments.joints)
     subject = Subject(
         closure,
         _source_name(file, arguments.name) if in_c else file.stem,
         file.name,
         arguments.derivatives,
-        _requested_joints(closure, arguments.joints),
+        joints,
     )
     text = write_arrays(subject) if arguments.arrays else write_source(subject, language(subject))
     atomic_write(output, text.encode())
@@ -152,7 +156,8 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
         )
     commanded = commanded_joints(closure, arguments.driven_by)
     inverse = _driven_closure(closure, commanded, arguments.branch)
-    joints = _requested_joints(closure, arguments.joints)
+    closure, joints = _requested_joints(closure, arguments.joints)
+    closure = closure.measuring(*commanded)
     joints = tuple(dict.fromkeys((*commanded, *joints)))
     write_folder(folder, write_package(closure, inverse, name, file.name, joints))
     print(folder)
@@ -179,17 +184,18 @@ def _source_name(file: Path, typed: str | None) -> str:
     return name
 
 
-def _requested_joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
-    """Return the requested joints, each once."""
-    published = closure.linkage.joints
+def _requested_joints(closure: Any, typed: str | None) -> tuple[Any, tuple[str, ...]]:
+    """Return the closure with the requested joints, and these joints, each once."""
     if typed is None:
-        return tuple(published)
+        return closure, closure.joint_names
     names = tuple(dict.fromkeys(name.strip() for name in typed.split(',')))
     for name in names:
-        if name not in published:
+        if name in closure.input_names:
             raise LinkageError(
-                '--joints',
-                f'{quote(name)} is not a published joint',
-                did_you_mean(name, published, f'name some of {", ".join(published)}'),
-            )
-    return names
+                '--joints', f'{quote(name)} is an input, which is given',
+                f'name some of {list_names(closure.joint_names)}',
+            )  # fmt: skip
+    try:
+        return closure.measuring(*names), names
+    except DefinitionError as error:
+        raise LinkageError('--joints', f'{error.where}: {error.reason}', error.remedy) from None

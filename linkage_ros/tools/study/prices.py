@@ -32,7 +32,7 @@ from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.stages.drives import sampled_inverse
+from linkage_ros.stages.drives import sampled_branch
 from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.study.budget import Knob, Price
 from linkage_ros.tools.study.measuring import Progress, Spread, spread_of, thread_clock
@@ -119,7 +119,7 @@ def _input_paths(linkage: LinkagePipeline) -> list[Path]:
             speed = tau * _CRANK_RATE
             return [lambda seconds: (speed * seconds, speed)]
         return swinging_inputs(closure, _CRANK_RATE)
-    branch = sampled_inverse(closure, joint, linkage.scene_linkage.drive[1].branch).branch
+    branch = sampled_branch(closure, joint, linkage.scene_linkage.drive[1].branch)
     middle, width = 0.5 * (branch.low + branch.high), branch.high - branch.low
     return [_oscillation_path(middle, _PART * width, tau * _CRANK_RATE)]
 

@@ -52,7 +52,7 @@ from linkage_ros.node import (
 )
 from linkage_ros.replay import read_change
 from linkage_ros.signals import bounded_end
-from linkage_ros.stages.drives import DependentSampleReader, joint_of, sampled_inverse
+from linkage_ros.stages.drives import DependentSampleReader, joint_of, sampled_branch
 from linkage_ros.tools.view.followed_run import diagnostics_content, FollowedRun, read_run
 from linkage_ros.tools.view.hand_crank import HandCrank, HELD
 from linkage_ros.tools.view.live import KINDS
@@ -584,9 +584,9 @@ def _read_flag(content: Mapping[str, Any]) -> bool:
 
 def _branch_of(scene_linkage: SceneLinkage) -> CrankBranch:
     """Return the branch on which a dependent joint moves a crank."""
-    return sampled_inverse(
+    return sampled_branch(
         scene_linkage.closure, scene_linkage.dependent_joint, scene_linkage.drive[1].branch
-    ).branch
+    )
 
 
 def _crank_reader(scene_linkage: SceneLinkage) -> JointStateReader | DependentSampleReader:

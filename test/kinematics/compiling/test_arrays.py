@@ -116,9 +116,9 @@ def test_numpy_tells_of_limits():
 )
 def test_a_dependent_joint_may_be_the_input(name, joint):
     closure = closure_of(name).driven_by(joint, branch=1)
-    (reached,) = closure.input_ranges
-    beyond = 0.1 * (reached.highest - reached.lowest)
-    inputs = np.linspace(reached.lowest - beyond, reached.highest + beyond, 500)[:, None]
+    branch = closure_of(name).branches(joint)[0]
+    beyond = 0.1 * (branch.high - branch.low)
+    inputs = np.linspace(branch.low - beyond, branch.high + beyond, 500)[:, None]
     module = module_of(subject(closure))
     status, joints = module['position'](inputs)
     slopes = module['jacobian'](inputs)

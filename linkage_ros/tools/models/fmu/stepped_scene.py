@@ -94,8 +94,8 @@ class _Sender:
         self._count = len(scene_linkage.sampled_joints)
         self._write = JointStateWriter(scene_linkage.sampled_joints).write
         parts = (
-            [scene_linkage.linkage.joints[scene_linkage.dependent_joint]]
-            if scene_linkage.dependent_joint
+            [scene_linkage.closure.measuring(dependent).linkage.joints[dependent]]
+            if (dependent := scene_linkage.dependent_joint)
             else (scene_linkage.linkage.inputs)
         )
         self.variables = [

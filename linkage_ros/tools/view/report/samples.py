@@ -23,7 +23,7 @@ from linkage_ros.description import Scene
 from linkage_ros.errors import BagError
 from linkage_ros.messages import Rejection
 from linkage_ros.replay import read_change, turn_fault
-from linkage_ros.stages.drives import crank_of, sampled_inverse
+from linkage_ros.stages.drives import crank_of, sampled_branch
 from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.view.report.blocks import MessageRows
 from linkage_ros.tools.view.report.decimation import Flags, Numbers, Times
@@ -46,7 +46,7 @@ class CrankHistory:
         self._carried = bool(of.carry_forward)
         self._branch = None
         if of.joint:
-            self._branch = sampled_inverse(linkage.closure, of.joint, of.branch).branch
+            self._branch = sampled_branch(linkage.closure, of.joint, of.branch)
         width = len(columns)
         self._number = np.array([-1])
         self._stamp = np.zeros(1, np.int64)

@@ -137,7 +137,9 @@ def test_rates_of_the_crank_give_the_joint_its_rates(name):
                 for row, other in enumerate(inverse.joint_names[1:], 1):
                     at = closure.joint_names.index(other)
                     assert velocity.joints[row] == pytest.approx(float(truth.rates[at]), rel=1e-9)
-                    assert position.joints[row] == closure.position(position.joints[0]).joints[at]
+                    off = position.joints[row] - float(truth.joints[at].mid())
+                    off = remainder(off, tau) if closure.turning[at] else off
+                    assert off == pytest.approx(0.0, abs=1e-12)
 
 
 def closures_to_scan():
@@ -218,7 +220,7 @@ def test_slide_through_infinity_has_a_branch_up_to_each_pole(slide):
         inverse = closure.driven_by('shoe_slide', branch=number)
         position = inverse.position(slide)
         assert position.status is Status.CLOSED
-        assert position.joints[0] == crank
+        assert position.joints[0] == pytest.approx(crank, abs=2e-15)
         velocity = inverse.velocity(position, 0.7)
         # A crank of 6 is rounded by 4e-16, and so is its distance from the pole.
         exact = {'rel': 1e-13 + 4e-15 * abs(slide)}
@@ -228,15 +230,17 @@ def test_slide_through_infinity_has_a_branch_up_to_each_pole(slide):
         assert changed == pytest.approx(bend, **exact, abs=1e-15 / (1.0 + slide**4))
 
 
-@pytest.mark.parametrize('slide', [3e6, -1e19, 1e300, -1.7e308])
-def test_slide_too_near_a_pole_is_open(slide):
+@pytest.mark.parametrize('slide', [3e6, -1e19, 1e150])
+def test_slide_too_near_a_pole_has_no_crank_but_drives_the_crank(slide):
+    """The crank has too few digits for the slide; the slide has enough for the crank."""
     closure = tangent_mechanism()
     assert closure.cranks('shoe_slide', slide) == []
-    inverse = closure.driven_by('shoe_slide', branch=1)
-    position = inverse.position(slide)
-    assert position.status is Status.OPEN
-    assert abs(slide) - position.gap == pytest.approx(2.0**21, rel=1e-3, abs=1e-6 * abs(slide))
-    assert inverse.input_ranges[0].toggles == ()
+    for number in (1, 2):
+        position = closure.driven_by('shoe_slide', branch=number).position(slide)
+        assert position.status is Status.CLOSED
+        assert remainder(position.joints[0] - atan2(1.0, slide), pi) == pytest.approx(
+            0.0, abs=1e-15
+        )
 
 
 def test_pole_is_no_end_of_the_range_of_the_crank():
@@ -318,18 +322,20 @@ def test_calls_in_any_order_give_the_same_bits():
 
 def test_joint_that_turns_back_is_a_toggle_there_and_open_beyond():
     inverse = load('four_bar').driven_by('rocker_joint', branch=1)
+    branch = load('four_bar').branches('rocker_joint')[0]
     # The dead centres of the crank-rocker: coupler and crank in line (cosine rule).
     a, b, c, d = _lengths(load('four_bar').linkage)
-    for reach, end in ((b + a, inverse.branch.low), (b - a, inverse.branch.high)):
+    for reach, end in ((b + a, branch.low), (b - a, branch.high)):
         at_ground = np.arccos((c * c + d * d - reach * reach) / (2 * c * d))
         assert end == pytest.approx(pi - at_ground, abs=1e-14)
         position = inverse.position(end)
         assert position.status is Status.TOGGLE
         with pytest.raises(ValueError, match='toggle has none'):
             inverse.velocity(position, 1.0)
-    beyond = inverse.position(inverse.branch.high + 0.25)
-    assert (beyond.status, beyond.gap) == (Status.OPEN, pytest.approx(0.25))
-    assert '0.25 rad' in repr(beyond)
+    beyond = inverse.position(branch.high + 0.25)
+    # The crank pin is as far from where the coupler ends as the crank is too long.
+    opened = sqrt(c * c + d * d - 2 * c * d * np.cos(pi - branch.high - 0.25))
+    assert (beyond.status, beyond.gap) == (Status.OPEN, pytest.approx(b - a - opened))
     assert inverse.position(float('nan')).status is Status.INDETERMINATE
 
 
@@ -341,25 +347,32 @@ def _lengths(linkage):
     return [length(link) for link in ('crank', 'coupler', 'rocker', 'ground')]
 
 
-def test_crank_at_its_toggle_stands_while_the_joint_moves():
-    for number in (1, 2, 3, 4):
-        inverse = load('double_rocker').driven_by('right_rocker_joint', branch=number)
-        end = inverse.input_ranges[0][inverse.branch.steep.index(True)]
-        middle = 0.5 * (inverse.branch.low + inverse.branch.high)
-        position = inverse.position(end)
-        velocity = inverse.velocity(position, 0.5)
-        acceleration = inverse.acceleration(position, velocity, 0.2)
-        assert position.status is Status.CLOSED
-        assert velocity.joints[0] == 0.0
-        step = 1e-4 if middle > end else -1e-4
-        beside = inverse.position(end + step)
-        assert beside.joints[0] == pytest.approx(
-            position.joints[0] + 0.5 * step**2 * acceleration.joints[0] / 0.25, abs=1e-10
+@pytest.mark.parametrize('number', [1, 2, 3, 4])
+def test_joint_leads_the_crank_through_its_toggle(number):
+    """There the crank stands; behind it the crank turns back, in its other assembly."""
+    closure = load('double_rocker')
+    branch = closure.branches('right_rocker_joint')[number - 1]
+    inverse = closure.driven_by('right_rocker_joint', branch=number)
+    end = (branch.low, branch.high)[branch.steep.index(True)]
+    step = 1e-4 if 0.5 * (branch.low + branch.high) > end else -1e-4
+    position = inverse.position(end)
+    velocity = inverse.velocity(position, 0.5)
+    acceleration = inverse.acceleration(position, velocity, 0.2)
+    assert position.status is Status.CLOSED
+    assert velocity.joints[0] == pytest.approx(0.0, abs=1e-7)
+    for beside in (step, -step):
+        found = inverse.position(end + beside)
+        bend = acceleration.joints[0] / 0.25
+        assert found.joints[0] == pytest.approx(
+            position.joints[0] + 0.5 * beside**2 * bend, abs=1e-10
         )
-        moving = inverse.velocity(beside, 0.5)
+        moving = inverse.velocity(found, 0.5)
         assert velocity.joints == pytest.approx(moving.joints, abs=2e-3)
-        nearly = inverse.acceleration(beside, moving, 0.2)
+        nearly = inverse.acceleration(found, moving, 0.2)
         assert acceleration.joints == pytest.approx(nearly.joints, abs=5e-3)
+    assert len(closure.cranks('right_rocker_joint', end - step)) < len(
+        closure.cranks('right_rocker_joint', end + step)
+    )
 
 
 def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
@@ -384,21 +397,22 @@ def test_limits_cut_branches():
     crank = replace(linkage.inputs[0], limits=Limits(0.5, 3.0))
     closure = Closure(replace(linkage, inputs=(crank,)))
     inverse = closure.driven_by('rocker_joint')  # Only one is left.
-    assert inverse.branch.by == ('crank_joint', 'crank_joint')
+    assert closure.branches('rocker_joint')[0].by == ('crank_joint', 'crank_joint')
     assert inverse.position(closure.position(3.0)['rocker_joint']).status is Status.CLOSED
     ends = [closure.position(x)['rocker_joint'] for x in (0.5, 3.0)]
     assert inverse.input_ranges[0][:2] == pytest.approx(tuple(ends), abs=1e-14)
-    assert inverse.position(ends[1] + 0.1).status is Status.OPEN
+    assert inverse.position(ends[1] + 0.1).status is Status.LIMITED
     assert closure.cranks('rocker_joint', ends[1] + 0.1) == []
 
 
 def test_iterated_linkage_is_inverted_along_its_branch():
     closure = load('class_3')
     inverse = closure.driven_by('platform_joint', branch=1)
-    y = 0.5 * (inverse.branch.low + inverse.branch.high)
+    branch = closure.branches('platform_joint')[0]
+    y = 0.5 * (branch.low + branch.high)
     position = inverse.position(y)
     again = closure.position(position.joints[0])
-    assert again['platform_joint'] == pytest.approx(y, abs=1e-14)
+    assert again['platform_joint'] == pytest.approx(y, abs=4e-14)
     velocity = inverse.velocity(position, 1.0)
     acceleration = inverse.acceleration(position, velocity, 0.0)
     step = 1e-4
@@ -449,7 +463,8 @@ def test_many_states_are_those_of_single_calls():
             velocity = inverse.velocity(position, 2.0)
             acceleration = inverse.acceleration(position, velocity, 0.5)
             found = (position.joints, velocity.joints, acceleration.joints)
-            assert [tuple(group[:, k]) for group in batch[1:]] == [*found]
+            for group, joints in zip(batch[1:], found, strict=True):
+                assert group[:, k] == pytest.approx(joints, rel=1e-12)
 
 
 def test_inverse_is_pickled_with_its_branch():
@@ -512,7 +527,7 @@ def test_several_inputs_are_exchanged_in_the_same_assembly(name, joints):
 def test_nothing_is_imported_that_was_not_asked_for():
     code = (
         'import sys, linkage_ros as lr; lr.load("four_bar").position(0.7); '
-        'print(sorted(name for name in sys.modules if "inverse" in name or "crank_br" in name))'
+        'print(sorted(name for name in sys.modules if "exchange" in name or "crank_br" in name))'
     )
     told = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == '[]'
