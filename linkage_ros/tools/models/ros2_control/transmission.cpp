@@ -134,9 +134,10 @@ public:
 
   void note(std::atomic<int> & which, int status, const Values & values)
   {
-    if (status > LAST_WITH_VALUES) {
+    const bool is_command = &which == &command;
+    if (status > (is_command ? LAST_VALID : LAST_WITH_VALUES)) {
       for (std::size_t k = 0; k < INPUTS; ++k) {
-        (&which == &command ? commanded_ : measured_)[k].store(
+        (is_command ? commanded_ : measured_)[k].store(
           values[k], std::memory_order_relaxed);
       }
     }
@@ -154,17 +155,20 @@ private:
     std::unique_lock<std::mutex> lock(mutex_);
     int told_state = 0, told_command = 0;
     while (!wakes_.wait_for(lock, std::chrono::seconds(1), [this] {return ends_;})) {
-      tell(state, told_state, measured_, "the actuators' ", "no new joint states");
-      tell(command, told_command, commanded_, "the command ", "the last valid command stays");
+      tell(
+        state, told_state, LAST_WITH_VALUES, measured_, "the actuators' ", "no new joint states");
+      tell(
+        command, told_command, LAST_VALID, commanded_, "the command ",
+        "the last valid command stays");
     }
   }
 
   void tell(
-    const std::atomic<int> & of, int & told, const Noted & noted, const char * what,
+    const std::atomic<int> & of, int & told, int last, const Noted & noted, const char * what,
     const char * then) const
   {
     const int status = of.load(std::memory_order_relaxed);
-    if (status != told && status > LAST_WITH_VALUES) {
+    if (status != told && status > last) {
       std::string values;
       for (const auto & value : noted) {
         values += (values.empty() ? "" : ", ") +
