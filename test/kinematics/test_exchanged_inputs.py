@@ -33,6 +33,7 @@ from linkage_ros.kinematics import (
     CrankBranch,
     Input,
     InputRange,
+    is_iterated,
     Linkage,
     SlideJoint,
     Slider,
@@ -383,6 +384,49 @@ def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
         assert crank - tau * turns == pytest.approx(first, abs=1e-12)
     backwards = load('four_bar').driven_by('coupler_joint')
     assert backwards.position(0.1 + tau).joints[0] < backwards.position(0.1).joints[0]
+
+
+@pytest.mark.sample(8)
+@pytest.mark.parametrize('name', LINKAGES)
+def test_exchanged_input_has_the_crank_of_its_branch_with_its_whole_turns(name):
+    """
+    The crank runs on from end to end of the branch; its errors are as those of `cranks`.
+
+    Links that are iterated have twice as many roundings.
+    """
+    closure = gallery(name)
+    rng = random.Random(name)
+    for joint in outputs(closure)[:2] + outputs(closure)[-1:]:
+        row = closure.joint_names.index(joint)
+        (branch, *_) = closure.branches(joint)
+        inverse = closure.driven_by(joint, branch=branch.number)
+        limit = 16.0 if is_iterated(inverse) else 8.0
+        for share in [1e-3, 1.0 - 1e-3, *(rng.random() for _ in range(STATES // 3))]:
+            y, known = branch.state_at(share)
+            crank = inverse.position(y)[closure.input_names[0]]
+            assert crank == pytest.approx(known, abs=1e-9)
+            forward = closure.position(crank)
+            slope = abs(closure.velocity(forward, 1.0).joints[row])
+            off = forward.joints[row] - y
+            off = remainder(off, tau) if branch.turning else off
+            size = tau if branch.turning else closure.scale
+            allowed = slope * (abs(crank) + 1.0) + abs(y) + size
+            assert abs(off) <= limit * U * allowed, (joint, share)
+
+
+def test_joint_whose_own_plan_cannot_pass_a_change_point_is_refused():
+    with pytest.raises(DefinitionError, match='rod_joint: as the input passes a change point'):
+        load('parallelogram').driven_by('rod_joint')
+
+
+def test_follower_is_an_input_and_what_it_followed_follows_it():
+    closure = load('gripper')
+    inverse = closure.driven_by('right_knuckle_joint')
+    position = closure.position(0.4)
+    found = inverse.position(position['right_knuckle_joint'])
+    for joint in inverse.joint_names:
+        wanted = 0.4 if joint == 'left_knuckle_joint' else position[joint]
+        assert found[joint] == pytest.approx(wanted, abs=1e-15)
 
 
 def test_joint_that_oscillates_is_compared_modulo_a_turn():
