@@ -315,7 +315,7 @@ class FollowerJoint(LinearStep):
 
 
 @dataclass(frozen=True, slots=True)
-class TurnsNear:
+class TurnsNear(Step):
     """
     Whole turns of a link, such that a joint of it is near a value that is linear in the inputs.
 
