@@ -21,6 +21,7 @@ single input, and `GridGroup` for several.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
@@ -182,10 +183,7 @@ class Iteration(Step):
 
     def _list_solution(self, pose: GroupPose, solved: LinkState) -> list[Any]:
         """Return the unknowns, the angles with their turns, and the slides."""
-        angles = [
-            angle + more if more else angle
-            for angle, more in zip(pose.unknowns[0::3], pose.gained[0::3], strict=True)
-        ]
+        angles = map(add, pose.unknowns[0::3], pose.gained[0::3])
         slides = [slide.place(pose.unknowns, solved).real for slide in self._slides]
         return [*pose.unknowns, *angles, *slides]
 
