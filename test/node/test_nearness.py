@@ -46,7 +46,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, is_open=Fal
     )
     scene_linkage = SimpleNamespace(
         name='',
-        drive=('topic', None),
+        drive=('topic', SimpleNamespace(gives_torque=False)),
         linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}),
     )
     linkages = [SimpleNamespace(scene_linkage=scene_linkage, closure=closure, drive=None)]

@@ -38,9 +38,9 @@ def four_bar_lengths(a: float, b: float, c: float, d: float) -> tuple[float, flo
         return a, d, a, d
     if _are_equal(a, b) and _are_equal(c, d):
         return a, a, d, d
-    if _are_equal(a, d) and _are_equal(b, c):
-        return a, b, b, a
     size = a + b + c + d
+    if max(abs(a - d), abs(b - c)) <= _IN_LINE * min(a, b):
+        return a, b, b, a  # Where the two pins meet, they may pass each other closely.
     if _is_rounding(off := exact_sum(b, c, -a, -d), size):
         return a, b - off, c, d
     if _is_rounding(off := exact_sum(max(a, d), -min(a, d), -max(b, c), min(b, c)), size):
@@ -49,8 +49,8 @@ def four_bar_lengths(a: float, b: float, c: float, d: float) -> tuple[float, flo
 
 
 def swivel_lengths(a: float, d: float, offset: float) -> tuple[float, float, float]:
-    """Return crank, ground and offset of an inverted slider-crank."""
-    if _are_equal(a, d) and abs(offset) <= PAIRED * a:
+    """Return crank, ground and offset of an inverted slider-crank; pins may pass closely."""
+    if max(abs(a - d), abs(offset)) <= _IN_LINE * a:
         return a, a, 0.0
     if _is_rounding(off := exact_sum(max(a, d), -min(a, d), -abs(offset)), a + d):
         return a, d, offset + off if offset > 0.0 else offset - off

@@ -341,7 +341,8 @@ class _PlanarModel:
         """Return a pose that tells the assembly of a parallelogram that is drawn flat."""
         crank_pins = [pin for pin in self._pins if GROUND in pin.links]
         others = [pin for pin in self._pins if GROUND not in pin.links]
-        if not (len(self._links) == 4 and len(crank_pins) == len(others) == 2):
+        is_four_bar = len(self._links) == 4 and len(crank_pins) == len(others) == 2
+        if not is_four_bar or any(len(pin.links) != 2 for pin in self._pins):
             return pose
         moved, cranks = dict(pose.points), []
         for pivot in crank_pins:

@@ -201,7 +201,7 @@ def measure_age_of_command(
         return None
     settings: list[Setting | None] = [own]
     settings.append(measure_setting({'carry_forward': not use.carry_forward}))
-    if use.is_measured and use.acceleration == 'zero':
+    if motion.scene_linkage.drive[1].is_measured and use.acceleration == 'zero':
         differenced = {} if use.carry_forward else {'carry_forward': True}
         settings.append(measure_setting({'acceleration': 'differenced', **differenced}))
     if motion.samples:

@@ -215,13 +215,21 @@ def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
         before = [*before[-1:], here]
 
 
-@pytest.mark.parametrize('kind', FLAT)
-@pytest.mark.parametrize('digits', [17, 16, 13, 11])
+# A swivel may be passed closely, so that lengths are as they are written.
+@pytest.mark.parametrize(
+    ('kind', 'digits'),
+    [
+        (kind, digits)
+        for kind in FLAT
+        for digits in (17, 16, 13, 11)
+        if kind != 'RPR' or digits > 15
+    ],
+)
 def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
     rng = random.Random(f'{kind} {digits}')
     for hips in range(3):
         made: Flat = FLAT[kind](rng)
-        while digits < 16 and len(made.at) + 2 * len(made.meets) < 2:
+        while digits < 16 and len(made.at) < 2:
             # So rounded, only lengths that are equal in pairs are known to have been equal.
             made = FLAT[kind](rng)
         plane = Closure(made.linkage)
