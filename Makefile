@@ -36,7 +36,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test test_all bench accuracy topologies synthesis round_trips gallery schema reference effects docs lint format
-.PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled arrays
+.PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled arrays planar_loops
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 sets the duration)'
@@ -47,6 +47,7 @@ help:
 	@echo 'make accuracy  test the kinematics on 17 million cases, plane and space, and topologies (one hour)'
 	@echo 'make topologies  test random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make arrays    add PyTorch, and test linkages as functions of arrays in all libraries (10 min)'
+	@echo 'make planar_loops  solve 660,000 states of planar loops in space, through change points (4 min)'
 	@echo 'make compiled  compare 100,000 states in C, Python and JavaScript with the plain steps (8 min)'
 	@echo 'make accuracy_page  measure where errors come from, into docs/accuracy.md (8 min)'
 	@echo 'make synthesis compute docs/synthesis.md and its pictures'
@@ -182,6 +183,9 @@ topologies: $(STAMP)
 
 compiled: $(STAMP)
 	@LINKAGE_STATES=100000 $(BIN)/python -m pytest -q test/kinematics/compiling
+
+planar_loops: $(STAMP)
+	@LINKAGE_STATES=40000 $(BIN)/python -m pytest -q test/kinematics/space/test_planar_loops.py
 
 # PyTorch is in no lock file: its wheel for Linux brings gigabytes of CUDA. PIP_INDEX_URL may name
 # an index with wheels for the CPU.

@@ -38,8 +38,8 @@ from ...support.scenes import size_of
 
 Array = NDArray[np.float64]
 
-STATES = int(os.environ.get('LINKAGE_STATES', '1200'))
-"""Number of states of each linkage; `make test_all` takes more."""
+STATES = int(os.environ.get('LINKAGE_STATES', '600'))
+"""Number of states of each linkage; `make planar_loops` takes 40,000."""
 
 BESIDE = [10.0**-digits for digits in range(1, 16)]
 
