@@ -30,6 +30,7 @@ from linkage_ros.kinematics.plane.linkage import (
     GROUND,
     Input,
     Linkage,
+    NO_LIMITS,
     Point,
     Ratio,
     RevoluteJoint,
@@ -245,8 +246,7 @@ class _PlanarModel:
         joined = {self._links[0]}
         for _ in pairs:
             joined.update(*(pair for pair in pairs if not joined.isdisjoint(pair)))
-        loose = [link for link in self._links if link not in joined]
-        if any(link in self._linkage.link_names and link in _ends_of(pairs) for link in loose):
+        if not _ends_of(pairs) <= joined:
             return False
         rods = [edge for edge in self._edges if edge not in self._linkage.pair_joints]
         if any(self._edges[edge][1] not in joined for edge in rods):
@@ -313,8 +313,8 @@ class _PlanarModel:
         made: dict[str, RevoluteJoint | SlideJoint] = {}
         for name in (*self._inputs, *self._joints):
             if name in sliders:
-                limits = spatial.pair_joints[name].limits if name in spatial.slides else None
-                made[name] = SlideJoint(name, limits) if limits else SlideJoint(name)
+                limits = spatial.slides[name].limits if name in spatial.slides else NO_LIMITS
+                made[name] = SlideJoint(name, limits)
                 offsets[name] = 0.0
                 continue
             joint = spatial.hinges[name]
