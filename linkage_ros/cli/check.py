@@ -160,6 +160,22 @@ def _structure_json(closure: Closure) -> dict[str, Any]:
         ],
         'limits': _limits_json(linkage),
         'unwrapped': _counts_turns(closure),
+        **_corrections_json(linkage),
+    }
+
+
+def _corrections_json(linkage: Linkage | SpaceLinkage) -> dict[str, Any]:
+    """Return what was corrected in the pose of a linkage that is drawn in space."""
+    corrections = linkage.corrections
+    if corrections is None:
+        return {}
+    return {
+        'plane': list(linkage.axes) if isinstance(linkage, Linkage) else None,
+        'robot_open_by_m': corrections.open_by,
+        'robot_turned_by_rad': corrections.turned_by,
+        'merged_by_m': corrections.merged_by,
+        'tilted_by_rad': corrections.tilted_by,
+        'left_out': list(linkage.left_out),
     }
 
 
@@ -180,7 +196,7 @@ def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
     if len(linkage.inputs) > 1:
         raise LinkageError('--branches', f'there are {len(linkage.inputs)} inputs', 'leave it out')
     names = [joint for joint in linkage.joints if joint != linkage.inputs[0].joint]
-    names += [f'{point}.{axis}' for point in linkage.traced for axis in 'xy']
+    names += [f'{point}.{axis}' for point in linkage.traced for axis in linkage.axes]
     for name in names:
         with suppress(DefinitionError):  # It does not move.
             for branch in closure.branches(name):
@@ -357,11 +373,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         **_examine_reach(closure, sweep),
         **_examine_states(closure, sweep),
         **_examine_joints(closure, sweep),
-        'robot_open_by_m': linkage.open_by,
-        'robot_turned_by_rad': linkage.turned_by,
-        'merged_by_m': linkage.merged_by,
-        'tilted_by_rad': closure.tilt,
-        'left_out': list(linkage.left_out),
+        **_corrections_json(linkage),
         'groups': [group._asdict() for group in closure.groups],
         **tables_json(tables[1:]),
     }, tables

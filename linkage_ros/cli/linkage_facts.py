@@ -49,6 +49,9 @@ def _planar_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[t
             else f'angle of {given["child"]} to {given["parent"]}'
         )
         yield 'input', f'{given["joint"]}: {driven}'
+    if account.get('plane'):
+        yield 'plane', ' and '.join(account['plane'])
+        yield from _correction_facts(account, units)
     yield from _reach_facts(account, units)
 
 
@@ -68,6 +71,14 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         count = account['redundant_equations']
         equations = f'{count} equation{"s" * (count != 1)}'
         yield 'redundant', f'{equations}, met within the worst residual'
+    yield from _correction_facts(account, units)
+    yield from _reach_facts(account, units)
+
+
+def _correction_facts(
+    account: Mapping[str, Any], units: DisplayUnits
+) -> Iterator[tuple[str, str]]:
+    """Yield what was corrected in the pose of a robot or of a linkage in space."""
     if account['robot_open_by_m'] is not None:
         open_by = units.format_length(account['robot_open_by_m'], '.2g')
         if turned_by := account['robot_turned_by_rad']:
@@ -78,10 +89,9 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
         yield 'merged', f'places of the pose that are up to {apart} apart'
     if tilted_by := account['tilted_by_rad']:
         tilt = f'{units.convert(tilted_by):.2g} {units.angle}'
-        yield 'parallel', f'axes of planar loops that are up to {tilt} apart'
+        yield 'parallel', f'axes that are up to {tilt} apart'
     if account['left_out']:
         yield 'left out, in no loop', ', '.join(account['left_out'])
-    yield from _reach_facts(account, units)
 
 
 def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:

@@ -388,8 +388,8 @@ def _slope_text(slope: float | None, _units: DisplayUnits) -> str:
     return '' if slope is None else f'{slope:.{_DIGITS}f}'
 
 
-def _axes(closure: StepwiseClosure) -> str:
-    return 'xy' if isinstance(closure, Closure) else 'xyz'
+def _axes(closure: StepwiseClosure) -> Sequence[str]:
+    return closure.linkage.axes if isinstance(closure, Closure) else 'xyz'
 
 
 def _state_column(name: str, unit: str) -> Column:

@@ -52,7 +52,8 @@ from linkage_ros.description.urdf_file import (
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
-    closure_in_pose,
+    Closure,
+    closure_as_drawn,
     cross,
     direction_of,
     dot,
@@ -65,6 +66,7 @@ from linkage_ros.kinematics import (
     minus,
     ONE_PLACE,
     plus,
+    PoseCorrections,
     Ratio,
     scale,
     SpaceClosure,
@@ -124,14 +126,14 @@ ROBOT = Keys(
 
 def read_robot_closure(
     content: Section, name: str = '', *, publish_inputs: bool = False
-) -> SpaceClosure:
+) -> Closure | SpaceClosure:
     """Read the loops of a robot and check that they close; errors as in `read_closure`."""
     urdf = read_urdf(content.named_data, content.mapping['urdf'])
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
 
-    def close(without: Sequence[str] = ()) -> SpaceClosure:
-        closure = closure_in_pose(robot.linkage(publish_inputs, without), name)
+    def close(without: Sequence[str] = ()) -> Closure | SpaceClosure:
+        closure = closure_as_drawn(robot.linkage(publish_inputs, without), name)
         check_limits(closure)
         return closure
 
@@ -504,6 +506,7 @@ class _Robot:
         found = [*made.hinges, *made.slides]
         for loop in self._loops:
             self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
+        traced = tuple(self._add_traced(on, frames, made))
         published = [k for k in self._moving if k in found and k not in self._driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
         return SpaceLinkage(
@@ -512,10 +515,20 @@ class _Robot:
             driven=self._driven,
             published=(*(self._driven if publish_inputs else ()), *published),
             ratios={name: of for name, of in ratios.items() if name in found},
+            traced=traced,
             left_out=(*left_out, *(f'mimic of {name}' for name in without)),
-            open_by=open_by[0],
-            turned_by=turned_by[0],
+            corrections=PoseCorrections(open_by[0], turned_by[0]),
         )
+
+    def _add_traced(
+        self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], made: _LinkageParts
+    ) -> Iterator[str]:
+        """Add the frames called POINT_on_LINK that meet no other as points of links that move."""
+        for point, (frame, *others) in pin_frames(self._urdf).items():
+            if not others and point not in made.points and (link := on[frame]) != GROUND:
+                made.points[point] = frames[frame].origin
+                made.links[link] = (*made.links.get(link, ()), point)
+                yield point
 
     def _limits_in_pose(self, joint: UrdfJoint, value: float, told: float) -> Limits:
         """Return the limits of a joint, whose value in the pose is corrected."""

@@ -22,7 +22,8 @@ from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_limits,
-    closure_in_pose,
+    Closure,
+    closure_as_drawn,
     GROUND,
     GROUND_FRAME,
     SpaceClosure,
@@ -38,10 +39,10 @@ def is_spatial(content: Section) -> bool:
 
 def read_space_closure(
     content: Section, name: str = '', *, publish_inputs: bool = False
-) -> SpaceClosure:
+) -> Closure | SpaceClosure:
     """Read a spatial linkage and check that its pose closes; errors as in `read_closure`."""
     try:
-        closure = closure_in_pose(_read_linkage(content, publish_inputs), name)
+        closure = closure_as_drawn(_read_linkage(content, publish_inputs), name)
         check_limits(closure)
     except DefinitionError as error:
         where = _own_key(content, error.where)

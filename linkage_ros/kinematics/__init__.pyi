@@ -143,6 +143,7 @@ from linkage_ros.kinematics.plane.linkage import (
     Mass as Mass,
     NO_LIMITS as NO_LIMITS,
     Point as Point,
+    PoseCorrections as PoseCorrections,
     Ratio as Ratio,
     RevoluteJoint as RevoluteJoint,
     Side as Side,
@@ -183,7 +184,6 @@ from linkage_ros.kinematics.results import (
 )
 from linkage_ros.kinematics.space.carried_points import CarriedPoints as CarriedPoints
 from linkage_ros.kinematics.space.closure import (
-    closure_in_pose as closure_in_pose,
     SpaceClosure as SpaceClosure,
 )
 from linkage_ros.kinematics.space.freedom import (
@@ -196,6 +196,7 @@ from linkage_ros.kinematics.space.linkage import (
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
 )
+from linkage_ros.kinematics.space.one_plane import closure_as_drawn as closure_as_drawn
 from linkage_ros.kinematics.space.rod_joints import with_rod_joints as with_rod_joints
 from linkage_ros.kinematics.space.vectors import (
     cross as cross,

@@ -125,7 +125,7 @@ def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_pat
         found = ankle.position(*map(radians, at))
         for name, value in zip(ankle.joint_names, found.joints, strict=True):
             assert abs(value - radians(joints[name])) < 1e-8
-    assert 6.9e-18 < ankle.linkage.merged_by < 8e-18
+    assert 6.9e-18 < ankle.linkage.corrections.merged_by < 8e-18
 
 
 def test_check_says_the_largest_distance_that_was_merged(tmp_path, capsys):
@@ -140,5 +140,5 @@ def test_hinges_a_hundred_thousandth_of_the_size_apart_are_two(tmp_path):
     text = ''.join(ankle_urdf()).replace('6.93889e-18', '2e-6')
     (tmp_path / 'ankle.urdf').write_text(text)
     ankle = load(tmp_path / 'ankle.urdf', {'input': ['m1', 'm2']})
-    assert ankle.linkage.merged_by == 0.0
+    assert ankle.linkage.corrections.merged_by == 0.0
     assert dist(ankle.linkage.hinges['r1x'].at, ankle.linkage.hinges['r1y'].at) > 1e-6

@@ -145,15 +145,20 @@ def near_pose(closure, reach, count):
     return pose + RNG.uniform(-reach, reach, (count, len(pose)))
 
 
+def pose_of(closure):
+    inputs = closure.linkage.pose.inputs
+    names, joints = closure.joint_names, closure.position(*inputs).joints
+    return dict(zip((*closure.input_names, *names), (*inputs, *joints), strict=True))
+
+
 @pytest.mark.parametrize('name', CHOICES)
 def test_states_are_those_of_newtons_method_on_the_urdf(name):
     told, loops, reach = CHOICES[name]
     closure = load(ROBOTS / f'{name}.urdf', told)
     walk = Walk((ROBOTS / f'{name}.urdf').read_text(), loops)
-    names = [*closure.linkage.driven, *closure.joint_names]
-    pose = {k: closure.linkage.pose_value(k) for k in names}
+    pose = pose_of(closure)
     for inputs in near_pose(closure, reach, 2):
-        given = dict(zip(closure.linkage.driven, inputs.tolist(), strict=True))
+        given = dict(zip(closure.input_names, inputs.tolist(), strict=True))
         expected = walk.go(pose, given)
         position = closure.position(*given.values())
         found = {**given, **dict(zip(closure.joint_names, position.joints, strict=True))}
@@ -304,10 +309,8 @@ def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
     """CAD writes five digits: no link changes, and each angle is that at which the loops close."""
     text = (ROBOTS / 'ankle.urdf').read_text().replace('0.040 0 0.215', '0.04001 0 0.21502')
     closure = read(tmp_path, text, input=['pitch', 'roll'])
-    assert 1e-5 < closure.linkage.open_by < 3e-5
-    pose = {
-        k: closure.linkage.pose_value(k) for k in (*closure.linkage.driven, *closure.joint_names)
-    }
+    assert 1e-5 < closure.linkage.corrections.open_by < 3e-5
+    pose = pose_of(closure)
     walk = Walk(text, CHOICES['ankle'][1])
     assert np.abs(walk.gaps(pose)).max() < 1e-14
     assert 1e-5 < max(map(abs, pose.values())) < 1e-2
@@ -371,7 +374,7 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
         file.write_text(CYLINDER)
     own = request.getfixturevalue('hexapod') if name == 'hexapod' else None
     linkage, (_, robot) = load(file), own or model_and_robot(file, tmp_path)
-    assert robot.linkage.driven == linkage.linkage.driven
+    assert robot.input_names == linkage.input_names
     assert {k: robot.linkage.limits[k] for k in linkage.linkage.limits} == linkage.linkage.limits
     count = 0
     for inputs in near_pose(linkage, 0.1, 15):
@@ -394,7 +397,7 @@ def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name):
     written = SpaceClosure(replace(linkage, hinges=hinges))
     (tmp_path / 'robot.urdf').write_bytes(urdf_model(name, [ModelPart(written)]))
     robot = load(tmp_path / 'robot.urdf')
-    assert robot.linkage.turned_by < 1e-12
+    assert robot.linkage.corrections.turned_by < 1e-12
     for inputs in written.linkage.pose.inputs + TURNS.uniform(-0.3, 0.3, (5, 1)):
         joints = dict(zip(robot.joint_names, robot.position(*inputs).joints, strict=True))
         found = [joints[joint] for joint in written.joint_names]
@@ -526,7 +529,9 @@ def test_frames_of_a_closing_that_differ_by_rounding_are_told(tmp_path, kind, ca
     if kind == 'revolute':
         text = text.replace('"q4" type="continuous"', '"q4" type="fixed"')
     closure = read(tmp_path, text, input='q1')
-    assert closure.linkage.turned_by == pytest.approx(angle_between(kind, rpy), rel=1e-6)
+    assert closure.linkage.corrections.turned_by == pytest.approx(
+        angle_between(kind, rpy), rel=1e-6
+    )
     assert main(['check', str(tmp_path / 'robot.urdf'), '--input', 'q1', '--radians']) == 0
     assert ' m and 0.00036 rad in the pose' in capsys.readouterr().out
 
@@ -543,7 +548,7 @@ def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_pa
     at = yaml.safe_load(str(caught.value).partition('at: ')[2])
     assert at == {'q4': -0.5}
     closure = read(tmp_path, text, input='q1', close=close, at=at)
-    assert closure.linkage.turned_by < 1e-15
+    assert closure.linkage.corrections.turned_by < 1e-15
     # Rod and end are one link: by the angles from base to it, over crank and over rocker.
     for crank in TURNS.uniform(-3.0, 3.0, 5):
         joints = closure.position(crank)
@@ -556,4 +561,4 @@ def test_places_are_welded_as_they_stand(tmp_path):
     close = ['rod.0.3,0,0=end.0,0,0:fixed']
     closure = read(tmp_path, WELDED.replace('rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>%s', '/>'
                    '<axis xyz="0 0 1"/></joint>%s') % '', input='q1', close=close)  # fmt: skip
-    assert closure.linkage.turned_by == 0.0
+    assert closure.linkage.corrections.turned_by == 0.0

@@ -30,8 +30,8 @@ from linkage_ros.kinematics.plane.linkage import (
     Slider,
 )
 
-_AXES = {'x': ((1.0, 0.0), (0.0, 1.0)), 'y': ((0.0, 1.0), (1.0, 0.0))}
-"""For each axis its direction, and that of the slot across."""
+_AXES = ((1.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0))
+"""For each axis of the plane its direction, and that of the slot across."""
 
 
 def with_measured(linkage: Linkage, names: Sequence[str]) -> Linkage:
@@ -51,7 +51,7 @@ def _add_measured(linkage: Linkage, name: str) -> Linkage:
     carriers = links_by_point(linkage.links)
     ends = point_pair(name, carriers)
     of, _, what = name.rpartition('.')
-    if of in carriers and what in _AXES:
+    if of in carriers and what in linkage.axes:
         if GROUND in carriers[of]:
             raise DefinitionError(name, f'{of} is a point of the ground', 'name one that moves')
         added = _with_coordinate(linkage, name, of, what)
@@ -64,7 +64,7 @@ def _add_measured(linkage: Linkage, name: str) -> Linkage:
         check_apart(name, carriers[ends[0]], carriers[ends[1]])
         added = _with_distance(linkage, name, *ends)
     else:
-        coordinates = (f'{point}.{axis}' for point in linkage.traced for axis in 'xy')
+        coordinates = (f'{point}.{axis}' for point in linkage.traced for axis in linkage.axes)
         known = [*(given.joint for given in linkage.inputs), *linkage.joints, *coordinates]
         raise DefinitionError(
             name or quote(name), 'is no joint, and describes no point, distance or angle',
@@ -95,7 +95,7 @@ def check_apart(name: str, one: Sequence[str], other: Sequence[str]) -> None:
 
 
 def _with_coordinate(linkage: Linkage, name: str, point: str, axis: str) -> Linkage:
-    along, across = _AXES[axis]
+    along, across = _AXES[linkage.axes.index(axis)]
     block, origin = f'carrier of {name}', f'origin of {name}'
     ground = {**linkage.links[GROUND], origin: (0.0, 0.0)}
     sliders = {

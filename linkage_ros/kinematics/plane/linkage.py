@@ -220,6 +220,31 @@ class Mass:
 
 
 @dataclass(frozen=True, slots=True)
+class PoseCorrections:
+    """
+    What is corrected in the pose in which a linkage in space is drawn.
+
+    Attributes
+    ----------
+    open_by
+        By how much the loops of the robot that it is read from do not close in the pose, in [m];
+        None without a robot. What they miss, the pose is corrected by.
+    turned_by
+        By how much the directions of frames that these loops join differ there, in [rad].
+    merged_by
+        The largest distance between places that a closure takes for one, in [m].
+    tilted_by
+        The largest angle between axes that a closure takes for parallel, in [rad].
+
+    """
+
+    open_by: float | None = None
+    turned_by: float = 0.0
+    merged_by: float = 0.0
+    tilted_by: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Linkage:
     """
     A planar linkage, as a linkage file says it.
@@ -247,6 +272,12 @@ class Linkage:
     nominal
         The linkage without deviations, if this one has some; it determines the assembly and the
         change points that are passed.
+    axes
+        The names of the axes of its plane; those of a robot may be x and z.
+    corrections
+        What was corrected in the pose, if it was drawn in space.
+    left_out
+        What belongs to no loop of the robot that it is read from.
 
     """
 
@@ -260,6 +291,9 @@ class Linkage:
     masses: Mapping[str, Mass] = field(default_factory=dict)
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
     nominal: Linkage | None = field(default=None, compare=False, repr=False)
+    axes: tuple[str, str] = ('x', 'y')
+    corrections: PoseCorrections | None = field(default=None, compare=False, repr=False)
+    left_out: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def link_names(self) -> tuple[str, ...]:

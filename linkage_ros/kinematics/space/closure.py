@@ -103,12 +103,12 @@ class SpaceClosure(StepwiseClosure):
         if not at_change_point:
             check_freedom(linkage, plan, freedom)
         self.turns_with = plan.turns_with
+        corrections = replace(linkage.corrections, tilted_by=plan.tilt)
+        linkage = replace(linkage, corrections=corrections)
         self._set_linkage(linkage, name, plan.scale)
         self.groups, self._knots = plan.groups, plan.knots
         self.idle = plan.idle
         """Rods that may turn about themselves."""
-        self.tilt = plan.tilt
-        """By how much axes of planar loops are not parallel, in [rad]."""
         self._error_line = StraightLine(self._list_errors, lambda: None)
         self.steps, self.step_groups = tuple(plan.steps), tuple(plan.step_groups)
         self.ratio_turns = plan.ratio_turns

@@ -28,6 +28,7 @@ from linkage_ros.kinematics.plane.linkage import (
     Input,
     Limits,
     NO_LIMITS,
+    PoseCorrections,
     Ratio,
     RevoluteJoint,
     SlideJoint,
@@ -94,13 +95,8 @@ class SpaceLinkage:
         Names of points whose paths are drawn.
     left_out
         What belongs to no loop of the robot that it is read from.
-    open_by
-        By how much the loops of that robot do not close in the pose, in [m]; None without a
-        robot. What they miss, the pose is corrected by.
-    turned_by
-        By how much the directions of frames that these loops join differ there, in [rad].
-    merged_by
-        The largest distance between places that a closure takes for one, in [m].
+    corrections
+        What was corrected in the pose.
 
     """
 
@@ -114,9 +110,7 @@ class SpaceLinkage:
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
     traced: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
-    open_by: float | None = None
-    turned_by: float = 0.0
-    merged_by: float = 0.0
+    corrections: PoseCorrections = field(default_factory=PoseCorrections)
 
     @cached_property
     def pair_joints(self) -> dict[str, SpatialJoint]:

@@ -44,8 +44,9 @@ def merge_pose(linkage: SpaceLinkage) -> SpaceLinkage:
     hinges = {name: _turn_axis(hinge, unit, places) for name, hinge in hinges.items()}
     if not places.largest:
         return linkage
-    merged_by = max(places.largest, linkage.merged_by)
-    return replace(linkage, points=points, hinges=hinges, merged_by=merged_by)
+    merged_by = max(places.largest, linkage.corrections.merged_by)
+    corrections = replace(linkage.corrections, merged_by=merged_by)
+    return replace(linkage, points=points, hinges=hinges, corrections=corrections)
 
 
 def _turn_axis(hinge: SpatialJoint, unit: float, places: _Places) -> SpatialJoint:

@@ -91,9 +91,24 @@ def find_planar_loops(
         joints = _joints_across(linkage, carried, normal)
         rods = _rods_across(linkage, carried, normal, known)
         for edges in biconnected_components({**joints, **rods}, order):
-            loop = _PlanarModel(linkage, carried, _FlatJoints(normal, edges), known, order)
+            loop = PlanarModel(linkage, carried, _FlatJoints(normal, edges), known, order)
             if loop.is_moved_by_inputs:
                 yield loop.loop()
+
+
+def model_in_plane(
+    linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector
+) -> PlanarModel | None:
+    """Return the model of all links in the plane across a direction; None if they leave it."""
+    joints = _joints_across(linkage, carried, normal)
+    struts = {name for name in linkage.struts if name in (*linkage.driven, *linkage.published)}
+    edges = {**joints, **_rods_across(linkage, carried, normal, struts)}
+    ends = _ends_of(edges.values())
+    if len(joints) < len(linkage.pair_joints) or not {*linkage.link_names, *struts} <= ends:
+        return None
+    order = _links_from_ground(linkage)
+    model = PlanarModel(linkage, carried, _FlatJoints(normal, edges), linkage.driven, order)
+    return model if model.is_moved_by_inputs else None
 
 
 def _normals(linkage: SpaceLinkage, carried: CarriedPoints) -> list[Vector]:
@@ -126,22 +141,37 @@ def _joints_across(linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector
 def _rods_across(
     linkage: SpaceLinkage, carried: CarriedPoints, normal: Vector, known: Collection[str]
 ) -> Edges:
-    """Return the ends of rods, and of struts of known length that lie across a direction."""
+    """Return the ends of rods, of struts of known length across a direction, and of balls."""
     edges: Edges = {}
-    for link in carried.rods:
-        if len(points := carried.carried[link]) != 2:
-            continue
-        others = [[on for on in carried.carriers[point] if on != link] for point in points]
-        if all(others):
-            edges |= {
-                f'{link}, {point}': (link, on[0]) for point, on in zip(points, others, strict=True)
-            }
-    for name, ends in linkage.struts.items():
-        points = [carried.same[point] for point in ends]
+    rods = carried.rods
+    for point, (first, *others) in _balls(linkage, rods):
+        edges |= {f'{link}, {point}': (link, first) for link in others}
+    held = {
+        point: next((link for link in carriers if link not in rods), '')
+        for point, carriers in carried.carriers.items()
+    }
+    for link in rods:
+        ends = {f'{link}, {point}': (link, held[point]) for point in carried.carried[link]}
+        ends = {edge: on for edge, on in ends.items() if on[1]}
+        edges |= ends if len(ends) > 1 else {}
+    for name, pair in linkage.struts.items():
+        points = [carried.same[point] for point in pair]
         one, other = (carried.places[point] for point in points)
         if name in known and abs(dot(minus(other, one), normal)) < MERGED:
-            edges |= {f'{name}, {point}': (name, carried.carriers[point][0]) for point in points}
+            edges |= {f'{name}, {point}': (name, held[point]) for point in points}
     return edges
+
+
+def _balls(linkage: SpaceLinkage, rods: Collection[str]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the points that several links carry, with those of them that are no rods."""
+    for point in linkage.points:
+        links = [
+            link
+            for link, carried in linkage.links.items()
+            if point in carried and link not in rods
+        ]
+        if len(links) > 1:
+            yield point, links
 
 
 def _links_from_ground(linkage: SpaceLinkage) -> list[str]:
@@ -203,7 +233,7 @@ class _Pin(NamedTuple):
     links: set[str]
 
 
-class _PlanarModel:
+class PlanarModel:
     """
     A planar linkage made of the joints of a loop.
 
@@ -229,12 +259,14 @@ class _PlanarModel:
         self._struts = [name for name in linkage.struts if name in ends]
         joints = [name for name in linkage.pair_joints if name in part.edges]
         self._inputs = [name for name in (*joints, *self._struts) if name in known]
-        self._inputs.sort(key=lambda name: name not in linkage.driven)
+        order_of_inputs = {name: number for number, name in enumerate(linkage.driven)}
+        self._inputs.sort(key=lambda name: order_of_inputs.get(name, len(order_of_inputs)))
         self._joints = [name for name in joints if name not in known]
+        self._joints.sort(key=lambda name: name not in linkage.published)
         self._ratios = {
             name: ratio
             for name, ratio in linkage.ratios.items()
-            if name in self._joints and ratio.of in self._joints
+            if name in self._joints and ratio.of in (*self._joints, *self._inputs)
         }
         self._near = MERGED * size_of(linkage)
         self._pins = self._find_pins()
@@ -246,16 +278,16 @@ class _PlanarModel:
         joined = {self._links[0]}
         for _ in pairs:
             joined.update(*(pair for pair in pairs if not joined.isdisjoint(pair)))
-        if not _ends_of(pairs) <= joined:
-            return False
-        rods = [edge for edge in self._edges if edge not in self._linkage.pair_joints]
-        if any(self._edges[edge][1] not in joined for edge in rods):
+        # Rods and struts end on links of the plane, and balls join such links.
+        free = {*self._carried.rods, *self._struts}
+        if not _ends_of(self._edges.values()) - free <= joined:
             return False
         slides = sum(name in self._linkage.slides for name in self._edges)
         count = sum(len(pin.links) - 1 for pin in self._pins) + slides
-        freedoms = 3 * (len(self._links) - 1) - 2 * count - len(self._struts)
-        # A strut is a rod whose length is known.
+        # A strut of known length is a rod.
         turned = [name for name in self._inputs if name not in self._struts]
+        rod_count = len(self._inputs) - len(turned)
+        freedoms = 3 * (len(self._links) - 1) - 2 * count - rod_count
         return freedoms == len(turned) + len(self._ratios) and bool(self._inputs)
 
     def _flat_name(self, link: str) -> str:
@@ -289,7 +321,13 @@ class _PlanarModel:
         return pins
 
     def loop(self) -> PlanarLoop:
-        """Return the loop."""
+        """Return the loop, with all joints whose values are not known."""
+        return self.with_joints(self._joints, {})
+
+    def with_joints(
+        self, joints: Collection[str], points: Mapping[str, Collection[str]]
+    ) -> PlanarLoop:
+        """Return the linkage in its plane with some joints, and with more points of its links."""
         spatial = self._linkage
         turned = self._pose_angles()
         places: dict[str, dict[str, Point]] = {self._flat_name(link): {} for link in self._links}
@@ -302,16 +340,18 @@ class _PlanarModel:
                 sliders[name] = self._slider(name, places, turned)
         for name in self._struts:
             sliders[name] = self._cylinder(name, places)
+        for link, names in points.items():
+            self._add_points(places.get(link, {}), names)
         links: dict[str, dict[str, Point]] = {}
-        for link, points in places.items():
-            first = (0.0, 0.0) if link == GROUND else next(iter(points.values()))
+        for link, at in places.items():
+            first = (0.0, 0.0) if link == GROUND else next(iter(at.values()))
             links[link] = {
                 name: _turn((x - first[0], y - first[1]), -turned.get(link, 0.0))
-                for name, (x, y) in points.items()
+                for name, (x, y) in at.items()
             }
         offsets: dict[str, float] = {}
         made: dict[str, RevoluteJoint | SlideJoint] = {}
-        for name in (*self._inputs, *self._joints):
+        for name in dict.fromkeys((*self._inputs, *joints)):
             if name in sliders:
                 limits = spatial.slides[name].limits if name in spatial.slides else NO_LIMITS
                 made[name] = SlideJoint(name, limits)
@@ -332,10 +372,17 @@ class _PlanarModel:
         )
         pose = self._open_parallelogram(pose, inputs)
         flat = Linkage(
-            links, inputs, {}, {name: made[name] for name in self._joints}, sliders, pose=pose,
+            links, inputs, {}, {name: made[name] for name in joints}, sliders, pose=pose,
             ratios={name: self._ratio(of, name, offsets) for name, of in self._ratios.items()},
         )  # fmt: skip
         return PlanarLoop(flat, tuple(self._links), offsets, self._normal, self._tilt)
+
+    def _add_points(self, there: dict[str, Point], names: Collection[str]) -> None:
+        """Add the points of a link that are in no other place of it."""
+        for name in names:
+            place = self._flat(self._linkage.points[name])
+            if name not in there and all(dist(place, at) >= self._near for at in there.values()):
+                there[name] = place
 
     def _open_parallelogram(self, pose: AssemblyPose, inputs: tuple[Input, ...]) -> AssemblyPose:
         """Return a pose that tells the assembly of a parallelogram that is drawn flat."""

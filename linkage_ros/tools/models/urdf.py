@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterator, Mapping, Sequence
+from math import pi
 import re
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
@@ -51,12 +52,20 @@ from linkage_ros.tools.models.xml import (
 
 _ROOT = 'world'
 
+_FLAT = ('x', 'y')
+_STANDING = {
+    _FLAT: (0.0, 0.0, 0.0),
+    ('x', 'z'): (0.5 * pi, 0.0, 0.0),
+    ('y', 'z'): (0.5 * pi, 0.0, 0.5 * pi),
+}
+"""How planes stand in the world: roll, pitch and yaw, in [rad]."""
+
 _EXPRESSION = re.compile(r'\$[{(]')
 """Text that xacro evaluates (https://wiki.ros.org/xacro)."""
 
 _HEAD = f"""\
 A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
-published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+published joint states. Lengths in [m], angles in [rad]; the plane of the links is z = 0.
 Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
 iyy = izz/2.
 A limit is as the linkage gives it; else what the joint comes to over the range of the input that
@@ -212,14 +221,16 @@ def urdf_model(name: str, parts: Sequence[ModelPart]) -> bytes:
         layers += len(linkage.links)
     robot = ET.Element('robot', name=name)
     robot.append(xml_comment(list(_head_lines(models))))
-    if len(models) > 1:
+    linkages = [part.closure.linkage for part in parts]
+    planes = [one.axes if isinstance(one, Linkage) else _FLAT for one in linkages]
+    if len(models) > 1 or planes != [_FLAT]:
         root = names.free_frame(_ROOT)
         ET.SubElement(robot, 'link', name=root)
-        for model in models:
-            mount = TreeJoint(
-                model.names.free_joint('mount'), 'fixed', root, model.names.own_name(GROUND), 0j
-            )
-            add_joint(robot, mount, None, NO_LIMITS)
+        for its, axes in zip(own, planes, strict=True):
+            mount = ET.SubElement(robot, 'joint', name=its.free_joint('mount'), type='fixed')
+            ET.SubElement(mount, 'origin', xyz='0 0 0', rpy=format_numbers(*_STANDING[axes]))
+            ET.SubElement(mount, 'parent', link=root)
+            ET.SubElement(mount, 'child', link=its.own_name(GROUND))
     _refuse_expressions(0, robot, of_linkage=False)
     for count, model in enumerate(models):
         before = len(robot)

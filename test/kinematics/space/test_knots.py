@@ -21,6 +21,7 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 from ...support.sampling import sample_count
+from ...support.spatial import load_in_space
 
 FOLDER = Path(__file__).parent / 'linkages'
 BOTH_WAYS = {'ankle': 'ankle_motors', 'hexapod_inverse': 'hexapod'}
@@ -28,7 +29,7 @@ BOTH_WAYS = {'ankle': 'ankle_motors', 'hexapod_inverse': 'hexapod'}
 
 def closure_of(name):
     own = FOLDER / f'{name}.yaml'
-    return load(own if own.is_file() else name)
+    return load_in_space(own if own.is_file() else name)
 
 
 def random_inputs(closure, count, reach):

@@ -28,13 +28,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from ...support.spatial import load_in_space
+
 FOLDER = Path(__file__).parent / 'linkages'
 NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.yaml'))]
 
 
 def closure_of(name):
     own = FOLDER / f'{name}.yaml'
-    return lr.load(own if own.is_file() else name)
+    return load_in_space(own if own.is_file() else name)
 
 
 def states_of(closure, count, reach=0.3):

@@ -306,7 +306,7 @@ def tilted(angle: float) -> SpaceClosure:
 def test_axes_that_are_nearly_parallel_are_parallel_and_told(angle):
     closure = tilted(angle)
     assert closure.groups[0].kind == 'planar loop'
-    assert closure.tilt == pytest.approx(angle, rel=1e-6, abs=1e-15)
+    assert closure.linkage.corrections.tilted_by == pytest.approx(angle, rel=1e-6, abs=1e-15)
     for driver in np.linspace(0.1, 6.1, 40).tolist():
         (driven,) = closure.position(driver).joints
         assert abs(np.remainder(driven - driver + pi, tau) - pi) < 1e-14 + angle

@@ -1,0 +1,89 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+A linkage in space whose links all move in one plane, as the planar linkage that it is.
+
+The plane is across an axis of the ground, and keeps the names of the other two axes. A linkage in
+an oblique plane stays spatial. So does one with hinges round a loop whose values in the pose do
+not add up: frames of links cannot give each of them its zero.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.plane.closure import Closure
+from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.space.carried_points import CarriedPoints
+from linkage_ros.kinematics.space.closure import closure_in_pose, SpaceClosure
+from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage, unit_of
+from linkage_ros.kinematics.space.merged_pose import merge_pose
+from linkage_ros.kinematics.space.planar_loops import model_in_plane, PlanarLoop
+from linkage_ros.kinematics.space.vectors import GROUND_FRAME, scale
+
+_SAME_ZERO = 1e-12
+"""Difference of a joint's values in plane and space that is rounding, in [rad]."""
+
+_TURNED = 1.0
+"""Difference of a joint's values in plane and space from which it is whole turns, in [rad]."""
+
+_PLANES = ('y', 'z'), ('x', 'z'), ('x', 'y')
+"""The axes of the planes across x, y and z."""
+
+
+def closure_as_drawn(linkage: SpaceLinkage, name: str = '') -> Closure | SpaceClosure:
+    """Return the closure of a linkage that closes in its pose: planar if its links move so."""
+    planar = linkage_in_plane(linkage)
+    if planar is not None:
+        # A pose at a toggle is left to the closure in space.
+        with suppress(DefinitionError):
+            closure = Closure(planar, name)
+            if _begins_in_pose(closure, linkage):
+                return closure
+    return closure_in_pose(linkage, name)
+
+
+def _begins_in_pose(closure: Closure, linkage: SpaceLinkage) -> bool:
+    """Return whether the joints have the pose's values in the pose, without whole turns."""
+    found = closure.close_unlimited(*linkage.pose.inputs)
+    return found.status.has_rates and all(
+        abs(value - linkage.pose_value(name)) < _TURNED
+        for name, value in zip(closure.joint_names, found.joints, strict=True)
+    )
+
+
+def linkage_in_plane(linkage: SpaceLinkage) -> Linkage | None:
+    """Return a linkage as a planar one, or None if its links do not all move in one plane."""
+    check_space_linkage(linkage)
+    linkage = merge_pose(linkage)
+    carried = CarriedPoints(linkage, unit_of(linkage))
+    x, y, z = GROUND_FRAME[:3]
+    for normal, axes in zip((x, scale(-1.0, y), z), _PLANES, strict=True):
+        model = model_in_plane(linkage, carried, normal)
+        if model is not None and linkage.ratios.keys() <= {*linkage.published}:
+            found = model.with_joints(linkage.published, linkage.links)
+            return None if _has_own_zeroes(found) else _in_plane(linkage, found, axes)
+    return None
+
+
+def _has_own_zeroes(found: PlanarLoop) -> bool:
+    return any(abs(offset) > _SAME_ZERO for offset in found.offsets.values())
+
+
+def _in_plane(linkage: SpaceLinkage, found: PlanarLoop, axes: tuple[str, str]) -> Linkage:
+    """Return the planar linkage, which begins at the pose."""
+    carried = {point: link for link, points in found.linkage.links.items() for point in points}
+    return replace(
+        found.linkage,
+        traced=tuple(point for point in linkage.traced if point in carried),
+        axes=axes,
+        corrections=replace(linkage.corrections, tilted_by=found.tilt),
+        left_out=linkage.left_out,
+    )

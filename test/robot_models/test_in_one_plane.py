@@ -1,0 +1,133 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""A robot, or a linkage of a spatial file, whose links move in one plane is a planar linkage."""
+
+from math import cos, pi, sin
+
+from linkage_ros import load
+from linkage_ros.kinematics import Closure, SpaceClosure, Status, usual_inputs
+from linkage_ros.resources import linkage_names
+from linkage_ros.tools.models.part import ModelPart
+from linkage_ros.tools.models.urdf import urdf_model
+import numpy as np
+import pytest
+
+PLANES = {
+    'xy': ('0 0 0', ('x', 'y')),
+    'xy seen from below': (f'{pi!r} 0 0', ('x', 'y')),
+    'xz': (f'{pi / 2!r} 0 0', ('x', 'z')),
+    'yz': (f'{pi / 2!r} 0 {pi / 2!r}', ('y', 'z')),
+    'xz of CAD': (f'{pi / 2 + 3e-9!r} 1e-8 -2e-9', ('x', 'z')),
+}
+
+OBLIQUE = '0.3 0.2 0.1'
+
+
+def robot_of(folder, name, rpy):
+    """Return a gallery linkage as a robot that stands turned on its base."""
+    planar = load(name)
+    text = urdf_model(name, [ModelPart(planar)]).decode()
+    base = (
+        '<link name="base"/><joint name="stand" type="fixed"><parent link="base"/>'
+        f'<child link="ground"/><origin xyz="0.3 -0.2 0.1" rpy="{rpy}"/></joint></robot>'
+    )
+    file = folder / 'robot.urdf'
+    file.write_text(text.replace('</robot>', base))
+    return planar, load(file, {'input': list(planar.input_names)})
+
+
+def states_of(closure):
+    """Return states beyond the pose on both sides, through change points."""
+    start = np.array(usual_inputs(closure))
+    steps = [1.0 if given.unit == 'rad' else 0.01 for given in closure.linkage.inputs]
+    return start + np.linspace(-7.0, 7.0, 71)[:, None] * steps
+
+
+@pytest.mark.parametrize('plane', PLANES)
+@pytest.mark.parametrize('name', linkage_names())
+def test_a_robot_in_one_plane_has_the_states_of_the_planar_file(tmp_path, name, plane):
+    rpy, axes = PLANES[plane]
+    planar, robot = robot_of(tmp_path, name, rpy)
+    assert isinstance(robot, Closure)
+    assert robot.linkage.axes == axes
+    assert (robot.linkage.corrections.tilted_by > 0.0) == plane.endswith('CAD')
+    for state in states_of(planar):
+        expected, found = planar.position(*state), robot.position(*state)
+        assert found.status is expected.status
+        if expected.status is Status.CLOSED:
+            joints = [found[joint] for joint in planar.joint_names]
+            assert joints == pytest.approx(expected.joints, abs=1e-7 if 'CAD' in plane else 1e-12)
+
+
+def test_a_robot_in_an_oblique_plane_is_spatial(tmp_path):
+    planar, robot = robot_of(tmp_path, 'parallelogram', OBLIQUE)
+    assert isinstance(robot, SpaceClosure)
+    for state in states_of(planar):
+        joints = [robot.position(*state)[joint] for joint in planar.joint_names]
+        assert joints == pytest.approx(planar.position(*state).joints, abs=1e-12)
+
+
+SPATIAL = """
+points: {{T: [0.35, 0.02, 0.5]}}
+links: {{coupler: [T]}}
+hinges:
+  crank_joint: {{parent: ground, child: crank, axis: [0, 1, 0], at: [0, 0, 0.1]{crank}}}
+  rod_joint: {{parent: crank, child: coupler, axis: [0, 1, 0], at: [0.1, 0.01, 0.2]}}
+  rocker_joint: {{parent: ground, child: rocker, axis: [0, -1, 0], at: [0.4, 0, 0.1]}}
+  pin: {{parent: coupler, child: rocker, axis: [0, 1, 0], at: [0.5, 0, 0.35]}}
+  {more}
+input: [{inputs}]
+joints: [rod_joint, rocker_joint{pin}]
+traced: [T]
+"""
+
+
+def spatial(folder, **kinds):
+    file = folder / 'linkage.yaml'
+    given = {'crank': '', 'more': '', 'inputs': 'crank_joint', 'pin': '', **kinds}
+    file.write_text(SPATIAL.format(**given))
+    return load(file)
+
+
+def test_coordinates_have_the_names_of_the_grounds_axes(tmp_path):
+    closure = spatial(tmp_path)
+    assert isinstance(closure, Closure)
+    height = closure.measuring('T.z')
+    position = height.position(0.4)
+    # The coupler's turn about y: its angles add up, as all hinges are 0 in the pose.
+    turn = 0.4 + position['rod_joint']
+    x, z = 0.1 * cos(0.4) + 0.1 * sin(0.4), 0.1 + 0.1 * cos(0.4) - 0.1 * sin(0.4)
+    expected = z + 0.3 * cos(turn) - 0.25 * sin(turn)
+    assert position['T.z'] == pytest.approx(expected, abs=1e-15)
+    assert closure.points(position)['T'][0] == pytest.approx(
+        x + 0.25 * cos(turn) + 0.3 * sin(turn), abs=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    'kinds',
+    [
+        # The crank and all round the loop are published: their zeroes do not add up.
+        {'crank': ', value: 0.5', 'pin': ', pin'},
+        # A turntable carries all of it, or turns beside it.
+        {
+            'more': 'turntable: {parent: ground, child: table, axis: [0, 0, 1]}',
+            'inputs': 'crank_joint, turntable',
+        },
+    ],
+    ids=['zeroes', 'turntable'],
+)
+def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
+    flat, closure = spatial(tmp_path), spatial(tmp_path, **kinds)
+    assert isinstance(closure, SpaceClosure)
+    pose = closure.linkage.pose.inputs
+    position = closure.position(*(value + 0.3 * (k == 0) for k, value in enumerate(pose)))
+    expected = flat.position(0.3)
+    for joint in flat.joint_names:
+        assert position[joint] == pytest.approx(expected[joint], abs=1e-14)
