@@ -50,6 +50,7 @@ from linkage_ros.kinematics.space.linkage import (
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
 )
+from linkage_ros.kinematics.space.masses import SpatialMass as SpatialMass
 from linkage_ros.kinematics.results import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.tick.interpreted_tick import Tick as Tick

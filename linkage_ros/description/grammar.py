@@ -163,6 +163,23 @@ class OnlyWith(Rule):
 
 
 @dataclass(frozen=True, slots=True)
+class Together(Rule):
+    """Two keys that mean something only together."""
+
+    keys: tuple[str, str]
+
+    def check(self, content: Section) -> None:
+        for key, other in (self.keys, self.keys[::-1]):
+            if key in content and other not in content:
+                remedy = f'write {other} too, or leave it out'
+                raise content.error(key, f'is without {other}', remedy)
+
+    def json_schema(self) -> Schema:
+        one, other = self.keys
+        return {'dependentRequired': {one: [other], other: [one]}}
+
+
+@dataclass(frozen=True, slots=True)
 class InsteadOf(Rule):
     """A key that stands in place of others, which are needed without it."""
 

@@ -13,11 +13,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from math import hypot
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from linkage_ros.description.linkage_grammar import (
+    is_rod,
     LINKAGE,
     ratio_in_si,
     SHORTHANDS,
@@ -41,7 +43,9 @@ from linkage_ros.kinematics import (
     GROUND,
     Input,
     Linkage,
+    Mass,
     PLANAR_ONLY,
+    Point,
     RevoluteJoint,
     SlideJoint,
     SpaceClosure,
@@ -212,7 +216,11 @@ def _parse_linkage(
         raise content.error('joints', 'publishes nothing', 'name a joint')
     if publish_inputs:
         published = {driven.joint: _published_joint(driven) for driven in inputs} | joints
-    traced, masses = read('traced') or (), read('masses') or {}
+    traced = read('traced') or ()
+    masses = {
+        link: _mass_of(content, link, given, points[link])
+        for link, given in (read('masses') or {}).items()
+    }
     pose = pose or read('pose')
     units = {name: joint.unit for name, joint in joints.items()}
     units |= {driven.joint: driven.unit for driven in inputs}
@@ -222,6 +230,17 @@ def _parse_linkage(
         for name, one in (read('ratios') or {}).items()
     }
     return Linkage(points, inputs, assembly, published, sliders, traced, pose, masses, ratios)
+
+
+def _mass_of(
+    content: Section, link: str, given: dict[str, Any], points: Mapping[str, Point]
+) -> Mass:
+    """Return the mass of a link, which may be written as that of a rod."""
+    mass = given['mass']
+    if not is_rod(content, link, given, [*points]):
+        return Mass(mass, given.get('center', (0.0, 0.0)), given.get('inertia', 0.0))
+    (a, b), (c, d) = points.values()
+    return Mass(mass, (0.5 * (a + c), 0.5 * (b + d)), mass / 12.0 * hypot(c - a, d - b) ** 2)
 
 
 def _input_line(points: Mapping[str, Collection[str]]) -> str:

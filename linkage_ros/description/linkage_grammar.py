@@ -26,6 +26,7 @@ from linkage_ros.description.grammar import (
     OneOrMore,
     OnlyWith,
     optional_keys,
+    Together,
 )
 from linkage_ros.description.parameters import (
     CHARACTER,
@@ -53,7 +54,6 @@ from linkage_ros.kinematics import (
     GROUND,
     Input,
     Limits,
-    Mass,
     Ratio,
     RevoluteJoint,
     SlideJoint,
@@ -150,6 +150,20 @@ LIMITS = {
 }
 
 
+def is_rod(content: Section, link: str, given: _Values, points: Sequence[object]) -> bool:
+    """Return whether a mass is that of a rod between two points; refuse one of another link."""
+    if 'center' in given or not given['mass']:
+        return False
+    if len(points) != 2:
+        count = f'{len(points)} point{"s" * (len(points) != 1)}'
+        raise content.error(
+            f'masses.{link}',
+            f'is a mass alone, of a rod between two points, and {quote(link)} has {count}',
+            'write center and inertia too',
+        )
+    return True
+
+
 def split_limits(values: _Values) -> Limits:
     """Return the limits of a joint and take their keys out; `checks` judges them."""
     low, high = values.pop('limits', (-inf, inf))
@@ -236,16 +250,30 @@ _POSE = Keys(
         ),
     },
 )
+MASS_OF_ROD = number(
+    'mass; alone that of a thin rod between the two points of the link, or 0 of a massless link',
+    unit='kg',
+    least=0.0,
+    most=HEAVIEST,
+)
+WHOLE_BODY = (Together(('center', 'inertia')),)
 _MASS = Keys(
     'Mass properties of a link.',
-    Mass,
+    dict,
     {
-        'mass': number('mass; 0: the link is massless', unit='kg', least=0.0, most=HEAVIEST),
-        'center': point("centre of mass in the link's frame: [x, y]", unit='m', most=FARTHEST),
+        'mass': MASS_OF_ROD,
+        'center': point(
+            "centre of mass in the link's frame: [x, y]", None, unit='m', most=FARTHEST
+        ),
         'inertia': number(
-            'moment of inertia about the centre of mass', unit='kg·m²', least=0.0, most=HEAVIEST
+            'moment of inertia about the centre of mass',
+            None,
+            unit='kg·m²',
+            least=0.0,
+            most=HEAVIEST,
         ),
     },
+    WHOLE_BODY,
 )
 _PLACE = Point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
 

@@ -54,6 +54,7 @@ from linkage_ros.kinematics import (
     check_limits,
     Closure,
     closure_as_drawn,
+    combine_masses,
     cross,
     direction_of,
     dot,
@@ -73,7 +74,9 @@ from linkage_ros.kinematics import (
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
+    SpatialMass,
     turn_about,
+    turned_tensor,
     Vector,
     ZERO,
 )
@@ -509,7 +512,7 @@ class _Robot:
         traced = tuple(self._add_traced(on, frames, made))
         published = [k for k in self._moving if k in found and k not in self._driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
-        return SpaceLinkage(
+        linkage = SpaceLinkage(
             *made,
             struts={},
             driven=self._driven,
@@ -519,6 +522,24 @@ class _Robot:
             left_out=(*left_out, *(f'mimic of {name}' for name in without)),
             corrections=PoseCorrections(open_by[0], turned_by[0]),
         )
+        weighed = self._masses(on, frames, linkage.link_names[1:])
+        linkage = replace(linkage, masses=weighed)
+        return replace(linkage, masses=linkage.masses_with(*linkage.link_names[1:]))
+
+    def _masses(
+        self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], links: Sequence[str]
+    ) -> dict[str, SpatialMass]:
+        """Return the masses of links, with what hangs on them and does not move with a loop."""
+        parts: dict[str, list[SpatialMass]] = {}
+        for name, link in self._urdf.links.items():
+            way = (name, *(joint.parent for joint in self._above[name]))
+            carrier = next((on[each] for each in way if on[each] in links), None)
+            if link.inertial is not None and carrier is not None:
+                body = link.inertial
+                at = _compose_frames(frames[name], _frame(body.xyz, body.rpy))
+                part = SpatialMass(body.mass, at.origin, turned_tensor(at[:3], body.tensor))
+                parts.setdefault(carrier, []).append(part)
+        return {link: combine_masses(of) for link, of in parts.items()}
 
     def _add_traced(
         self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], made: _LinkageParts

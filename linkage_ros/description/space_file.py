@@ -11,17 +11,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from linkage_ros.description.linkage_grammar import ratio_in_si, UNITS
+from linkage_ros.description.linkage_grammar import is_rod, ratio_in_si, UNITS
 from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import SPACE
 from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
+    check_inertia,
     check_limits,
+    check_weighed,
     Closure,
     closure_as_drawn,
     GROUND,
@@ -29,6 +32,9 @@ from linkage_ros.kinematics import (
     SpaceClosure,
     SpaceLinkage,
     SpatialJoint,
+    SpatialMass,
+    thin_rod,
+    Vector,
 )
 
 
@@ -66,7 +72,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     content.units = Units(*(SPACE.read_key(content, key, {}) for key in UNITS))
     sliding = [*_names(content, 'slides'), *_names(content, 'struts')]
     values = read_parameters(content, SPACE, {'slide': sliding})
-    points = values['points']
+    points, massless = values['points'], []
     links = {link: tuple(names) for link, names in values.get('links', {}).items()}
     _refuse_single_ends(content, values)
     joints: dict[str, dict[str, SpatialJoint]] = {}
@@ -85,6 +91,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
                 reason = f'{quote(joint)} is a hinge or a link of the file already'
                 raise content.error(f'balls.{ball}', reason, 'name the ball differently')
             joints['hinges'][joint] = made
+            massless += [made.parent] if made.parent != given['parent'] else []
     struts = values.get('struts', {})
     names = [*joints['hinges'], *joints['slides'], *struts]
     for one in names:
@@ -96,7 +103,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
     for name in driven:
         if name in published:
             raise content.error('joints', f'{quote(name)} is an input', 'publish the others')
-    return SpaceLinkage(
+    linkage = SpaceLinkage(
         points=points,
         links=links,
         hinges=joints['hinges'],
@@ -110,6 +117,26 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         },
         traced=values.get('traced', ()),
     )
+    weighed = values.get('masses', {})
+    check_weighed(linkage, weighed)
+    masses = {
+        link: _mass_of(content, link, given, [points[name] for name in links.get(link, ())])
+        for link, given in weighed.items()
+    }
+    linkage = replace(linkage, masses=masses)
+    return replace(linkage, masses=linkage.masses_with(*massless))
+
+
+def _mass_of(
+    content: Section, link: str, given: dict[str, Any], places: Sequence[Vector]
+) -> SpatialMass:
+    """Return the mass of a link, which may be written as that of a rod."""
+    if is_rod(content, link, given, places):
+        return thin_rod(given['mass'], places[0], places[1])
+    body = SpatialMass(**given)
+    if any(body.inertia):
+        check_inertia(f'masses.{link}.inertia', body.inertia)
+    return body
 
 
 def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:

@@ -15,13 +15,16 @@ from typing import Any
 from linkage_ros.description.grammar import DIALECT, InsteadOf, ListOf, Named
 from linkage_ros.description.linkage_grammar import (
     FARTHEST,
+    HEAVIEST,
     LIMITS,
+    MASS_OF_ROD,
     MOST_LINKS,
     Moves,
     planar_schema,
     RATIO,
     split_limits,
     UNITS,
+    WHOLE_BODY,
 )
 from linkage_ros.description.parameters import (
     declare,
@@ -38,6 +41,8 @@ from linkage_ros.description.parameters import (
 )
 from linkage_ros.description.section import Section
 
+_MOMENTS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+
 _MOST_POINTS = 2000
 """Bound on the points of a spatial linkage; at it a check takes seconds."""
 
@@ -51,6 +56,20 @@ class Place(NumberList):
 
     def json_schema(self) -> Schema:
         return {**NumberList.json_schema(self), 'minItems': 3, 'maxItems': 3}
+
+
+@dataclass(frozen=True, slots=True)
+class _Tensor(NumberList):
+    """Six finite numbers [ixx, ixy, ixz, iyy, iyz, izz]."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
+        found = NumberList.read(self, content, key, parts, folder)
+        if len(found) != len(_MOMENTS):
+            raise content.error(key, f'has {len(found)} numbers', f'write [{", ".join(_MOMENTS)}]')
+        return found
+
+    def json_schema(self) -> Schema:
+        return {**NumberList.json_schema(self), 'minItems': 6, 'maxItems': 6}
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +152,29 @@ _BALL = Keys(
     dict,
     {**_ENDS, 'at': declare(Place('its centre: [x, y, z]', 'm', FARTHEST))},
 )
+_MASS = Keys(
+    'Mass properties of a link.',
+    dict,
+    {
+        'mass': MASS_OF_ROD,
+        'center': declare(
+            Place(
+                'centre of mass in the pose, in the frame of the ground: [x, y, z]', 'm', FARTHEST
+            ),
+            None,
+        ),
+        'inertia': declare(
+            _Tensor(
+                'moments of inertia about the centre of mass in the pose, about the axes of '
+                'the ground: [ixx, ixy, ixz, iyy, iyz, izz]',
+                'kg·m²',
+                HEAVIEST,
+            ),
+            None,
+        ),
+    },
+    WHOLE_BODY,
+)
 SPACE = Keys(
     'A spatial linkage: points in one pose, and what joins the links there.',
     dict,
@@ -170,6 +212,7 @@ SPACE = Keys(
         ),
         'ratios': _by_name(RATIO.meaning, _group(RATIO)),
         'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
+        'masses': _by_name('Masses of the links, by link name.', _group(_MASS)),
     },
 )  # fmt: skip
 

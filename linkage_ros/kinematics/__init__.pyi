@@ -191,10 +191,18 @@ from linkage_ros.kinematics.space.freedom import (
     Freedom as Freedom,
 )
 from linkage_ros.kinematics.space.linkage import (
+    check_weighed as check_weighed,
     extent_of as extent_of,
     ONE_PLACE as ONE_PLACE,
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
+)
+from linkage_ros.kinematics.space.masses import (
+    check_inertia as check_inertia,
+    combine_masses as combine_masses,
+    SpatialMass as SpatialMass,
+    thin_rod as thin_rod,
+    turned_tensor as turned_tensor,
 )
 from linkage_ros.kinematics.space.one_plane import closure_as_drawn as closure_as_drawn
 from linkage_ros.kinematics.space.rod_joints import with_rod_joints as with_rod_joints

@@ -33,6 +33,7 @@ from linkage_ros.kinematics.plane.linkage import (
     RevoluteJoint,
     SlideJoint,
 )
+from linkage_ros.kinematics.space.masses import MASSLESS, SpatialMass
 from linkage_ros.kinematics.space.vectors import length, Vector, ZERO
 
 ONE_PLACE = 1e-6
@@ -93,6 +94,8 @@ class SpaceLinkage:
         How a joint follows another, by name.
     traced
         Names of points whose paths are drawn.
+    masses
+        Masses by link name; given only for forces, and then for every link that moves.
     left_out
         What belongs to no loop of the robot that it is read from.
     corrections
@@ -109,6 +112,7 @@ class SpaceLinkage:
     published: tuple[str, ...]
     ratios: Mapping[str, Ratio] = field(default_factory=dict)
     traced: tuple[str, ...] = ()
+    masses: Mapping[str, SpatialMass] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     corrections: PoseCorrections = field(default_factory=PoseCorrections)
 
@@ -122,6 +126,10 @@ class SpaceLinkage:
         """Return all links, the ground first."""
         ends = (end for joint in self.pair_joints.values() for end in (joint.parent, joint.child))
         return tuple(dict.fromkeys((GROUND, *self.links, *ends)))
+
+    def masses_with(self, *links: str) -> Mapping[str, SpatialMass]:
+        """Return the masses with those of links that are added: they have none."""
+        return {**dict.fromkeys(links, MASSLESS), **self.masses} if self.masses else {}
 
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
@@ -203,7 +211,18 @@ def check_space_linkage(linkage: SpaceLinkage) -> None:
     _check_driven(linkage)
     for point in linkage.traced:
         _check_name('traced', point, 'point', linkage.points)
+    check_weighed(linkage, linkage.masses)
     check_all_limits(linkage)
+
+
+def check_weighed(linkage: SpaceLinkage, links: Iterable[str]) -> None:
+    """Refuse the mass of what is not a moving link."""
+    for link in links:
+        if link == GROUND:
+            raise DefinitionError(
+                f'masses.{link}', 'the ground does not move', 'leave its mass out'
+            )
+        _check_name(f'masses.{link}', link, 'link', linkage.link_names[1:])
 
 
 def _check_held(linkage: SpaceLinkage) -> None:

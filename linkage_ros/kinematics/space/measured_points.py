@@ -57,17 +57,19 @@ def _with_coordinate(linkage: SpaceLinkage, name: str, point: str, axis: str) ->
     if point in linkage.links.get(GROUND, ()):
         raise DefinitionError(name, f'{point} is a point of the ground', 'name one that moves')
     place = dict(zip(_AXES, linkage.points[point], strict=True))
-    slides, before = dict(linkage.slides), GROUND
+    slides, before, carriers = dict(linkage.slides), GROUND, []
     for one in (axis, *(other for other in _AXES if other != axis)):
         link, slide = f'carrier along {one} of {name}', f'{one} of {name}'
         slide = name if one == axis else slide
         slides[slide] = SpatialJoint(before, link, _AXES[one], value=place[one])
         before = link
+        carriers.append(link)
     return replace(
         linkage,
         slides=slides,
         links={**linkage.links, before: (point,)},
         published=(*linkage.published, name),
+        masses=linkage.masses_with(*carriers),
     )
 
 

@@ -36,9 +36,14 @@ _FLAT = 1e-3
 
 def with_rod_joints(linkage: SpaceLinkage) -> SpaceLinkage:
     """Return the linkage with joints that place every link, all of them published."""
+    named = linkage.link_names
     linkage = _hang_links(_with_tubes(linkage))
     left = [name for name in linkage.pair_joints if name not in linkage.driven]
-    return replace(linkage, published=tuple(dict.fromkeys((*linkage.published, *left))))
+    return replace(
+        linkage,
+        published=tuple(dict.fromkeys((*linkage.published, *left))),
+        masses=linkage.masses_with(*(link for link in linkage.link_names if link not in named)),
+    )
 
 
 def _with_tubes(linkage: SpaceLinkage) -> SpaceLinkage:
