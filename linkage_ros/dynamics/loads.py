@@ -269,7 +269,7 @@ def check_masses(linkage: Linkage, loads: Loads) -> None:
                 'masses',
                 f'link {quote(link)} has no mass, and forces are asked for',
                 f'add masses: {{{link}: {{mass: 0.1, center: [0, 0], inertia: 1.0e-5}}}} '
-                'in [kg], [m] and [kg·m²]; for a massless link write the three as 0, [0, 0] and 0',
+                'in [kg], [m] and [kg·m²]; for a massless link write {mass: 0}',
             )
 
 

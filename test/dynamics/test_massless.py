@@ -117,7 +117,7 @@ REFUSED = {
 @pytest.mark.parametrize('kind', REFUSED)
 def test_without_any_load_or_with_a_weight_masses_are_asked_for(kind):
     with pytest.raises(
-        FileError, match=r"link 'crank' has no mass, .*for a massless link write the three as 0"
+        FileError, match=r"link 'crank' has no mass, .*for a massless link write \{mass: 0\}"
     ):
         Pipeline(scene_of(REFUSED[kind], FOUR_BAR))
 
