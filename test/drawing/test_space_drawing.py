@@ -20,6 +20,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from .test_pictures import box, drawn, nearer
+from ..support.spatial import load_in_space
 
 # A leg of two cylinders and a rail on a link that turns: what the gallery lacks.
 LIFT = """
@@ -114,7 +115,7 @@ def test_the_camera_is_chosen_unless_it_is_given():
 
 def test_a_strut_is_a_rod_in_a_tube_of_its_own_length(tmp_path):
     (tmp_path / 'lift.yaml').write_text(LIFT)
-    lift = load(tmp_path / 'lift.yaml')
+    lift = load_in_space(tmp_path / 'lift.yaml')
     model = SpaceDrawing(lift)
     (tube,) = (part for part in model.parts if part.name == 'ram' and part.width > 1.0)
     lengths = []

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Sequence
+from math import tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import quote
@@ -386,5 +387,6 @@ class Closure(StepwiseClosure):
     def _joint_term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
         """Return a published joint as factor·(x[i] − x[j]) + constant, in [rad] or [m]."""
         i, j, factor, constant = self._known.joint_term(joint)
-        unit = self.scale if isinstance(joint, SlideJoint) else 1.0
-        return i, j, factor * unit, constant * unit
+        if isinstance(joint, SlideJoint):
+            return i, j, factor * self.scale, constant * self.scale
+        return i, j, factor, constant + tau * joint.turns

@@ -138,8 +138,8 @@ class RevoluteJoint:
     """
     A published angle, ``child`` minus ``parent``, in [rad], as in a URDF.
 
-    Its whole turns are as they come, or, if ``near`` is given, such that it is within half a turn
-    of near[0] + near[1]·(first input) + near[2]·(second input) and so on, in [rad].
+    Its whole turns are as they come, with ``turns`` added; or, if ``near`` is given, such that it
+    is within half a turn of near[0] + near[1]·(first input) + near[2]·(second input) and so on.
     """
 
     unit: ClassVar = 'rad'
@@ -148,6 +148,7 @@ class RevoluteJoint:
     child: str
     limits: Limits = NO_LIMITS
     near: tuple[float, ...] = ()
+    turns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

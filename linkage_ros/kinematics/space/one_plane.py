@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from math import tau
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.plane.closure import Closure
-from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.plane.linkage import Linkage, RevoluteJoint
 from linkage_ros.kinematics.space.carried_points import CarriedPoints
 from linkage_ros.kinematics.space.closure import closure_in_pose, SpaceClosure
 from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage, unit_of
@@ -30,9 +31,6 @@ from linkage_ros.kinematics.space.vectors import GROUND_FRAME, scale
 
 _SAME_ZERO = 1e-12
 """Difference of a joint's values in plane and space that is rounding, in [rad]."""
-
-_TURNED = 1.0
-"""Difference of a joint's values in plane and space from which it is whole turns, in [rad]."""
 
 _PLANES = ('y', 'z'), ('x', 'z'), ('x', 'y')
 """The axes of the planes across x, y and z."""
@@ -45,18 +43,26 @@ def closure_as_drawn(linkage: SpaceLinkage, name: str = '') -> Closure | SpaceCl
         # A pose at a toggle is left to the closure in space.
         with suppress(DefinitionError):
             closure = Closure(planar, name)
-            if _begins_in_pose(closure, linkage):
-                return closure
+            turns = _turns_in_pose(closure, linkage)
+            if any(turns.values()):
+                joints = {
+                    joint: replace(of, turns=turns[joint]) if isinstance(of, RevoluteJoint) else of
+                    for joint, of in planar.joints.items()
+                }
+                closure = Closure(replace(planar, joints=joints), name)
+            return closure
     return closure_in_pose(linkage, name)
 
 
-def _begins_in_pose(closure: Closure, linkage: SpaceLinkage) -> bool:
-    """Return whether the joints have the pose's values in the pose, without whole turns."""
+def _turns_in_pose(closure: Closure, linkage: SpaceLinkage) -> dict[str, int]:
+    """Return for each joint the whole turns that its value lacks in the pose."""
     found = closure.close_unlimited(*linkage.pose.inputs)
-    return found.status.has_rates and all(
-        abs(value - linkage.pose_value(name)) < _TURNED
+    if not found.status.has_rates:
+        raise DefinitionError('pose', 'the linkage is at a toggle', 'draw another pose')
+    return {
+        name: round((linkage.pose_value(name) - value) / tau)
         for name, value in zip(closure.joint_names, found.joints, strict=True)
-    )
+    }
 
 
 def linkage_in_plane(linkage: SpaceLinkage) -> Linkage | None:

@@ -30,6 +30,7 @@ from linkage_ros.kinematics.plane.linkage import (
     GROUND,
     Input,
     Linkage,
+    Mass,
     NO_LIMITS,
     Point,
     Ratio,
@@ -39,6 +40,7 @@ from linkage_ros.kinematics.plane.linkage import (
 )
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.linkage import size_of, SpaceLinkage
+from linkage_ros.kinematics.space.masses import SpatialMass, tensor_rows
 from linkage_ros.kinematics.space.merged_pose import MERGED
 from linkage_ros.kinematics.space.vectors import cross, dot, length, minus, scale, Vector
 
@@ -343,8 +345,12 @@ class PlanarModel:
         for link, names in points.items():
             self._add_points(places.get(link, {}), names)
         links: dict[str, dict[str, Point]] = {}
+        masses: dict[str, Mass] = {}
         for link, at in places.items():
             first = (0.0, 0.0) if link == GROUND else next(iter(at.values()))
+            if spatial.masses and link != GROUND:
+                weighed = spatial.masses_with(link)[link]
+                masses[link] = self._mass(weighed, first, turned.get(link, 0.0))
             links[link] = {
                 name: _turn((x - first[0], y - first[1]), -turned.get(link, 0.0))
                 for name, (x, y) in at.items()
@@ -374,8 +380,17 @@ class PlanarModel:
         flat = Linkage(
             links, inputs, {}, {name: made[name] for name in joints}, sliders, pose=pose,
             ratios={name: self._ratio(of, name, offsets) for name, of in self._ratios.items()},
+            masses=masses,
         )  # fmt: skip
         return PlanarLoop(flat, tuple(self._links), offsets, self._normal, self._tilt)
+
+    def _mass(self, weighed: SpatialMass, first: Point, angle: float) -> Mass:
+        """Return the mass of a link with its first point at a place, turned by an angle."""
+        x, y = self._flat(weighed.center)
+        center = _turn((x - first[0], y - first[1]), -angle) if weighed.mass else (0.0, 0.0)
+        across = (dot(row, self._normal) for row in tensor_rows(weighed.inertia))
+        about = sum(one * other for one, other in zip(self._normal, across, strict=True))
+        return Mass(weighed.mass, center, about)
 
     def _add_points(self, there: dict[str, Point], names: Collection[str]) -> None:
         """Add the points of a link that are in no other place of it."""
