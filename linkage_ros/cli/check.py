@@ -32,7 +32,7 @@ from linkage_ros.cli.result import add_result, Result, show_result, tables_json
 from linkage_ros.cli.table import Column, facts_table, Quantity, Table, UNIT
 from linkage_ros.cli.terminal import ProgressCallback, show_progress
 from linkage_ros.description import linkage_content, linkage_notes, read_any_closure
-from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.errors import DefinitionError, LinkageError, list_names
 from linkage_ros.kinematics import (
     closes_in_two_ways,
     closing_name,
@@ -43,6 +43,7 @@ from linkage_ros.kinematics import (
     find_standing_state,
     find_worst_states,
     four_bars,
+    GearedLinks,
     Group,
     InputSweep,
     is_iterated,
@@ -334,6 +335,10 @@ def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> G
             if any(any(step.crosses) for step in steps):
                 assembly += ' as drawn, changing at change points'
         return GroupDescription(f'{group.kind} dyad', links, 'closed form', assembly)
+    if isinstance(group, GearedLinks):
+        ratios = ((name, closure.linkage.ratios[name]) for name in group.ratios)
+        followed = [f'{name} follows {ratio.of} by {ratio.ratio:g}' for name, ratio in ratios]
+        return GroupDescription('ratio', list(group.links), list_names(followed), '')
     (equations,) = (step.equation_count for step in steps if step.iterates)
     method = f"iterated: Newton's method, {equations} equations"
     links = list(group.links)

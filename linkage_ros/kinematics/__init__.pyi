@@ -168,6 +168,7 @@ from linkage_ros.kinematics.plane.topology import (
     count_mobility as count_mobility,
     Driven as Driven,
     Dyad as Dyad,
+    GearedLinks as GearedLinks,
     Group as Group,
     Iterated as Iterated,
     Joint as Joint,

@@ -281,6 +281,30 @@ class RelativeAngle(LinearStep):
 
 
 @dataclass(frozen=True, slots=True)
+class GearedAngle(LinearStep):
+    """The angle of a link that ratios turn: factors times known coordinates, and a constant."""
+
+    factors: tuple[tuple[int, float], ...]  # Indices among the coordinates, and factors
+    constant: float
+
+    def close(self, solved: LinkState) -> StepPose:
+        """Append the angle."""
+        solved.coordinates.append(self._sum(solved) + self.constant)
+        return PLACED
+
+    def append_derivative(self, state: LinkState) -> None:
+        """Append the derivative of the angle."""
+        state.coordinates.append(self._sum(state))
+
+    def _sum(self, state: LinkState) -> float:
+        # Not `sum`, which from Python 3.12 on has other bits.
+        total = 0.0
+        for index, factor in self.factors:
+            total = total + factor * state.coordinates[index]
+        return total
+
+
+@dataclass(frozen=True, slots=True)
 class FollowerJoint(LinearStep):
     """
     The value of a joint that follows another: ratio·(x[one] − x[other] + constant) + offset.

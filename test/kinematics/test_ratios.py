@@ -335,18 +335,107 @@ def test_implicit_ratio_turns_its_link_by_whole_turns_of_the_input(ratio: float)
     closed = 0
     for _ in range(8):
         closure, offset = geared_rocker(random, ratio)
-        values = [closure.linkage.pose.inputs[0]]  # type: ignore[union-attr]
-        for one in closure.closing_ranges:
-            values += [random.uniform(one.lowest, one.highest) for _ in range(4)]
+        links = closure.linkage.links
+        values = [random.uniform(-pi, pi) for _ in range(4)]
         for value in values:
             for turns in range(-6, 7):
                 theta = value + tau * turns
+                place = mpf(links['crank']['A'][0]) * mp.expj(theta)
+                met = meeting(
+                    place, mpf(links['ground']['D'][0]), links['coupler']['B'][0],
+                    links['rocker']['B'][0], 1,
+                )  # fmt: skip
                 position = closure.position(theta)
+                assert position.status.has_pose == (met is not None), (theta, turns)
                 if position.joints:
                     exact = (mpf(theta) + offset) / (1.0 - mpf(ratio))
                     assert same_angles([position['arm_joint']], [exact], 1e-11), (theta, turns)
                     closed += 1
     assert closed >= 8
+
+
+def geared_train(rng: Random) -> tuple[Linkage, Any]:
+    """
+    Return a train of one or two links that ratios turn, on a double rocker, and its exact angles.
+
+    The first link hangs on the ground or the crank, the second on one before. Each ratio is of two
+    joints between the links so far: the equations are linear, and their solution is the reference.
+    """
+    count = rng.choice([1, 2])
+    links: dict[str, dict[str, tuple[float, float]]] = {
+        'ground': {'O': (0.0, 0.0), 'D': (1.0, 0.0)},
+        'crank': {'O': (0.0, 0.0), 'A': (0.5, 0.0)},
+        'coupler': {'A': (0.0, 0.0), 'B': (0.7, 0.0)},
+        'rocker': {'D': (0.0, 0.0), 'B': (0.6, 0.0)},
+    }
+    names, joints = ['ground', 'crank'], {}
+    for number in range(count):
+        name, on = f'arm{number}', rng.choice(names[-2:])
+        pin = f'P{number}'
+        links[on] = dict(links[on]) | {pin: (rng.uniform(0.1, 0.4), rng.uniform(0.1, 0.4))}
+        links[name] = {pin: (0.0, 0.0), f'E{number}': (0.3, 0.0)}
+        joints[f'hinge{number}'] = RevoluteJoint(on, name)
+        names.append(name)
+    arms = [name for name in names if name.startswith('arm')]
+    joints |= {f'{name}_angle': RevoluteJoint('ground', name) for name in arms}
+    theta, wanted = rng.uniform(-0.4, 0.4), [rng.uniform(-3.0, 3.0) for _ in arms]
+    ratios, rows, rights = {}, [], []
+    for number in range(count):
+        joint = joints[f'hinge{number}']
+        on = 'crank' if joint.parent == 'ground' else 'ground'
+        joints[f'of{number}'] = RevoluteJoint(on, arms[count - 1 - number])
+        ratio = rng.choice([-1.0, -0.5, 1 / 3, 2.0, 3.0, -1.5, 0.3712345])
+        angles = dict(zip(names, [0.0, theta, *wanted], strict=True))
+        ends = joint, joints[f'of{number}']
+        values = [angles[one.child] - angles[one.parent] for one in ends]
+        ratios[f'hinge{number}'] = Ratio(f'of{number}', ratio, values[0] - ratio * values[1])
+        row = dict.fromkeys(names, mpf(0))
+        for one, factor in zip(ends, (mpf(1), -mpf(ratio)), strict=True):
+            row[one.child] += factor
+            row[one.parent] -= factor
+        rows.append(row)
+        rights.append(mpf(ratios[f'hinge{number}'].offset))
+
+    def exact(crank: float) -> Any:
+        matrix = mp.matrix([[row[name] for name in arms] for row in rows])
+        right = mp.matrix([c - row['crank'] * crank for row, c in zip(rows, rights, strict=True)])
+        return [*mp.lu_solve(matrix, right)]
+
+    linkage = Linkage(links, (Input('theta', 'ground', 'crank'),), {'B': 'left'}, joints, {},
+        ratios=ratios)  # fmt: skip
+    return linkage, exact
+
+
+def test_random_links_that_ratios_turn_over_whole_turns() -> None:
+    """They follow the crank turn after turn, also where another loop was open in between."""
+    rng = Random(11)
+    compared, opened = 0, 0
+    while compared < 40:
+        linkage, exact = geared_train(rng)
+        try:
+            closure = Closure(linkage)
+        except DefinitionError:
+            continue  # The ratios lock the links, or leave them free.
+        compared += 1
+        names = [name for name in linkage.joints if name.endswith('_angle')]
+        for turns in (-70, -1, 0, 2, 200):
+            theta = rng.uniform(-pi, pi) + tau * turns
+            place = mpf('0.5') * mp.expj(theta)
+            closes = meeting(place, mpf(1), mpf('0.7'), mpf('0.6'), 1) is not None
+            position = closure.position(theta)
+            assert position.status.has_pose == closes
+            opened += not closes
+            if closes:
+                right, error = exact(theta), 1e-15 * (10.0 + 20.0 * abs(theta))
+                size = max(map(abs, right)) / abs(theta) if theta else 1.0
+                found = [position[name] for name in names]
+                assert same_angles(found, right, float(error * (1.0 + size)))
+                rates = closure.velocity(position, 1.0)
+                slopes = [a - b for a, b in zip(exact(1.0), exact(0.0), strict=True)]
+                for name, slope in zip(names, slopes, strict=True):
+                    at = closure.joint_names.index(name)
+                    assert rates.joints[at] == pytest.approx(float(slope), rel=1e-13)
+    assert opened > 20
 
 
 @pytest.mark.parametrize('ratio', [1.0, -1.5, 0.37, -2.0])

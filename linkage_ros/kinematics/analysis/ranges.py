@@ -28,6 +28,7 @@ from linkage_ros.kinematics.plane.linkage import Point
 from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 from linkage_ros.kinematics.step import (
     FixedPoint,
+    GearedAngle,
     PLACED,
     PointOnLink,
     PointOnRail,
@@ -54,7 +55,7 @@ _ROUNDED = 1e-9
 _FLAT = 1e-12
 """A margin that changes less between samples, relative to itself, is constant there."""
 
-_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
+_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle, GearedAngle)
 
 _SAME = 1e-9
 """Largest difference of joints that count as equal, in [rad] or relative to the scale."""

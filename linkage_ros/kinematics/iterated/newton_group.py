@@ -44,7 +44,7 @@ from linkage_ros.kinematics.iterated.newton_system import NewtonSystem
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
 from linkage_ros.kinematics.plane.linkage import Linkage
-from linkage_ros.kinematics.plane.rough_pose import guess_unknowns
+from linkage_ros.kinematics.plane.rough_pose import close_in_pose, guess_unknowns
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
 import numpy as np
@@ -332,24 +332,10 @@ def make_iteration(
             'give inputs, and where points of these links lie then: '
             'pose: {inputs: [...], points: {...}}',
         )
-    inputs = tuple(
-        value / scale if given.slider else value
-        for value, given in zip(pose.inputs, linkage.inputs, strict=True)
-    )
-    solved = LinkState([0.0, *inputs], [])
-    for step in before:
-        if not step.close(solved).status.has_pose:
-            raise DefinitionError(
-                'pose.inputs',
-                'what comes before the iterated links does not close there',
-                'give inputs that the linkage can have',
-            )
-    x, pins = solved
-    places = {name: complex(*place) / scale for name, place in pose.points.items()}
-    places |= {name: pins[i] for name, i in constraints.known_pins.items()}
-    angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
-    angles |= {link: angle for link, angle in pose.angles.items() if link in links}
-    start = guess_unknowns(linkage, links, planner, places, angles)
+    solved = close_in_pose(linkage, scale, before)
+    inputs = tuple(solved.coordinates[1 : 1 + len(linkage.inputs)])
+    pins = {name: solved.pins[i] for name, i in constraints.known_pins.items()}
+    start = guess_unknowns(linkage, links, planner, pins, solved)
     far = sum(
         max(abs(one - other) for one in points.values() for other in points.values())
         for points in planner.points.values()

@@ -13,7 +13,7 @@ from __future__ import annotations
 from cmath import phase, rect
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf
+from math import inf, lcm
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names, quote
@@ -33,6 +33,7 @@ from linkage_ros.kinematics.plane.dyads.rrr import (
     RRRDyad,
 )
 from linkage_ros.kinematics.plane.dyads.two_sided import TwoSided
+from linkage_ros.kinematics.plane.geared_links import solve_geared_links
 from linkage_ros.kinematics.plane.linkage import Input, Linkage
 from linkage_ros.kinematics.plane.meant_lengths import (
     four_bar_lengths,
@@ -46,10 +47,12 @@ from linkage_ros.kinematics.plane.rail import (
     Rail,
     UnsignedRail,
 )
+from linkage_ros.kinematics.plane.rough_pose import close_in_pose, guess_unknowns
 from linkage_ros.kinematics.plane.sides import closing_name, SIDES, telling_part, TwoWays
 from linkage_ros.kinematics.plane.solved_links import (
     Angle,
     Attachment,
+    count_turns,
     PlanStart,
     Slide,
     SlideLine,
@@ -59,6 +62,7 @@ from linkage_ros.kinematics.plane.topology import (
     assur_groups,
     Driven,
     Dyad,
+    GearedLinks,
     Iterated,
     Structure,
 )
@@ -126,8 +130,11 @@ class SolutionPlan(SolvedLinks):
             elif isinstance(group, Dyad):
                 self._add_dyad(group)
             else:
-                self._choose_sides()  # the iteration starts from the links before it
-                self._add_iteration(group)
+                self._choose_sides()  # these start from the links before them
+                if isinstance(group, GearedLinks):
+                    self._add_geared(group)
+                else:
+                    self._add_iteration(group)
             self.turn_joints()
         self._choose_sides()
         for name in self._assembly:
@@ -371,6 +378,47 @@ class SolutionPlan(SolvedLinks):
         for i, outer in enumerate(dyad.outer):
             self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
             self.attach_to_pin(outer.link, outer)
+
+    def _add_geared(self, group: GearedLinks) -> None:
+        waiting = list(self._structure.joints_of(group))
+        held = {*self.angles}
+        while waiting:
+            joint = next(one for one in waiting if held & {one.link, one.to})
+            waiting.remove(joint)
+            if joint.link in held:
+                joint = replace(joint, link=joint.to, to=joint.link)
+            held.add(joint.link)
+            self.attach_to_pin(joint.link, joint)
+        pose = self._pose_of_geared(group)
+        for link, step in zip(
+            group.links, solve_geared_links(self._linkage, group, self.angles, pose), strict=True
+        ):
+            self.add_step(step)
+            coordinate = self.new_coordinates(1)
+            turned = [(factor, self.turns_with[k]) for k, factor in step.factors]
+            by_input = zip(*([f * one for one in turns] for f, turns in turned), strict=True)
+            with_input = tuple(map(sum, by_input)) or self.turns_with[0]
+            self.turns_with[coordinate] = with_input
+            self.ratio_turns = lcm(self.ratio_turns, count_turns(with_input[0]))
+            self.angles[link] = Angle(coordinate, 0.0, 1 + 0j)
+
+    def _pose_of_geared(self, group: GearedLinks) -> tuple[list[float], list[float]] | None:
+        """Return the coordinates in the pose, and the angles of a group, if it draws its links."""
+        pose = self._linkage.pose
+        named = {*pose.points, *pose.angles} if pose else set()
+        if not any(named & {link, *self.points[link]} for link in group.links):
+            return None
+        known = [*self.angles]
+        pins = {
+            point: self.place_pin(point)
+            for link in group.links
+            for point in self.points[link]
+            if any(point in self.points[one] for one in known)
+        }
+        state = close_in_pose(self._linkage, self.scale, self.steps)
+        places = {name: state.pins[index] for name, index in pins.items()}
+        start = guess_unknowns(self._linkage, group.links, self, places, state)
+        return state.coordinates, start[0::3]
 
     def _add_iteration(self, group: Iterated) -> None:
         from linkage_ros.kinematics.iterated.equations import (

@@ -16,20 +16,49 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.step import LinkState, Step
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.plane.solved_links import SolvedLinks
+
+
+def close_in_pose(linkage: Linkage, scale: float, steps: Sequence[Step]) -> LinkState:
+    """Return the state after steps at the inputs of the pose; a DefinitionError if it is open."""
+    assert linkage.pose is not None
+    inputs = (
+        value / scale if given.slider else value
+        for value, given in zip(linkage.pose.inputs, linkage.inputs, strict=True)
+    )
+    solved = LinkState([0.0, *inputs], [])
+    for step in steps:
+        if not step.close(solved).status.has_pose:
+            raise DefinitionError(
+                'pose.inputs',
+                'what comes before the links of the pose does not close there',
+                'give inputs that the linkage can have',
+            )
+    return solved
 
 
 def guess_unknowns(
     linkage: Linkage,
     links: Sequence[str],
     planner: SolvedLinks,
-    given: Mapping[str, complex],
-    angles: dict[str, float],
+    pins: Mapping[str, complex],
+    solved: LinkState,
 ) -> list[float]:
-    """Return angle and place of each link, fitted to the given places of points."""
-    points = planner.points
+    """
+    Return angle and place of each link, fitted to the points and angles that the pose names.
+
+    ``solved`` are the links before, as `close_in_pose` returns them, ``pins`` places of their
+    pins, in lengths.
+    """
+    pose, points, x = linkage.pose, planner.points, solved.coordinates
+    assert pose is not None
+    given = {name: complex(*place) / planner.scale for name, place in pose.points.items()}
+    given |= pins
+    angles = {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()}
+    angles |= {link: angle for link, angle in pose.angles.items() if link in links}
 
     def by_slider(link: str) -> float | None:
         """Return the angle of a link from its slider: by the other link or by the direction."""

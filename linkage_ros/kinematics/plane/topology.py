@@ -87,7 +87,15 @@ class Iterated:
     ratios: tuple[str, ...] = ()  # The joints whose ratios are solved with them
 
 
-Group = Driven | Dyad | Iterated
+@dataclass(frozen=True, slots=True)
+class GearedLinks:
+    """Links that pins hold, and as many ratios turn: their angles are sums of known angles."""
+
+    links: tuple[str, ...]
+    ratios: tuple[str, ...]  # The joints that follow others
+
+
+Group = Driven | Dyad | GearedLinks | Iterated
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +114,7 @@ class Structure:
         """Degrees of freedom by Grübler's count, with the inputs free."""
         return 3 * (len(self.links) - 1) - 2 * len(self.joints) - self.ratios
 
-    def joints_of(self, group: Iterated) -> tuple[Joint, ...]:
+    def joints_of(self, group: GearedLinks | Iterated) -> tuple[Joint, ...]:
         """
         Return the joints that hold a group: among its links, and to the links known before it.
 
@@ -234,6 +242,8 @@ class _GroupSearch:
             index: (ratio.of, find_followed_links(linkage, blocks, ratio.of))
             for index, ratio in enumerate(linkage.ratios.values(), len(linkage.inputs))
         }
+        self._turning = {GROUND}
+        """The links whose angles are sums of inputs, so that their whole turns are known."""
         self._bodies: list[tuple[str, ...]] = []
         self._start_following()
 
@@ -261,10 +271,31 @@ class _GroupSearch:
             for index in ratios:
                 del self._waiting[index]
             names = tuple(self._linkage.driven_joints[index].joint for index in ratios)
-            yield Iterated(tuple(link for body in chosen for link in body), names)
+            links = tuple(link for body in chosen for link in body)
+            if self._are_geared(chosen, names):
+                self._turning.update(links)
+                yield GearedLinks(links, names)
+            else:
+                yield Iterated(links, names)
             for body in chosen:
                 for link in body:
                     self._rank[link] = len(self._rank)
+
+    def _are_geared(self, bodies: Collection[tuple[str, ...]], ratios: Collection[str]) -> bool:
+        """Return whether ratios alone turn bodies, against links whose turns are known."""
+        links = {link for body in bodies for link in body}
+        if not len(links) == len(bodies) == len(ratios):
+            return False
+        if any(joint.kind == 'P' and {joint.link, joint.to} & links for joint in self._joints):
+            return False
+        ends: set[str] = set()
+        for name in ratios:
+            for joint in (name, self._linkage.ratios[name].of):
+                given = self._linkage.joints.get(joint)
+                if not isinstance(given, RevoluteJoint):
+                    return False
+                ends |= {given.parent, given.child}
+        return ends <= links | self._turning
 
     def _driven_joint(self, given: Input, blocks: Mapping[str, str]) -> Joint:
         if given.slider:
@@ -341,7 +372,23 @@ class _GroupSearch:
                     (new,) = set(ends) - set(known)
                     yield Driven(Joint(drive.kind, drive.name, new, known[0]), index)
                     self._rank[new] = len(self._rank)
+                    if drive.kind == 'R' and known[0] in self._turning and self._turns(index):
+                        self._turning.add(new)
                     learnt = True
+
+    def _turns(self, index: int) -> bool:
+        """Return whether the whole turns of a driven joint are known."""
+        count = len(self._linkage.inputs)
+        if index < count:
+            return True
+        of = tuple(self._linkage.ratios.values())[index - count].of
+        names = [given.joint for given in self._linkage.driven_joints]
+        if of in names:
+            return self._turns(names.index(of))
+        followed = self._linkage.joints[of]
+        return isinstance(followed, RevoluteJoint) and (
+            {followed.parent, followed.child} <= self._turning
+        )
 
     def _outer_joints(self, body: tuple[str, ...]) -> list[Joint]:
         """Return the joints of a body to the known part."""
