@@ -38,7 +38,13 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.plane.linkage import GROUND
 from linkage_ros.kinematics.plane.plan import SolutionPlan
 from linkage_ros.kinematics.plane.solved_links import count_turns, PlanStart
-from linkage_ros.kinematics.plane.topology import assur_groups, Dyad, Iterated, Structure
+from linkage_ros.kinematics.plane.topology import (
+    assur_groups,
+    Dyad,
+    GearedLinks,
+    Iterated,
+    Structure,
+)
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
@@ -220,8 +226,9 @@ class SpacePlan:
                 # A pose at a toggle is left to the steps in space.
                 with suppress(DefinitionError):
                     structure = assur_groups(loop.linkage)
-                    # Links that are iterated are a knot.
-                    if not any(isinstance(group, Iterated) for group in structure.groups):
+                    # Links that are iterated, or turned by ratios, are a knot.
+                    knots = GearedLinks, Iterated
+                    if not any(isinstance(group, knots) for group in structure.groups):
                         self._add_loop(loop, structure)
                         return True
         return False
