@@ -23,10 +23,11 @@ motors, wanted = jnp.array([0.10, -0.04]), jnp.zeros(2)
 def foot(rods):
     """Return pitch and roll at the motors: the closed form leads from the foot to the motors."""
     at = wanted
-    for _ in range(5):
-        joints = position(jnp.concatenate([at, rods]))[1]
-        slopes = jacobian(jnp.concatenate([at, rods]))
-        at -= jnp.linalg.solve(slopes[:, :2], joints - motors)
+    for _ in range(6):
+        # The gradient is that of the last step alone: it starts at the solution.
+        inputs = jnp.concatenate([jax.lax.stop_gradient(at), rods])
+        slopes = jacobian(jax.lax.stop_gradient(inputs))[:, :2]
+        at = inputs[:2] - jnp.linalg.solve(slopes, position(inputs)[1] - motors)
     return at
 
 

@@ -401,8 +401,8 @@ def geared_train(rng: Random) -> tuple[Linkage, Any]:
         right = mp.matrix([c - row['crank'] * crank for row, c in zip(rows, rights, strict=True)])
         return [*mp.lu_solve(matrix, right)]
 
-    linkage = Linkage(links, (Input('theta', 'ground', 'crank'),), {'B': 'left'}, joints, {},
-        ratios=ratios)  # fmt: skip
+    inputs = (Input('theta', 'ground', 'crank'),)
+    linkage = Linkage(links, inputs, {'B': 'left'}, joints, {}, ratios=ratios)
     return linkage, exact
 
 

@@ -27,8 +27,13 @@ import yaml
 
 ROBOTS = Path(__file__).with_name('robots')
 OWN = Path(__file__).parents[1] / 'kinematics' / 'space' / 'linkages'
-RNG = np.random.default_rng(37)
-TURNS = np.random.default_rng(48)
+
+
+@pytest.fixture
+def turns():
+    """Return random numbers that depend on no other test."""
+    return np.random.default_rng(48)
+
 
 # An independent route: homogeneous matrices of the URDF, and Newton's method in small steps.
 
@@ -141,8 +146,9 @@ def read(folder, text, **told):
 
 
 def near_pose(closure, reach, count):
+    """Return inputs near the pose; they depend on no other test."""
     pose = np.array(closure.linkage.pose.inputs)
-    return pose + RNG.uniform(-reach, reach, (count, len(pose)))
+    return pose + np.random.default_rng(37).uniform(-reach, reach, (count, len(pose)))
 
 
 def pose_of(closure):
@@ -317,10 +323,12 @@ def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
 
 
 @pytest.mark.parametrize('rounding', [1e-16, 1e-13, 1e-9, 1e-6])
-def test_a_pose_at_a_limit_is_within_it_whatever_the_rounding_of_the_loops(tmp_path, rounding):
+def test_a_pose_at_a_limit_is_within_it_whatever_the_rounding_of_the_loops(
+    tmp_path, rounding, turns
+):
     """Each joint that the loops move has a limit of 0, above or below, where it is in the pose."""
     text = (ROBOTS / 'ankle.urdf').read_text()
-    off = [0.022, 0.015, 0.008] + rounding * TURNS.uniform(-1.0, 1.0, 3)
+    off = [0.022, 0.015, 0.008] + rounding * turns.uniform(-1.0, 1.0, 3)
     text = text.replace('xyz="0.022 0.015 0.008"', f'xyz="{" ".join(map(repr, off.tolist()))}"')
     for joint in ('m1', 'rod1_y', 'rod1_x'):
         for low, high in ((0.0, 0.5), (-0.5, 0.0)):
@@ -334,7 +342,7 @@ def test_a_pose_at_a_limit_is_within_it_whatever_the_rounding_of_the_loops(tmp_p
             limited = ET.tostring(robot, 'unicode')
             ankle = read(tmp_path, limited, input=['pitch', 'roll'])
             assert ankle.position(0.0, 0.0).status.value == 'closed'
-            states = [ankle.position(*at) for at in TURNS.uniform(-0.2, 0.2, (20, 2))]
+            states = [ankle.position(*at) for at in turns.uniform(-0.2, 0.2, (20, 2))]
             assert {'closed', 'limited'} == {state.status.value for state in states}
 
 
@@ -389,16 +397,16 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
 
 
 @pytest.mark.parametrize('name', ['bennett', 'spherical_four_bar'])
-def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name):
+def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name, turns):
     """Its frame is welded as it lies where the joints have values that are not 0."""
     linkage = load(name).linkage
-    values = {joint: TURNS.uniform(-3.0, 3.0) for joint in linkage.hinges}
+    values = {joint: turns.uniform(-3.0, 3.0) for joint in linkage.hinges}
     hinges = {k: replace(hinge, value=values[k]) for k, hinge in linkage.hinges.items()}
     written = SpaceClosure(replace(linkage, hinges=hinges))
     (tmp_path / 'robot.urdf').write_bytes(urdf_model(name, [ModelPart(written)]))
     robot = load(tmp_path / 'robot.urdf')
     assert robot.linkage.corrections.turned_by < 1e-12
-    for inputs in written.linkage.pose.inputs + TURNS.uniform(-0.3, 0.3, (5, 1)):
+    for inputs in written.linkage.pose.inputs + turns.uniform(-0.3, 0.3, (5, 1)):
         joints = dict(zip(robot.joint_names, robot.position(*inputs).joints, strict=True))
         found = [joints[joint] for joint in written.joint_names]
         assert found == pytest.approx(written.position(*inputs).joints, abs=1e-12)
@@ -513,9 +521,9 @@ def angle_between(kind, rpy):
 
 
 @pytest.mark.parametrize('kind', ['fixed', 'revolute', 'prismatic'])
-def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind):
+def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind, turns):
     for _ in range(12):
-        rpy = TURNS.uniform(0.4, 3.0, 3) * TURNS.choice([-1, 1], 3)
+        rpy = turns.uniform(0.4, 3.0, 3) * turns.choice([-1, 1], 3)
         with pytest.raises(LinkageError, match='the loop loop is open by') as caught:
             read(tmp_path, WELDED % CLOSED_BY.format(kind, *rpy), input='q1')
         told = float(re.search(r'open by (\S+) rad', str(caught.value))[1])
@@ -541,7 +549,7 @@ TIP += '<origin xyz="0.3 0 0" rpy="0 0 -0.5"/></joint>'
 
 
 @pytest.mark.parametrize('welded', [CLOSED_BY.format('fixed', 0, 0, 0.5), 'tip=end:fixed'])
-def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_path, welded):
+def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_path, welded, turns):
     text, close = WELDED % (welded if '<' in welded else TIP), [] if '<' in welded else [welded]
     with pytest.raises(LinkageError, match=r'is open by 0\.5 rad in the pose; near it') as caught:
         read(tmp_path, text, input='q1', close=close)
@@ -550,7 +558,7 @@ def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_pa
     closure = read(tmp_path, text, input='q1', close=close, at=at)
     assert closure.linkage.corrections.turned_by < 1e-15
     # Rod and end are one link: by the angles from base to it, over crank and over rocker.
-    for crank in TURNS.uniform(-3.0, 3.0, 5):
+    for crank in turns.uniform(-3.0, 3.0, 5):
         joints = closure.position(crank)
         over_crank = crank + 0.6 + joints['q2']
         away = over_crank - (joints['q3'] + 0.6 + joints['q4'] + 0.5)

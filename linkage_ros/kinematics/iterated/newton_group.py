@@ -333,7 +333,8 @@ def make_iteration(
             'pose: {inputs: [...], points: {...}}',
         )
     solved = close_in_pose(linkage, scale, before)
-    inputs = tuple(solved.coordinates[1 : 1 + len(linkage.inputs)])
+    beyond = 1 + len(linkage.inputs)
+    inputs = tuple(solved.coordinates[1:beyond])
     pins = {name: solved.pins[i] for name, i in constraints.known_pins.items()}
     start = guess_unknowns(linkage, links, planner, pins, solved)
     far = sum(

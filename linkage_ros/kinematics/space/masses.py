@@ -55,7 +55,7 @@ def thin_rod(mass: float, one: Vector, other: Vector) -> SpatialMass:
     """Return a uniform thin rod between two places, in [m]."""
     center = scale(0.5, plus(one, other))
     # Two halves of its mass a twelfth of its square apart from the centre, on either side.
-    return SpatialMass(mass, center, scaled(mass / 12.0, _spread(minus(other, one))))
+    return SpatialMass(mass, center, scale_tensor(mass / 12.0, _spread(minus(other, one))))
 
 
 def combine_masses(parts: Sequence[SpatialMass]) -> SpatialMass:
@@ -68,7 +68,7 @@ def combine_masses(parts: Sequence[SpatialMass]) -> SpatialMass:
         center = plus(center, scale(part.mass / total, part.center))
     inertia = _NONE
     for part in parts:
-        moved = scaled(part.mass, _spread(minus(part.center, center)))
+        moved = scale_tensor(part.mass, _spread(minus(part.center, center)))
         inertia = _sum(_sum(inertia, part.inertia), moved)
     return SpatialMass(total, center, inertia)
 
@@ -91,7 +91,7 @@ def tensor_rows(tensor: Tensor) -> tuple[Vector, Vector, Vector]:
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
-def scaled(factor: float, tensor: Tensor) -> Tensor:
+def scale_tensor(factor: float, tensor: Tensor) -> Tensor:
     """Return a tensor times a factor."""
     xx, xy, xz, yy, yz, zz = tensor
     return factor * xx, factor * xy, factor * xz, factor * yy, factor * yz, factor * zz

@@ -456,6 +456,20 @@ def test_a_point_at_three_distances_is_as_far_from_a_toggle_as_its_planes_are_ap
         )
 
 
+@pytest.mark.parametrize('drawn', [1.2, -1.2])
+def test_the_side_of_a_point_at_three_distances_is_that_of_the_plane_of_their_ends(drawn):
+    """The sign of ((P1 − P0) × (P2 − P0))·(X − P0), in the assembly that the file draws."""
+    text = TRIPOD.replace('1.2', str(drawn)).replace('--', '')
+    closure = read_any_closure(parse_yaml(text.encode(), 'x.yaml'))
+    number = next(k for k, step in enumerate(closure.steps) if step.has_transmission_angle)
+    p0, p1, p2 = np.array([0.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]), np.array([0.5, 1.5, 0.0])
+    for value in (0.2, 0.5, 0.9):
+        position = closure.position(value)
+        side = np.cross(p1 - p0, p2 - p0) @ (np.array(closure.points(position)['x']) - p0)
+        assert side * drawn > 0.0
+        assert closure.steps[number].side_of(position.poses[number]) * side > 0.0
+
+
 def sharing_links(links, points):
     """Return a hinged link, and others that share all of its points."""
     random = Random(1)
