@@ -170,8 +170,8 @@ def _corrections_json(linkage: Linkage | SpaceLinkage) -> dict[str, Any]:
     corrections = linkage.corrections
     if corrections is None:
         return {}
-    return {
-        'plane': list(linkage.axes) if isinstance(linkage, Linkage) else None,
+    plane = {'plane': list(linkage.axes)} if isinstance(linkage, Linkage) else {}
+    return plane | {
         'robot_open_by_m': corrections.open_by,
         'robot_turned_by_rad': corrections.turned_by,
         'merged_by_m': corrections.merged_by,

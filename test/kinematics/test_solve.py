@@ -30,6 +30,7 @@ from linkage_ros.kinematics import (
     Input,
     Linkage,
     Position,
+    Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
@@ -89,6 +90,24 @@ def slider_crank_linkage(
 # that cross, a link that a motor on another one turns, a motor within a dyad, change points that
 # are not passed.
 OTHERS: dict[str, tuple[Linkage, Inputs]] = {
+    'arm on a crank that a ratio turns': (
+        Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'D': (1.0, 0.0)},
+                'crank': {'O': (0.0, 0.0), 'A': (0.2, 0.0), 'P': (0.1, 0.1)},
+                'coupler': {'A': (0.0, 0.0), 'B': (0.9, 0.0)},
+                'rocker': {'D': (0.0, 0.0), 'B': (0.6, 0.0)},
+                'arm': {'P': (0.0, 0.0), 'E': (0.3, 0.0)},
+            },
+            inputs=(Input('theta', 'ground', 'crank'),), assembly={'B': 'left'},
+            joints={
+                'hinge': RevoluteJoint('crank', 'arm'), 'arm': RevoluteJoint('ground', 'arm'),
+                'rocker': RevoluteJoint('ground', 'rocker'),
+            },
+            sliders={}, ratios={'hinge': Ratio('arm', 3.0)}
+        ),
+        ((-7.0, 7.0),),
+    ),
     'rod in a swivel on two cranks': (
         Linkage(
             links={'ground': GROUND, **CRANKS, 'rod': {'A': (0.0, 0.0), 'T': (0.0, 0.05)}},

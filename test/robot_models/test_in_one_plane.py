@@ -14,8 +14,7 @@ from linkage_ros import load
 from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.kinematics import Closure, SpaceClosure, Status, usual_inputs
 from linkage_ros.resources import linkage_names
-from linkage_ros.tools.models.part import ModelPart
-from linkage_ros.tools.models.urdf import urdf_model
+from linkage_ros.tools.models import ModelPart, urdf_model
 import numpy as np
 import pytest
 

@@ -11,6 +11,7 @@ Lengths of dyads without the rounding by which they miss a change point.
 Coordinates of an oblique plane are rounded, and so are the lengths between them: a parallelogram
 of such lengths would fold at its change points. Lengths that are equal in pairs to nine digits are
 made equal. Where links lie in line but for less than 1e-14 of their lengths, one is made to fit.
+Linkages that are drawn in their plane keep their lengths, however nearly these are equal.
 """
 
 from __future__ import annotations

@@ -225,7 +225,7 @@ class SolutionPlan(SolvedLinks):
         other_arm = self.pin_vector(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
         hinge = self._find_hinge(first.name, second.name)
-        if hinge is not None:
+        if hinge is not None and self._drawn_in_space:
             a, b, c, d = four_bar_lengths(hinge.a, b, c, hinge.d)
             hinge = hinge._replace(a=a, d=d)
 
@@ -264,7 +264,7 @@ class SolutionPlan(SolvedLinks):
             return swivel_diagonal(a, d, offset, arms, angle, turns_known, crosses)
 
         hinge = self._find_hinge(first.name, second.name)
-        if hinge is not None:
+        if hinge is not None and self._drawn_in_space:
             a, d, offset = swivel_lengths(hinge.a, hinge.d, offset)
             hinge = hinge._replace(a=a, d=d)
         diagonal, base, upright = self._make_diagonal(
@@ -506,6 +506,11 @@ class SolutionPlan(SolvedLinks):
         nearly = nearly_paired(*lengths) if lengths else None
         return nearly.crosses if nearly else None
 
+    @property
+    def _drawn_in_space(self) -> bool:
+        """Return whether lengths are of coordinates in an oblique plane, which are rounded."""
+        return self._linkage.corrections is not None
+
     def _find_hinge(self, first: str, second: str) -> _Hinge | None:
         """Return the links with a common pin O that carry two pins, or None."""
         known = list(self.angles)
@@ -536,7 +541,7 @@ class SolutionPlan(SolvedLinks):
                 angle = self.angles[link]
                 arm = self.pin_vector(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
-                if length < inf:
+                if length < inf and self._drawn_in_space:
                     length, height = rail_lengths(abs(arm), length, place.imag)
                     place = complex(place.real, height)
                 arms = angle.coordinate, base.coordinate

@@ -90,6 +90,5 @@ def _in_plane(linkage: SpaceLinkage, found: PlanarLoop, axes: tuple[str, str]) -
         found.linkage,
         traced=tuple(point for point in linkage.traced if point in carried),
         axes=axes,
-        corrections=replace(linkage.corrections, tilted_by=found.tilt),
         left_out=linkage.left_out,
     )

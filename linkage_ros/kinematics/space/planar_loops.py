@@ -69,7 +69,12 @@ class PlanarLoop(NamedTuple):
     links: tuple[str, ...]
     offsets: Mapping[str, float]
     normal: Vector
-    tilt: float  # Largest angle of a joint to the plane, or to its normal, in [rad]
+
+    @property
+    def tilt(self) -> float:
+        """Return the largest angle of a joint to the plane, or to its normal, in [rad]."""
+        corrections = self.linkage.corrections
+        return corrections.tilted_by if corrections else 0.0
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -381,8 +386,9 @@ class PlanarModel:
             links, inputs, {}, {name: made[name] for name in joints}, sliders, pose=pose,
             ratios={name: self._ratio(of, name, offsets) for name, of in self._ratios.items()},
             masses=masses,
+            corrections=replace(spatial.corrections, tilted_by=self._tilt),
         )  # fmt: skip
-        return PlanarLoop(flat, tuple(self._links), offsets, self._normal, self._tilt)
+        return PlanarLoop(flat, tuple(self._links), offsets, self._normal)
 
     def _mass(self, weighed: SpatialMass, first: Point, angle: float) -> Mass:
         """Return the mass of a link with its first point at a place, turned by an angle."""
