@@ -61,7 +61,7 @@ NAMES = {
     *('ArrayFunctions', 'Batch', 'Closure', 'InputRange', 'Status'),
     *('Acceleration', 'Position', 'Velocity', 'load', 'linkage_names', 'svg', 'LinkagePage'),
     *('Input', 'Limits', 'Linkage', 'Mass', 'Ratio', 'RevoluteJoint', 'SlideJoint', 'Slider'),
-    *('SpaceClosure', 'SpaceLinkage', 'SpatialJoint'),
+    *('SpaceClosure', 'SpaceLinkage', 'SpatialJoint', 'SpatialMass'),
     *('Pipeline', 'Scene', 'Tick', 'load_scene', 'recorded_scene', 'scene_names'),
     *('DefinitionError', 'FileError', 'LinkageError', 'SynthesisError'),
     *('Assessment', 'Design', 'PathTask', 'Pose', 'assess', 'from_fixed_pivots'),
