@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from math import hypot
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -49,6 +48,7 @@ from linkage_ros.kinematics import (
     RevoluteJoint,
     SlideJoint,
     SpaceClosure,
+    thin_rod,
     without_drawn_pose,
 )
 from linkage_ros.resources import linkage_names, named_file
@@ -128,17 +128,29 @@ def read_linkage(content: Section) -> Linkage:
 
 
 def read_any_closure(
-    content: Section, name: str = '', *, publish_inputs: bool = False
+    content: Section,
+    name: str = '',
+    *,
+    publish_inputs: bool = False,
+    publish_model_joints: bool = False,
 ) -> Closure | SpaceClosure:
-    """Read a planar or a spatial linkage; errors as in `read_closure`."""
+    """
+    Read a planar or a spatial linkage; errors as in `read_closure`.
+
+    With ``publish_model_joints`` a robot, or a spatial file, publishes joints that place every
+    link, as a robot model needs them.
+    """
     if 'urdf' in content:
         from linkage_ros.description.robot_file import (
-            read_robot_closure,  # local import: few linkages are robots
+            read_robot_closure as read,  # local import: few linkages are robots
         )
-
-        return read_robot_closure(content, name, publish_inputs=publish_inputs)
-    read = read_space_closure if is_spatial(content) else read_closure
-    return read(content, name, publish_inputs=publish_inputs)
+    elif is_spatial(content):
+        read = read_space_closure
+    else:
+        return read_closure(content, name, publish_inputs=publish_inputs)
+    return read(
+        content, name, publish_inputs=publish_inputs, publish_model_joints=publish_model_joints
+    )
 
 
 def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
@@ -239,8 +251,10 @@ def _mass_of(
     mass = given['mass']
     if not is_rod(content, link, given, [*points]):
         return Mass(mass, given.get('center', (0.0, 0.0)), given.get('inertia', 0.0))
-    (a, b), (c, d) = points.values()
-    return Mass(mass, (0.5 * (a + c), 0.5 * (b + d)), mass / 12.0 * hypot(c - a, d - b) ** 2)
+    one, other = points.values()
+    rod = thin_rod(mass, (*one, 0.0), (*other, 0.0))
+    (x, y, _), (*_, about_z) = rod.center, rod.inertia
+    return Mass(mass, (x, y), about_z)
 
 
 def _input_line(points: Mapping[str, Collection[str]]) -> str:

@@ -128,15 +128,16 @@ ROBOT = Keys(
 
 
 def read_robot_closure(
-    content: Section, name: str = '', *, publish_inputs: bool = False
+    content: Section, name: str, *, publish_inputs: bool, publish_model_joints: bool
 ) -> Closure | SpaceClosure:
-    """Read the loops of a robot and check that they close; errors as in `read_closure`."""
+    """Read the loops of a robot and check that they close, as `read_any_closure` does."""
     urdf = read_urdf(content.named_data, content.mapping['urdf'])
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
 
     def close(without: Sequence[str] = ()) -> Closure | SpaceClosure:
-        closure = closure_as_drawn(robot.linkage(publish_inputs, without), name)
+        linkage = robot.linkage(publish_inputs, without)
+        closure = closure_as_drawn(linkage, name, publish_model_joints=publish_model_joints)
         check_limits(closure)
         return closure
 
@@ -522,9 +523,8 @@ class _Robot:
             left_out=(*left_out, *(f'mimic of {name}' for name in without)),
             corrections=PoseCorrections(open_by[0], turned_by[0]),
         )
-        weighed = self._masses(on, frames, linkage.link_names[1:])
-        linkage = replace(linkage, masses=weighed)
-        return replace(linkage, masses=linkage.masses_with(*linkage.link_names[1:]))
+        links = linkage.link_names[1:]
+        return linkage.with_masses(self._masses(on, frames, links), massless=links)
 
     def _masses(
         self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], links: Sequence[str]

@@ -40,7 +40,7 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
-from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage, with_rod_joints
+from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.stages.drives import drive_class
 
@@ -404,9 +404,11 @@ def _read_scene_linkage(
             each.without_inputs for each in types.values()
         )
     if closure is None:
-        closure = read_any_closure(linkage_content, publish_inputs=published)
-    if source.publishes_model_joints and isinstance(closure, SpaceClosure):
-        closure = SpaceClosure(with_rod_joints(closure.linkage), closure.name)
+        closure = read_any_closure(
+            linkage_content,
+            publish_inputs=published,
+            publish_model_joints=source.publishes_model_joints,
+        )
     linkage = closure.linkage
     _refuse_effects(effects, types, drive, published)
     if isinstance(linkage, SpaceLinkage):

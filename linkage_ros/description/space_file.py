@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -44,11 +43,12 @@ def is_spatial(content: Section) -> bool:
 
 
 def read_space_closure(
-    content: Section, name: str = '', *, publish_inputs: bool = False
+    content: Section, name: str, *, publish_inputs: bool, publish_model_joints: bool
 ) -> Closure | SpaceClosure:
-    """Read a spatial linkage and check that its pose closes; errors as in `read_closure`."""
+    """Read a spatial linkage and check that its pose closes, as `read_any_closure` does."""
     try:
-        closure = closure_as_drawn(_read_linkage(content, publish_inputs), name)
+        linkage = _read_linkage(content, publish_inputs)
+        closure = closure_as_drawn(linkage, name, publish_model_joints=publish_model_joints)
         check_limits(closure)
     except DefinitionError as error:
         where = _own_key(content, error.where)
@@ -123,8 +123,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         link: _mass_of(content, link, given, [points[name] for name in links.get(link, ())])
         for link, given in weighed.items()
     }
-    linkage = replace(linkage, masses=masses)
-    return replace(linkage, masses=linkage.masses_with(*massless))
+    return linkage.with_masses(masses, massless=massless)
 
 
 def _mass_of(

@@ -8,13 +8,14 @@
 
 """A robot, or a linkage of a spatial file, whose links move in one plane is a planar linkage."""
 
+from io import BytesIO
 from math import cos, pi, sin
 
 from linkage_ros import load
 from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.kinematics import Closure, SpaceClosure, Status, usual_inputs
 from linkage_ros.resources import linkage_names
-from linkage_ros.tools.models import ModelPart, urdf_model
+from linkage_ros.tools.models import model_of, ModelPart, urdf_model
 import numpy as np
 import pytest
 
@@ -76,8 +77,8 @@ def test_a_robot_in_an_oblique_plane_is_spatial(tmp_path):
 
 
 SPATIAL = """
-points: {{T: [0.35, 0.02, 0.5]}}
-links: {{coupler: [T]}}
+points: {{T: [0.35, 0.02, 0.5], U: [0.35, 0.05, 0.5], A: [0.1, 0.3, 0.2]}}
+links: {{coupler: [T, U, A]}}
 hinges:
   crank_joint: {{parent: ground, child: crank, axis: [0, 1, 0], at: [0, 0, 0.1]{crank}}}
   rod_joint: {{parent: crank, child: coupler, axis: [0, 1, 0], at: [0.1, 0.01, 0.2]}}
@@ -85,15 +86,16 @@ hinges:
   pin: {{parent: coupler, child: rocker, axis: [0, 1, 0], at: [0.5, 0, 0.35]}}
   {more}
 input: [{inputs}]
-joints: [rod_joint, rocker_joint{pin}]
-traced: [T]
+joints: [{joints}rocker_joint{pin}]
+traced: [T{traced}]
 """
 
 
 def spatial(folder, **kinds):
     file = folder / 'linkage.yaml'
-    given = {'crank': '', 'more': '', 'inputs': 'crank_joint', 'pin': '', **kinds}
-    file.write_text(SPATIAL.format(**given))
+    given = dict.fromkeys(('crank', 'more', 'pin', 'traced'), '')
+    given |= {'inputs': 'crank_joint', 'joints': 'rod_joint, '}
+    file.write_text(SPATIAL.format(**{**given, **kinds}))
     return load(file)
 
 
@@ -118,13 +120,15 @@ def test_coordinates_have_the_names_of_the_grounds_axes(tmp_path):
     [
         # The crank and all round the loop are published: their zeroes do not add up.
         {'crank': ', value: 0.5', 'pin': ', pin'},
-        # A turntable carries all of it, or turns beside it.
+        # Two traced points are one in the plane.
+        {'traced': ', U'},
+        # A turntable turns beside it.
         {
             'more': 'turntable: {parent: ground, child: table, axis: [0, 0, 1], at: [0, 0, 0]}',
             'inputs': 'crank_joint, turntable',
         },
     ],
-    ids=['zeroes', 'turntable'],
+    ids=['zeroes', 'traced', 'turntable'],
 )
 def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
     flat, closure = spatial(tmp_path), spatial(tmp_path, **kinds)
@@ -134,6 +138,31 @@ def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
     expected = flat.position(0.3)
     for joint in flat.joint_names:
         assert position[joint] == pytest.approx(expected[joint], abs=1e-14)
+
+
+def test_a_traced_point_on_the_axis_of_a_hinge_keeps_its_name(tmp_path):
+    closure = spatial(tmp_path, traced=', A')
+    assert isinstance(closure, Closure)
+    place = closure.named_points(closure.position(0.4))['A']
+    assert place == pytest.approx(
+        complex(0.1 * (cos(0.4) + sin(0.4)), 0.1 + 0.1 * (cos(0.4) - sin(0.4))), abs=1e-15
+    )
+
+
+def test_its_model_places_links_whose_joints_the_file_does_not_publish(tmp_path):
+    """By yourdfpy: the traced point of the coupler, whose joint is published for the model."""
+    yourdfpy = pytest.importorskip('yourdfpy')
+    closure = spatial(tmp_path, joints='')
+    assert closure.joint_names == ('rocker_joint',)
+    file = tmp_path / 'linkage.yaml'
+    robot = yourdfpy.URDF.load(
+        BytesIO(model_of(str(file), urdf_model)), load_meshes=False, build_scene_graph=True
+    )
+    every = spatial(tmp_path)
+    position = every.position(0.3)
+    robot.update_cfg({'crank_joint': 0.3} | {k: position[k] for k in every.joint_names})
+    x, _, z = robot.get_transform('T_on_coupler', 'world')[:3, 3]
+    assert complex(x, z) == pytest.approx(every.named_points(position)['T'], abs=1e-12)
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xy seen from below', 'xz', 'yz'])

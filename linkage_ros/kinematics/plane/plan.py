@@ -508,7 +508,7 @@ class SolutionPlan(SolvedLinks):
 
     @property
     def _drawn_in_space(self) -> bool:
-        """Return whether lengths are of coordinates in an oblique plane, which are rounded."""
+        """Return whether lengths are of places in space, which are rounded."""
         return self._linkage.corrections is not None
 
     def _find_hinge(self, first: str, second: str) -> _Hinge | None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import dist, frexp, isfinite, ldexp
 
@@ -126,6 +126,13 @@ class SpaceLinkage:
         """Return all links, the ground first."""
         ends = (end for joint in self.pair_joints.values() for end in (joint.parent, joint.child))
         return tuple(dict.fromkeys((GROUND, *self.links, *ends)))
+
+    def with_masses(
+        self, masses: Mapping[str, SpatialMass], massless: Iterable[str]
+    ) -> SpaceLinkage:
+        """Return the linkage with masses; beside them some links are massless."""
+        weighed = replace(self, masses=masses)
+        return replace(weighed, masses=weighed.masses_with(*massless))
 
     def masses_with(self, *links: str) -> Mapping[str, SpatialMass]:
         """Return the masses with those of links that are added: they have none."""

@@ -10,7 +10,8 @@ A linkage in space whose links all move in one plane, as the planar linkage that
 
 The plane is across an axis of the ground, and keeps the names of the other two axes. A linkage in
 an oblique plane stays spatial. So does one with hinges round a loop whose values in the pose do
-not add up: frames of links cannot give each of them its zero.
+not add up: frames of links cannot give each of them its zero. And so does one with two traced
+points of a link above each other, which are one point in the plane.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from linkage_ros.kinematics.space.closure import closure_in_pose, SpaceClosure
 from linkage_ros.kinematics.space.linkage import check_space_linkage, SpaceLinkage, unit_of
 from linkage_ros.kinematics.space.merged_pose import merge_pose
 from linkage_ros.kinematics.space.planar_loops import model_in_plane, PlanarLoop
+from linkage_ros.kinematics.space.rod_joints import with_rod_joints
 from linkage_ros.kinematics.space.vectors import GROUND_FRAME, scale
 
 _SAME_ZERO = 1e-12
@@ -36,14 +38,23 @@ _PLANES = ('y', 'z'), ('x', 'z'), ('x', 'y')
 """The axes of the planes across x, y and z."""
 
 
-def closure_as_drawn(linkage: SpaceLinkage, name: str = '') -> Closure | SpaceClosure:
-    """Return the closure of a linkage that closes in its pose: planar if its links move so."""
-    planar = linkage_in_plane(linkage)
+def closure_as_drawn(
+    linkage: SpaceLinkage, name: str = '', *, publish_model_joints: bool = False
+) -> Closure | SpaceClosure:
+    """
+    Return the closure of a linkage that closes in its pose: planar if its links move so.
+
+    With ``publish_model_joints`` its published joints place every link. Rods and struts hang on
+    axes across the plane then, and the closure of a linkage that has some is spatial.
+    """
+    check_space_linkage(linkage)
+    drawn = with_rod_joints(linkage) if publish_model_joints else linkage
+    planar = linkage_in_plane(drawn)
     if planar is not None:
         # A pose at a toggle is left to the closure in space.
         with suppress(DefinitionError):
             closure = Closure(planar, name)
-            turns = _turns_in_pose(closure, linkage)
+            turns = _turns_in_pose(closure, drawn)
             if any(turns.values()):
                 joints = {
                     joint: replace(of, turns=turns[joint]) if isinstance(of, RevoluteJoint) else of
@@ -51,7 +62,10 @@ def closure_as_drawn(linkage: SpaceLinkage, name: str = '') -> Closure | SpaceCl
                 }
                 closure = Closure(replace(planar, joints=joints), name)
             return closure
-    return closure_in_pose(linkage, name)
+    spatial = closure_in_pose(linkage, name)
+    if publish_model_joints:
+        return SpaceClosure(with_rod_joints(spatial.linkage), name)
+    return spatial
 
 
 def _turns_in_pose(closure: Closure, linkage: SpaceLinkage) -> dict[str, int]:
@@ -67,28 +81,21 @@ def _turns_in_pose(closure: Closure, linkage: SpaceLinkage) -> dict[str, int]:
 
 def linkage_in_plane(linkage: SpaceLinkage) -> Linkage | None:
     """Return a linkage as a planar one, or None if its links do not all move in one plane."""
-    check_space_linkage(linkage)
     linkage = merge_pose(linkage)
     carried = CarriedPoints(linkage, unit_of(linkage))
     x, y, z = GROUND_FRAME[:3]
     for normal, axes in zip((x, scale(-1.0, y), z), _PLANES, strict=True):
         model = model_in_plane(linkage, carried, normal)
         if model is not None and linkage.ratios.keys() <= {*linkage.published}:
-            found = model.with_joints(linkage.published, linkage.links)
-            return None if _has_own_zeroes(found) else _in_plane(linkage, found, axes)
+            return _in_plane(linkage, model.with_joints(linkage.published, linkage.links), axes)
     return None
 
 
-def _has_own_zeroes(found: PlanarLoop) -> bool:
-    return any(abs(offset) > _SAME_ZERO for offset in found.offsets.values())
-
-
-def _in_plane(linkage: SpaceLinkage, found: PlanarLoop, axes: tuple[str, str]) -> Linkage:
-    """Return the planar linkage, which begins at the pose."""
-    carried = {point: link for link, points in found.linkage.links.items() for point in points}
-    return replace(
-        found.linkage,
-        traced=tuple(point for point in linkage.traced if point in carried),
-        axes=axes,
-        left_out=linkage.left_out,
-    )
+def _in_plane(linkage: SpaceLinkage, found: PlanarLoop, axes: tuple[str, str]) -> Linkage | None:
+    """Return the planar linkage, or None if it cannot say a joint's zero or a traced point."""
+    named = {point for points in found.linkage.links.values() for point in points}
+    has_own_zeroes = any(abs(offset) > _SAME_ZERO for offset in found.offsets.values())
+    if has_own_zeroes or not named.issuperset(linkage.traced):
+        return None
+    planar = found.linkage
+    return replace(planar, traced=linkage.traced, axes=axes, left_out=linkage.left_out)

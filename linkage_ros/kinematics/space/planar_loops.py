@@ -108,10 +108,11 @@ def model_in_plane(
 ) -> PlanarModel | None:
     """Return the model of all links in the plane across a direction; None if they leave it."""
     joints = _joints_across(linkage, carried, normal)
+    if len(joints) < len(linkage.pair_joints):
+        return None
     struts = {name for name in linkage.struts if name in (*linkage.driven, *linkage.published)}
     edges = {**joints, **_rods_across(linkage, carried, normal, struts)}
-    ends = _ends_of(edges.values())
-    if len(joints) < len(linkage.pair_joints) or not {*linkage.link_names, *struts} <= ends:
+    if not {*linkage.link_names, *struts} <= _ends_of(edges.values()):
         return None
     order = _links_from_ground(linkage)
     model = PlanarModel(linkage, carried, _FlatJoints(normal, edges), linkage.driven, order)
@@ -312,7 +313,8 @@ class PlanarModel:
                 continue
             held = {self._flat_name(end) for end in ends if end not in self._struts}
             if edge in self._linkage.hinges:
-                name, place = edge, self._linkage.hinges[edge].at
+                place = self._linkage.hinges[edge].at
+                name = self._point_at(self._flat(place), ends) or edge
             else:
                 name = edge.removeprefix(f'{ends[0]}, ')
                 place = scale(self._carried.size, self._carried.places[name])
@@ -326,6 +328,15 @@ class PlanarModel:
                     pin = _Pin(other.name, other.place, held)
             pins.append(pin)
         return pins
+
+    def _point_at(self, place: Point, links: Collection[str]) -> str:
+        """Return the name of a point of some links at a place in the plane, first a traced one."""
+        spatial = self._linkage
+        names = (point for link in links for point in spatial.links.get(link, ()))
+        at = [
+            point for point in names if dist(self._flat(spatial.points[point]), place) < self._near
+        ]
+        return min(at, key=lambda point: point not in spatial.traced, default='')
 
     def loop(self) -> PlanarLoop:
         """Return the loop, with all joints whose values are not known."""

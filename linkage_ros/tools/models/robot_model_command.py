@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 from threading import Event
+from typing import Any
 
 from linkage_ros.cli import add_output, SCENE_HELP
 from linkage_ros.description import (
@@ -99,9 +100,12 @@ def model_of(named: str, write: Write) -> bytes:
 
         scene = load_scene(file)
         return make_scene_model(scene, Pipeline(scene).closures, write)
-    read = read_any_closure if write is urdf_model else read_closure
+    if write is urdf_model:
+        closure: Any = read_any_closure(content, publish_model_joints=True)
+    else:
+        closure = read_closure(content)
     try:
-        return write(file.stem, [ModelPart(read(content))])
+        return write(file.stem, [ModelPart(closure)])
     except PartError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 
