@@ -20,10 +20,11 @@ A link is placed when its pose is known.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Mechanism, Spot
+from campaigns.accuracy.mechanism import CRANK, Mechanism, Spot
 from campaigns.accuracy.motion import (
     Array,
     conjugate,
@@ -437,3 +438,40 @@ def _vary_meeting(tangent: Tangent, rest: Any, one: Any, two: Any) -> tuple[Any,
     by = tangent.next_inverse()
     x = times(by, times(two.conj(), rest).imag)
     return x, -times(by, times(one.conj(), rest).imag)
+
+
+def is_nearly_paired(mechanism: Mechanism) -> bool:
+    """
+    Return whether the lengths of a four-bar are equal in pairs to 1/500, and no toggle is meant.
+
+    Folded kites have one change point: they pass it only if the crank drives them.
+    """
+    return any(
+        _are_nearly_equal((a, c), (b, d))
+        or _are_nearly_equal((a, b), (c, d))
+        or (crank == CRANK and _are_nearly_equal((a, d), (b, c)))
+        for dyad in mechanism.dyads
+        if isinstance(dyad, RRR) and not (dyad.fold or dyad.stretch)
+        for crank, (a, b, c, d) in _four_bars(mechanism, dyad)
+    )
+
+
+def _are_nearly_equal(*pairs: tuple[float, float]) -> bool:
+    return all(abs(one - other) <= max(one, other) / 500 for one, other in pairs)
+
+
+def _four_bars(mechanism: Mechanism, dyad: RRR) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the link at A and the lengths of each loop of the dyad and two links with a pin."""
+    links = mechanism.links
+    b = _distance(links[dyad.one], dyad.a.point, dyad.pin)
+    c = _distance(links[dyad.two], dyad.d.point, dyad.pin)
+    for crank, arm in links.items():
+        for ground, base in links.items():
+            if dyad.a.point in arm and dyad.d.point in base and crank != ground:
+                for pivot in (arm.keys() & base.keys()) - {dyad.pin}:
+                    a = _distance(arm, pivot, dyad.a.point)
+                    yield crank, (a, b, c, _distance(base, pivot, dyad.d.point))
+
+
+def _distance(points: Mapping[str, tuple[float, float]], one: str, other: str) -> float:
+    return abs(complex(*points[one]) - complex(*points[other]))

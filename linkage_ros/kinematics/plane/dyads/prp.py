@@ -16,14 +16,14 @@ from û1 to û2::
     E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
 
 The rates solve the same equations for the difference of the links' velocities at the pin, the
-accelerations for the difference of their accelerations, with Coriolis terms. Seen from one of the
-links, a slide is multiplied by the relative turn only::
+accelerations for the difference of their accelerations, with Coriolis terms. In a frame that turns
+about E1 at any rate ω, the links turn at the rates less ω::
 
-    ṡ1 = ((Ė2 − Ė1 − ω1 × (E2 − E1)) × û2 − (ω2 − ω1)·s2)/sin δ
-    ṡ2 = ((Ė2 − Ė1 − ω2 × (E2 − E1)) × û1 − (ω2 − ω1)·s1)/sin δ
+    ṡ1·û1 − ṡ2·û2 = Ė2 − Ė1 − ω × (E2 − E1) + (ω2 − ω) × s2·û2 − (ω1 − ω) × s1·û1
 
-The slides are rounded, and 1/sin δ amplifies that: with both turns times both slides, a chain
-whose links turn almost alike lost 5 u·κ. Parallel lines do not meet, or coincide: open, or
+The slides are rounded, and 1/sin δ amplifies that. ω is the smaller one of both turns: with ω = 0
+a chain whose links turn almost alike lost 5 u·κ; with the larger one, a slow link with a line that
+starts far away lost 188 u·κ in its acceleration. Parallel lines do not meet, or coincide: open, or
 indeterminate.
 """
 
@@ -32,7 +32,14 @@ from __future__ import annotations
 from math import pi
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2, cross_product, phase, ROUNDING, unit_vector
+from linkage_ros.kinematics.arithmetic import (
+    atan2,
+    cross_product,
+    phase,
+    ROUNDING,
+    unit_vector,
+    where,
+)
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
 
@@ -127,13 +134,11 @@ class PRPDyad(_CrossingLines):
         turn, other_turn = (velocities.coordinates[k] for k in self.arms)
         start, end = (velocities.pins[k] for k in self._starts)
         begin, finish = (solved.pins[k] for k in self._starts)
-        away, drift = finish - begin, end - start
-        swing, sine = other_turn - turn, pose.across.imag
-        first = (cross_product(drift - 1j * turn * away, other) - swing * pose.second) / sine
-        second = (cross_product(drift - 1j * other_turn * away, one) - swing * pose.first) / sine
-        velocities.coordinates.append(first)
-        velocities.coordinates.append(second)
-        return first, second
+        frame = where(abs(turn) < abs(other_turn), turn, other_turn)
+        carried = end - start - 1j * frame * (finish - begin)
+        carried += 1j * ((other_turn - frame) * pose.second) * other
+        carried -= 1j * ((turn - frame) * pose.first) * one
+        return resolve_along_lines(carried, pose.units, pose.across.imag, velocities)
 
     def accelerations(
         self,
