@@ -10,8 +10,8 @@
 
 from linkage_ros.description import load_scene, parse_scene
 from linkage_ros.errors import FileError
-from linkage_ros.messages import JointStateWriter, Rejection
-from linkage_ros.tick import Pipeline, sample_router
+from linkage_ros.messages import JointStateWriter, Rejection, sample_router
+from linkage_ros.tick import Pipeline
 import pytest
 
 from .support.messages import read_joint_state as read, STORE

@@ -309,9 +309,9 @@ def test_other_encodings_are_refused(name, encapsulation):
 def test_a_layout_seen_before_is_not_taken_for_granted(wrong):
     right = {'names': [CRANK, 'x'], 'positions': [1.0, 2.0]}
     reader = JointStateReader([CRANK])
-    assert reader.read(serialized(**right)) == (NS + 2, (1.0,), None)
+    assert reader.read(serialized(**right))[:3] == (NS + 2, (1.0,), None)
     assert reader.read(serialized(**right | wrong)) is Rejection.UNEQUAL
-    assert reader.read(serialized(**right)) == (NS + 2, (1.0,), None)
+    assert reader.read(serialized(**right))[:3] == (NS + 2, (1.0,), None)
 
 
 @given(st.lists(st.lists(names_, min_size=1, max_size=3), min_size=1, max_size=4), st.data())

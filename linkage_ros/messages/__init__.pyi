@@ -6,6 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+from linkage_ros.messages.input_samples import input_reader as input_reader
 from linkage_ros.messages.joint_state import (
     arrays_of as arrays_of,
     CrankSample as CrankSample,
@@ -46,7 +47,6 @@ from linkage_ros.messages.layout import (
     pack_message as pack_message,
     parse_declaration as parse_declaration,
     parse_message as parse_message,
-    STAMP_END as STAMP_END,
 )
 from linkage_ros.messages.marker_array import (
     ADD as ADD,
@@ -63,6 +63,7 @@ from linkage_ros.messages.marker_array import (
     TEXT_VIEW_FACING as TEXT_VIEW_FACING,
     TRIANGLE_LIST as TRIANGLE_LIST,
 )
+from linkage_ros.messages.sample_router import SampleRouter as SampleRouter
 from linkage_ros.messages.single_values import (
     text_message as text_message,
     text_of as text_of,

@@ -76,12 +76,29 @@ class Rejection(Enum):
 
 
 class CrankSample(NamedTuple):
-    """State of all inputs in a message, in the order of the linkage."""
+    """State of the inputs in a message, in the order of the linkage."""
 
     stamp: int  # Time of the measurement, in [ns]
     angles: tuple[float, ...]  # Value of each input, in [rad]; of a sliding input in [m]
     # Rates, in [rad/s] or [m/s]; None if the message has no velocities, NaN where one is absent.
     rates: tuple[float, ...] | None
+    named: int = -1  # Bit i: the message names input i; the values of the others are NaN
+
+    def merged_over(self, earlier: CrankSample | None) -> CrankSample:
+        """Return the sample, with an earlier one's values of inputs that it leaves out."""
+        if earlier is None or self.named == -1:
+            return self
+        angles, rates = (
+            tuple(
+                new if self.named >> index & 1 else old
+                for index, (new, old) in enumerate(zip(ours, theirs, strict=True))
+            )
+            for ours, theirs in (
+                (self.angles, earlier.angles),
+                (self.rates or (), earlier.rates or ()),
+            )
+        )
+        return CrankSample(self.stamp, angles, rates)
 
 
 class JointStateReader:

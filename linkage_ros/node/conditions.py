@@ -220,21 +220,16 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
     if counts.ignored and counts.ignored == counts.received:
         head = head_of(counts.last_ignored)
         held = sorted(name.decode(errors='replace') for name in head[0]) if head else ()
-        # Two drivers may each publish a part of the inputs.
-        remedy = (
-            ' in one message: let one node publish them together'
-            if set(held) & set(run.inputs)
-            else ': name the joint so there, or remap the topic'
-        )
         text = (
             f'messages on {topic} hold {list_names(map(repr, held))}; the linkage needs '
-            f'{list_names(map(repr, run.inputs))}{remedy}'
+            f'{list_names(map(repr, run.inputs))}: name the joint so there, or remap the topic'
         )
         yield Condition(STALE if max_age else WARN, text, 'ignored')
     if counts.stale > since[''].stale and age * NANOSECONDS > max_age:
         yield Condition(STALE, f'Samples arrive, but are {age:.1f} s old by their stamps')
     if max_age and age * NANOSECONDS > max_age:
         yield Condition(STALE, _describe_silence(run, age))
+    yield from _find_silent_inputs(run)
     if run.cranks_doubled:
         yield Condition(WARN, run.cranks_doubled, 'publishers')
     rejected = since['rejected'].rejected
@@ -256,6 +251,23 @@ def crank_conditions(run: RunState, since: Since) -> Iterator[Condition]:
                 'than a turn; if these are degrees, publish radians'
             )
             yield Condition(OK, text, f'jump {given.joint}', inf)
+
+
+def _find_silent_inputs(run: RunState) -> Iterator[Condition]:
+    """Yield the inputs without which a linkage has no crank, while others have samples."""
+    silent = run.loop.pipeline.silent_inputs(run.clock)
+    if not silent or len(silent) == len(run.inputs) or run.takes_commands:
+        return
+    said = [
+        f'{name} for {(run.clock - stamp) / NANOSECONDS:.1f} s' if stamp else f'{name} yet'
+        for name, stamp in silent.items()
+    ]
+    is_due = (run.counts.time - run.start) / NANOSECONDS > _PATIENCE
+    text = (
+        f'{run.crank_topic}: no sample of {" and ".join(said)}, so its linkage has no crank; '
+        'publish each input, alone or with others'
+    )
+    yield Condition(STALE, text, 'silent inputs' if is_due else '')
 
 
 def _describe_silence(run: RunState, age: float) -> str:

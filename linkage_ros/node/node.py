@@ -490,7 +490,8 @@ class LinkageNode(LifecycleNode):
         if counts.interleaved - self._previous_counts.interleaved > 1:
             return f'{topic}: several publishers send the crank, among {among}; stop all but one'
         # One that sends nothing is told by its life, where others do not share the topic.
-        several = len(publishers) > 1 and not shared and len(self.loop.pipeline.linkages) == 1
+        cranks = sum(len(line.drive.stamps) for line in self.loop.pipeline.linkages)
+        several = len(publishers) > 1 and not shared and cranks == 1
         self._several_since = min(self._several_since, counts.time) if several else inf
         if counts.time - self._several_since > _LEASE * NANOSECONDS:
             return f'{topic}: several publishers, {among}; stop all but one'

@@ -44,9 +44,9 @@ from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, list_names
 from linkage_ros.messages import (
     head_of,
+    input_reader,
     JOINT_STATE_TYPE,
     JointEffortReader,
-    JointStateReader,
     Rejection,
     text_message,
     TIME_END,
@@ -435,7 +435,7 @@ def _sample_reader(
 ) -> Callable[[bytes], object]:
     if scene_linkage.drive[1].gives_torque:
         return JointEffortReader(scene_linkage.input_names[0], dependent).read
-    return JointStateReader(scene_linkage.sampled_joints).read
+    return input_reader(scene_linkage.sampled_joints)
 
 
 def _candidate_topics(

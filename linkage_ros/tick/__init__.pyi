@@ -27,7 +27,6 @@ from linkage_ros.tick.run_topics import (
     SENSOR_QOS as SENSOR_QOS,
     WITHHELD as WITHHELD,
 )
-from linkage_ros.tick.sample_router import SampleRouter as SampleRouter
 from linkage_ros.tick.tick_loop import (
     Counts as Counts,
     DurationHistogram as DurationHistogram,

@@ -14,7 +14,7 @@ Only the stages that the scene names are built; a tick never reads the scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from operator import add
@@ -321,9 +321,17 @@ class LinkagePipeline:
         speaks = any(extra.writer.no_pose is not None for extra in self.extras)
         return not (speaks or self.drive_stages or self._solve_loops(*crank.angles).joints)
 
-    def is_stale(self, now: int) -> bool:
-        """Return whether the newest sample is too old at a time, in [ns], to give a crank."""
-        return now - self.drive.stamp > self.drive.max_age > 0
+    def is_stale(self, now: int, number: int = 0) -> bool:
+        """Return whether an input's newest sample is too old at a time, in [ns]."""
+        return now - self.drive.stamps[number] > self.drive.max_age > 0
+
+    def silent_inputs(self, now: int) -> Iterator[tuple[str, int]]:
+        """Yield the inputs without a sample at a time, in [ns], and their newest stamps."""
+        stamps = self.drive.stamps
+        for index, name in enumerate(self.scene_linkage.sampled_joints):
+            number = min(index, len(stamps) - 1)  # One stamp is that of all inputs.
+            if self.is_stale(now, number):
+                yield name, stamps[number]
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""

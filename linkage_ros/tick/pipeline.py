@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING
 from linkage_ros.description import Scene
 from linkage_ros.errors import quote
 from linkage_ros.kinematics import Closure
-from linkage_ros.messages import Rejection
+from linkage_ros.messages import Rejection, SampleRouter
 from linkage_ros.tick.compiled_tick import compile_tick
 from linkage_ros.tick.interpreted_tick import InterpretedTick, Tick
 from linkage_ros.tick.linkage_pipeline import LinkagePipeline
-from linkage_ros.tick.sample_router import SampleRouter
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import Injection
@@ -107,10 +106,14 @@ class Pipeline:
         self._router = SampleRouter(
             {linkage: linkage.scene_linkage.sampled_joints for linkage in self.linkages}
         )
-        self.addressed_linkages: tuple[LinkagePipeline, ...] = ()
-        """Of several linkages, those whose inputs the last message named."""
+        first = self.linkages[0]
+        alone = len(self.linkages) == len(first.drive.stamps) == 1
+        self._only = first if alone else None
+        """The linkage, if there is one, and its inputs come together."""
+        self.moved_inputs: tuple[tuple[LinkagePipeline, int], ...] = ()
+        """Inputs with samples of their own that took the last message; () if all inputs do."""
         self._offer_count = 0
-        self._newest_offers: dict[LinkagePipeline, int] = {}
+        self._newest_offers: dict[tuple[LinkagePipeline, int], int] = {}
         interpreted = InterpretedTick(self.linkages)
         self.tick = compile_tick(interpreted) or interpreted.run
         """Computes the tick at a time, in [ns]."""
@@ -127,31 +130,42 @@ class Pipeline:
             The time, in [ns].
 
         """
-        if len(self.linkages) == 1:
-            return self.linkages[0].offer(message, now)
-        # A message may concern one linkage or several: it is good if one of them accepts it.
+        if self._only is not None:
+            return self._only.offer(message, now)
+        # A message may concern one input or several: it is good if one of them accepts it.
         self._offer_count += 1
         rejections = []
-        self.addressed_linkages = self._router.find_receivers(message)
-        for linkage in self.addressed_linkages:
+        moved: list[tuple[LinkagePipeline, int]] = []
+        for linkage in self._router.find_receivers(message):
             rejections.append(linkage.offer(message, now))
             if rejections[-1] is None:
-                self._newest_offers[linkage] = self._offer_count
+                moved += [(linkage, number) for number in linkage.drive.newest_inputs]
+        self.moved_inputs = tuple(moved)
+        self._newest_offers |= dict.fromkeys(moved, self._offer_count)
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
     def count_fresh_and_stale(self, now: int) -> tuple[int, int]:
         """
-        Tell the good messages since the last call that are still the newest for a linkage.
+        Tell the good messages since the last call that are still the newest for an input.
 
         Return how many of them give a crank at a time, in [ns], and how many are too old.
         """
-        if len(self.linkages) == 1:
-            return (0, 1) if self.linkages[0].is_stale(now) else (1, 0)
+        if self._only is not None:
+            return (0, 1) if self._only.is_stale(now) else (1, 0)
         newest = self._newest_offers.items()
-        fresh = {offer for linkage, offer in newest if not linkage.is_stale(now)}
+        fresh = {offer for (linkage, number), offer in newest if not linkage.is_stale(now, number)}
         stale = {*self._newest_offers.values()} - fresh
         self._newest_offers.clear()
         return len(fresh), len(stale)
+
+    def silent_inputs(self, now: int) -> dict[str, int]:
+        """Return the inputs without a sample at a time, in [ns], with their newest stamps."""
+        return {
+            name: stamp
+            for linkage in self.linkages
+            if linkage.topic
+            for name, stamp in linkage.silent_inputs(now)
+        }
 
     def changes_state(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes the state of the pipeline."""

@@ -186,7 +186,7 @@ class TickLoop:
         self._take_wrenches = take_wrenches
         self._sample_sequence = self._own_sequence = 0
         self._crank_sequences: dict[object, int] = {}
-        """Number of the last message with the crank of the same linkages."""
+        """Number of the last message that moved the same inputs."""
         self._last_time = 0
         self._jump_time = 0
         """System's time at which the clock was seen to be back, in [ns]."""
@@ -326,7 +326,7 @@ class TickLoop:
                     counts.rejected[rejection] += 1
                     self._rejected_old += rejection is Rejection.STAMP_OLD
                 if number and rejection is not Rejection.MISSING:
-                    cranks = pipeline.addressed_linkages
+                    cranks = pipeline.moved_inputs
                     counts.interleaved += number <= self._crank_sequences.get(cranks, 0)
                     self._crank_sequences[cranks] = number
             elif number:
@@ -344,7 +344,8 @@ class TickLoop:
             counts.superseded += good - used - stale
             if stale:
                 counts.stale += stale
-                counts.stale_age = self._last_time - pipeline.newest_stamp
+                silent = pipeline.silent_inputs(self._last_time)
+                counts.stale_age = self._last_time - max(silent.values())
 
     def _take_wrench(self, index: int, take: TakeMessage, clock: Callable[[], int] | None) -> None:
         """Take the waiting messages of a topic with a wrench: record, offer and count them."""

@@ -17,7 +17,7 @@ from hypothesis import given, strategies as st
 from linkage_ros.description import parse_scene
 from linkage_ros.kinematics import Input
 from linkage_ros.messages import CrankSample, Rejection
-from linkage_ros.stages.drives import CrankState, SampledCrank, TopicDrive
+from linkage_ros.stages.drives import CrankState, sample_inputs, SampledCrank, TopicDrive
 from linkage_ros.tick import Pipeline
 import pytest
 
@@ -191,7 +191,7 @@ def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(na
 
 def test_of_several_inputs_only_the_absent_rate_is_differenced_and_a_slide_has_no_turns():
     slide = (Input('crank', 'ground', 'crank'), Input('slide', slider='s'), Input('c', 'a', 'b'))
-    drive = SampledCrank(CARRIED, needs_rate=True, inputs=slide)
+    drive = sample_inputs(CARRIED, True, slide)
     assert drive.offer(CrankSample(NOW, (3.1, 0.0, 1.0), (nan, nan, 9.0)), NOW) is GOOD
     now = NOW + 10 * MS
     assert drive.offer(CrankSample(now, (-3.1, 5.0, 2.0), (nan, nan, 8.0)), now) is GOOD
@@ -248,7 +248,7 @@ def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
 
 
 def test_of_several_inputs_each_is_carried_by_its_own_rate():
-    drive = SampledCrank(CARRIED, needs_rate=True)
+    drive = sample_inputs(CARRIED, True, [Input(name, 'ground', name) for name in 'abc'])
     assert drive.offer(CrankSample(NOW, (1.0, -2.0, 0.5), (10.0, 0.0, -3.0)), NOW) is GOOD
     angles, rates, accelerations, age = drive.state(NOW + 100 * MS)
     assert angles == pytest.approx((2.0, -2.0, 0.2))
@@ -265,7 +265,7 @@ def test_of_several_inputs_each_is_carried_by_its_own_rate():
 def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place):
     if isnan(bad) and place > 1:
         bad = inf  # a rate that is NaN is absent
-    drive = SampledCrank(CARRIED, needs_rate=True)
+    drive = sample_inputs(CARRIED, True, [Input(name, 'ground', name) for name in 'ab'])
     values = [0.1, 0.2, 0.3, 0.4]
     values[place] = bad
     sample = CrankSample(NOW, tuple(values[:2]), tuple(values[2:]))

@@ -26,7 +26,7 @@ class Said(list):
 
 def fake_loop(**known):
     """Return what takes the place of a tick loop without linkages."""
-    pipeline = SimpleNamespace(linkages=[], max_age=0, wrenches=[])
+    pipeline = SimpleNamespace(linkages=[], max_age=0, wrenches=[], silent_inputs=lambda _now: {})
     known = {'newest_stamp': 0, 'missed_messages': 0, 'pipeline': pipeline, **known}
     return SimpleNamespace(failure='', injection=None, **known)
 

@@ -11,8 +11,7 @@
 from campaigns.attacks.graph import attack
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.messages import JointStateWriter
-from linkage_ros.tick import SampleRouter
+from linkage_ros.messages import JointStateWriter, SampleRouter
 import pytest
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters

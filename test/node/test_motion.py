@@ -134,20 +134,28 @@ def test_two_inputs(graph, write_scene, start, publisher, motions):
     assert 'crank left_crank, right_crank from /crank_states' in node.log
 
 
-def test_half_of_two_inputs_is_not_used(graph, write_scene, start, publisher, motions):
-    node = start(write_scene('half', 'rate: 200\neffects: {acceleration: {}}', FIVE_BAR))
+def test_two_inputs_of_two_publishers_drive_a_linkage_and_the_silent_one_is_named(
+    graph, write_scene, start, publisher, motions
+):
+    other = graph.publisher(JointState, '/crank_states')
+    scene = 'rate: 200\neffects: {acceleration: {}}'
+    node = start(write_scene('two_drivers', scene, FIVE_BAR))
     wait_for(publisher.get_subscription_count, 'the node')
+    wait_for(other.get_subscription_count, 'the node')
 
-    def told():
-        publisher.publish(crank(1.0, name='left_crank'))
-        needs = "the linkage needs 'left_crank', 'right_crank' in one message"
-        return f"hold 'left_crank'; {needs}" in node.log
+    def send_left(until):
+        return lambda: publisher.publish(crank(1.0, name='left_crank')) or until()
 
-    wait_for(told, 'the warning')
-    wait_for(
-        lambda: int(graph.value('crank', 'Messages without the crank') or 0) > 0, 'the diagnostics'
-    )
+    wait_for(send_left(lambda: 'no sample of right_crank yet' in node.log), 'the warning')
     assert motions == []
+    wait_for(
+        send_left(lambda: other.publish(crank(2.0, name='right_crank')) or len(motions) > 400),
+        'motions',
+    )
+    (point,) = motions[-1].points
+    assert abs(five_bar_gap(*point.positions, 1.0, 2.0)) < 1e-9
+    wait_for(send_left(lambda: 'no sample of right_crank for' in node.log), 'the warning')
+    assert 'several publishers' not in node.log
     assert node.end() == 0
 
 

@@ -34,7 +34,9 @@ from linkage_ros.stages.drives.steady_motion import (
     SineDrive as SineDrive,
 )
 from linkage_ros.stages.drives.topic import (
+    sample_inputs as sample_inputs,
     SampledCrank as SampledCrank,
+    SampledInputs as SampledInputs,
     TopicDrive as TopicDrive,
 )
 from linkage_ros.stages.drives.torque import (

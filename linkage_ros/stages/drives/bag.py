@@ -33,9 +33,10 @@ from math import nan
 from linkage_ros.bag import Bag, read_bag, read_raw_metadata
 from linkage_ros.description import choice, file, flag, number, text
 from linkage_ros.errors import BagError, DefinitionError, list_names
-from linkage_ros.messages import CrankSample, JointStateReader, Rejection
+from linkage_ros.kinematics import Input
+from linkage_ros.messages import CrankSample, input_reader, Rejection
 from linkage_ros.stages.drives.drive import Context, Crank, CrankState, Drive
-from linkage_ros.stages.drives.topic import SampledCrank, TopicDrive
+from linkage_ros.stages.drives.topic import sample_inputs, TopicDrive
 
 _TYPE = 'sensor_msgs/msg/JointState'
 
@@ -51,6 +52,7 @@ class BagSamples:
         '_at_arrival',
         '_inputs',
         '_log_times',
+        '_named',
         '_read',
         '_sieve',
         '_stamps',
@@ -67,11 +69,11 @@ class BagSamples:
     def __init__(self, use: TopicDrive, context: Context) -> None:
         inputs = context.closure.linkage.inputs
         self._inputs = len(inputs)
-        self._read = JointStateReader(context.inputs_in_messages).read
-        self._sieve = SampledCrank(use, context.needs_rate, inputs)
+        self._read = input_reader(context.inputs_in_messages)
+        self._sieve = sample_inputs(use, context.needs_rate, inputs)
         self._at_arrival = use.stamp == 'arrival'
         self._log_times, self._stamps = array('Q'), array('Q')
-        self._values = array('d')
+        self._named, self._values = array('q'), array('d')
         self.offsets = array('q')
         self.rejected = Counter()
 
@@ -83,6 +85,7 @@ class BagSamples:
             return
         self._log_times.append(log_time)
         self._stamps.append(sample.stamp)
+        self._named.append(sample.named)
         self._values.extend(sample.angles)
         self._values.extend(sample.rates or (nan,) * self._inputs)
 
@@ -95,7 +98,7 @@ class BagSamples:
         values, first = array('d'), 0
         for place in order:
             stamp = self._stamps[place]
-            sample = CrankSample(stamp, *self[place])
+            sample = CrankSample(stamp, *self[place], self._named[place])
             rejection = self._sieve.offer(sample, times[place] if self._at_arrival else stamp)
             if rejection is not None:
                 self.rejected[rejection] += 1
@@ -105,7 +108,7 @@ class BagSamples:
                 self.offsets.append(stamp - first)
                 values.extend(angles + rates)
         self._values = values
-        del self._log_times[:], self._stamps[:]
+        del self._log_times[:], self._stamps[:], self._named[:]
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -226,7 +229,7 @@ class BagDrive(Drive):
         bag = read_bag(self.file, allow_truncated=self.allow_truncated)
         samples = read_samples(bag, self.topic, use, context)
         if recorded:
-            return RecordedPace(samples, use, repeat=self.repeat)
+            return RecordedPace(samples, use, context.closure.linkage.inputs, repeat=self.repeat)
         return FastPace(samples, repeat=self.repeat)
 
 
@@ -234,7 +237,7 @@ class RecordedPace(Crank):
     """
     Recorded samples at their times: each as long after the first tick as after the first sample.
 
-    A `SampledCrank` makes the crank state between and after them. If they ``repeat``, but take no
+    A `TopicDrive` makes the crank state between and after them. If they ``repeat``, but take no
     time, `DefinitionError` is raised.
     """
 
@@ -243,9 +246,11 @@ class RecordedPace(Crank):
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
 
-    def __init__(self, samples: BagSamples, use: TopicDrive, *, repeat: bool) -> None:
+    def __init__(
+        self, samples: BagSamples, use: TopicDrive, inputs: Sequence[Input], *, repeat: bool
+    ) -> None:
         self.samples = samples
-        self._topic = SampledCrank(replace(use, stamp='measured'), needs_rate=False)
+        self._topic = sample_inputs(replace(use, stamp='measured'), False, inputs)
         self.max_age = self._topic.max_age
         self._start: int | None = None
         self._newest = (-1, -1)

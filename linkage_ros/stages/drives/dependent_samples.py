@@ -77,7 +77,7 @@ class DependentSampleReader:
         sample = self._read(data)
         if isinstance(sample, Rejection):
             return sample
-        stamp, (value,), rates = sample
+        stamp, (value,), rates, _ = sample
         if not -LARGEST <= value <= LARGEST:
             return sample  # The drive says why not.
         if self._branch.distance_beyond(value):

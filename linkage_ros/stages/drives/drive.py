@@ -98,6 +98,16 @@ class Crank(Protocol):
         """Stamp of the newest good sample, in [ns]; 0 without one."""
 
     @property
+    def stamps(self) -> tuple[int, ...]:
+        """Likewise of each input, where each has samples of its own; else of all together."""
+        return (self.stamp,)
+
+    @property
+    def newest_inputs(self) -> tuple[int, ...]:
+        """Numbers of the inputs, of those with samples of their own, that took the last one."""
+        return (0,)
+
+    @property
     def max_age(self) -> int:
         """Age of the newest sample above which a warning is due, in [ns]; 0 for never."""
 

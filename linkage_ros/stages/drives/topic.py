@@ -21,19 +21,22 @@ the samples: their backward difference d = (ω − ω₋₁)/Δt, and behind it 
 which is exact for a d that is held over the time Δt between both stamps. The difference lags by
 half an interval, the low-pass by 1/(2π·cutoff) (A. V. Oppenheim, R. W. Schafer, Discrete-Time
 Signal Processing, 3rd ed., 2010, ch. 7).
+
+Of several inputs a message names one, some or all: each is carried to the tick by its own stamp.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import expm1, isfinite, isnan, nan, remainder, tau
+from itertools import chain
+from math import expm1, isfinite, nan, remainder, tau
 from typing import Any
 
 from linkage_ros.description import choice, flag, number, text, whole_number
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Input
-from linkage_ros.messages import CrankSample, JointStateReader, NANOSECONDS, Rejection
+from linkage_ros.kinematics import Input, where
+from linkage_ros.messages import CrankSample, input_reader, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import (
     Context,
     CrankState,
@@ -44,6 +47,8 @@ from linkage_ros.stages.drives.drive import (
 )
 
 _Values = tuple[float, ...]
+
+_ZERO, _NO_RATE = (0.0,), (nan,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +118,7 @@ class TopicDrive(Drive):
         """Return whether no filter remembers earlier samples."""
         return not self.cutoff
 
-    def build(self, context: Context) -> SampledCrank:
+    def build(self, context: Context) -> SampledCrank | SampledInputs:
         """
         Build the drive.
 
@@ -125,7 +130,7 @@ class TopicDrive(Drive):
             )
         if self.branch and not self.joint:
             raise DefinitionError('drive.topic.branch', 'has no joint', 'name it: joint: NAME')
-        return SampledCrank(self, context.needs_rate, context.closure.linkage.inputs)
+        return sample_inputs(self, context.needs_rate, context.closure.linkage.inputs)
 
     def reader(self, context: Context) -> Reader:
         """
@@ -141,16 +146,25 @@ class TopicDrive(Drive):
 
             branch = sampled_branch(context.closure, self.joint, self.branch)
             return DependentSampleReader(branch, context.prefix + self.joint).read
-        return JointStateReader(context.inputs_in_messages).read
+        return input_reader(context.inputs_in_messages)
+
+
+def sample_inputs(
+    use: TopicDrive, needs_rate: bool, inputs: Sequence[Input]
+) -> SampledCrank | SampledInputs:
+    """Return a crank that samples of some inputs move."""
+    cranks = [SampledCrank(use, needs_rate, slides=bool(given.slider)) for given in inputs]
+    return cranks[0] if len(cranks) == 1 else SampledInputs(cranks)
 
 
 class SampledCrank(FormulaCrank):
     """
-    Drive that keeps the newest good sample only.
+    One input that keeps the newest good sample only.
 
-    The crank's acceleration is 0, as the extrapolation at constant rate implies. If it is
-    estimated, the crank is carried forward with it, rates included. An absent rate counts as 0 if
-    only the extrapolation needs the rate. ``inputs`` may be () if all inputs are revolute.
+    Its acceleration is 0, as the extrapolation at constant rate implies. If it is estimated, the
+    input is carried forward with it, rates included. An absent rate counts as 0 if only the
+    extrapolation needs the rate. The way between two samples of an input that does not slide is
+    the shorter one around.
     """
 
     __slots__ = (
@@ -161,7 +175,7 @@ class SampledCrank(FormulaCrank):
         '_last',
         '_max_lead',
         '_needs_rate',
-        '_sliding',
+        '_slides',
         'jump',
         'max_age',
         'sample',
@@ -172,11 +186,11 @@ class SampledCrank(FormulaCrank):
     max_age: int
     """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
-    """The newest good sample with rates: its stamp, in [ns], angles, rates, accelerations."""
+    """The newest good sample with rates: its stamp, in [ns], angle, rate, acceleration."""
     jump: float
-    """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
+    """Greatest change from one sample to the next, in [rad] or [m]."""
 
-    def __init__(self, use: TopicDrive, needs_rate: bool, inputs: Sequence[Input] = ()) -> None:
+    def __init__(self, use: TopicDrive, needs_rate: bool, *, slides: bool = False) -> None:
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)
@@ -184,7 +198,7 @@ class SampledCrank(FormulaCrank):
         self._estimate = use.acceleration == 'differenced'
         self._bend = -tau * use.cutoff
         self._needs_rate = needs_rate or use.carry_forward or self._estimate
-        self._sliding = {index for index, given in enumerate(inputs) if given.slider}
+        self._slides = slides
         self._last: tuple[int, _Values] | None = None
         """Stamp and angles of the newest good sample."""
         self.sample = None
@@ -197,14 +211,10 @@ class SampledCrank(FormulaCrank):
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """Take a sample at a time [ns], or return why it is rejected; then nothing changes."""
-        stamp, angles, rates = sample
-        zeros = (0.0,) * len(angles)
+        stamp, angles, rates, _ = sample
         if rates is None:
-            rates = (nan,) * len(angles)
-        complete = True
-        for value in angles + rates:
-            if not -LARGEST <= value <= LARGEST:
-                complete = False
+            rates = _NO_RATE
+        complete = -LARGEST <= angles[0] <= LARGEST and -LARGEST <= rates[0] <= LARGEST
         if not complete and (why := _find_rejection(angles, rates)) is not None:
             return why
         if self._at_arrival:
@@ -221,56 +231,43 @@ class SampledCrank(FormulaCrank):
             if jump > self.jump:
                 self.jump = jump
         if not complete:
-            known = self._mean_rates(stamp, angles) if self._needs_rate else zeros
+            known = self._mean_rate(stamp, angles[0]) if self._needs_rate else _ZERO
             if known is None:
                 self._last = stamp, angles
                 return None
-            rates = tuple(
-                [old if isnan(rate) else rate for rate, old in zip(rates, known, strict=True)]
-            )
-        self.sample = (
-            stamp,
-            angles,
-            rates,
-            self._estimate_accelerations(stamp, rates) if self._estimate else zeros,
-        )
+            rates = known
+        acceleration = self._estimate_acceleration(stamp, rates[0]) if self._estimate else _ZERO
+        self.sample = stamp, angles, rates, acceleration
         self._last = stamp, angles
         return None
 
-    def _mean_rates(self, stamp: int, angles: _Values) -> _Values | None:
-        """Return the mean rates since the last sample; None without one of another stamp."""
+    def hold(self, stamp: int, angles: _Values, rates: _Values) -> None:
+        """Keep a sample of accelerations of 0, whatever was before."""
+        self.sample = stamp, angles, rates, _ZERO
+
+    def _mean_rate(self, stamp: int, angle: float) -> _Values | None:
+        """Return the mean rate since the last sample; None without one of another stamp."""
         if self._last is None or stamp == self._last[0]:
             return self.sample and self.sample[2]
-        before, earlier = self._last
-        ways = [q - old for q, old in zip(angles, earlier, strict=True)]
-        seconds = (stamp - before) * 1e-9
-        return tuple(
-            [
-                (way if index in self._sliding else remainder(way, tau)) / seconds
-                for index, way in enumerate(ways)
-            ]
-        )
+        before, (earlier,) = self._last
+        way = angle - earlier
+        return ((way if self._slides else remainder(way, tau)) / ((stamp - before) * 1e-9),)
 
-    def _estimate_accelerations(self, stamp: int, rates: _Values) -> _Values:
-        """Return the accelerations at a new sample; 0 at the first one, and after a gap."""
+    def _estimate_acceleration(self, stamp: int, rate: float) -> _Values:
+        """Return the acceleration at a new sample; 0 at the first one, and after a gap."""
         if self.sample is None or stamp - self.sample[0] > self.max_age:
-            return (0.0,) * len(rates)
-        before, _, earlier, bent = self.sample
+            return _ZERO
+        before, _, (earlier,), bent = self.sample
         if stamp == before:
             return bent
         seconds = (stamp - before) * 1e-9
         share = -expm1(self._bend * seconds) if self._bend else 1.0
-        found = tuple(
-            [
-                a + share * ((rate - old) / seconds - a)
-                for rate, old, a in zip(rates, earlier, bent, strict=True)
-            ]
-        )
-        return found if all(-LARGEST <= a <= LARGEST for a in found) else (0.0,) * len(rates)
+        acceleration = bent[0] + share * ((rate - earlier) / seconds - bent[0])
+        return (acceleration,) if -LARGEST <= acceleration <= LARGEST else _ZERO
 
-    def usual(self, inputs: int) -> tuple[int, Any]:
+    def usual(self, _inputs: int) -> tuple[int, Any]:
         """Return a time, in [ns], and a sample."""
-        return 1, (0, (0.5,) * inputs, (1.25,) * inputs, (0.75,) * inputs)
+        return 1, (0, (0.5,), (1.25,), (0.75,))
 
     def crank_state(
         self, now: int, held: tuple[int, _Values, _Values, _Values]
@@ -282,17 +279,115 @@ class SampledCrank(FormulaCrank):
             return None
         if self._carry_forward and self._estimate:
             seconds = age * 1e-9
-            half = 0.5 * seconds
-            three = [*zip(angles, rates, accelerations, strict=True)]
-            angles = tuple([q + (w + a * half) * seconds for q, w, a in three])
-            rates = tuple([w + a * seconds for _, w, a in three])
+            change = accelerations[0] * (0.5 * seconds)
+            angles = (angles[0] + (rates[0] + change) * seconds,)
+            rates = (rates[0] + accelerations[0] * seconds,)
         elif self._carry_forward:
             seconds = age * 1e-9
-            if len(angles) == 1:  # a loop over one takes five times as long
-                angles = (angles[0] + rates[0] * seconds,)
-            else:
-                pairs = zip(angles, rates, strict=True)
-                angles = tuple([angle + rate * seconds for angle, rate in pairs])
+            angles = (angles[0] + rates[0] * seconds,)
+        return CrankState(angles, rates, accelerations, age)
+
+
+class SampledInputs(FormulaCrank):
+    """
+    Several inputs, each of which keeps its own newest good sample.
+
+    A message may name some of them. There is no crank state before each has a sample, and while
+    the newest sample of one is too old. The age is that of the oldest.
+    """
+
+    __slots__ = ('_cranks', '_newest_inputs', 'max_age')
+
+    HELD = 'samples'
+
+    max_age: int
+    """Age of an input's newest sample above which there is no crank state, in [ns]."""
+
+    def __init__(self, cranks: Sequence[SampledCrank]) -> None:
+        self._cranks = cranks
+        self.max_age = cranks[0].max_age
+        self._newest_inputs: tuple[int, ...] = ()
+
+    @property
+    def newest_inputs(self) -> tuple[int, ...]:
+        """Numbers of the inputs that took the last sample."""
+        return self._newest_inputs
+
+    @property
+    def samples(self) -> tuple[Any, ...] | None:
+        """Return the samples of all inputs, one behind the other; None if one has none."""
+        samples = [crank.sample for crank in self._cranks if crank.sample is not None]
+        return tuple(chain.from_iterable(samples)) if len(samples) == len(self._cranks) else None
+
+    @property
+    def stamps(self) -> tuple[int, ...]:
+        """Stamp of the newest good sample of each input, in [ns]; 0 before the first."""
+        return tuple([crank.stamp for crank in self._cranks])
+
+    @property
+    def stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 before the first."""
+        return max(self.stamps)
+
+    @property
+    def sample(self) -> tuple[int, _Values, _Values, _Values] | None:
+        """All inputs at the stamp of the newest sample; None if one has no state then."""
+        state = self.state(self.stamp)
+        return None if state is None else (self.stamp, *state[:3])
+
+    @property
+    def jump(self) -> float:
+        """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
+        return self._cranks[0].jump
+
+    def offer(self, sample: CrankSample, now: int) -> Rejection | None:
+        """Take a sample at a time [ns]; or return why no input takes it: then nothing changes."""
+        stamp, angles, rates, named = sample
+        indices = [index for index in range(len(angles)) if named >> index & 1]
+        self._newest_inputs = ()
+        parts = [
+            CrankSample(stamp, (angles[index],), None if rates is None else (rates[index],))
+            for index in indices
+        ]
+        for part in parts:
+            why = _find_rejection(part.angles, part.rates or _NO_RATE)
+            if why is not None:
+                return why
+        reasons = [
+            self._cranks[index].offer(part, now)
+            for index, part in zip(indices, parts, strict=True)
+        ]
+        self._newest_inputs = tuple(
+            [index for index, why in zip(indices, reasons, strict=True) if why is None]
+        )
+        return None if self._newest_inputs else reasons[0]
+
+    def hold(self, stamp: int, angles: _Values, rates: _Values) -> None:
+        """Keep a sample of accelerations of 0, whatever was before."""
+        for crank, angle, rate in zip(self._cranks, angles, rates, strict=True):
+            crank.hold(stamp, (angle,), (rate,))
+
+    def usual(self, inputs: int) -> tuple[int, Any]:
+        """Return a time, in [ns], and samples."""
+        now, sample = self._cranks[0].usual(1)
+        return now, sample * inputs
+
+    def crank_state(self, now: int, held: tuple[Any, ...]) -> CrankState | None:
+        """Return the crank state at a time, in [ns]; None if a newest sample is too old."""
+        states = []
+        parts = iter(held)
+        for crank in self._cranks:
+            state = crank.crank_state(now, (next(parts), next(parts), next(parts), next(parts)))
+            if state is None:
+                return None
+            states.append(state)
+        age: Any = states[0].age
+        for state in states[1:]:
+            age = where(state.age > age, state.age, age)
+        angles, rates, accelerations = (
+            tuple(chain.from_iterable(values))
+            for values in zip(*(state[:3] for state in states), strict=True)
+        )
         return CrankState(angles, rates, accelerations, age)
 
 

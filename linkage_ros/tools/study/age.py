@@ -28,7 +28,7 @@ from typing import Any
 
 from linkage_ros.description import HIGHEST_RATE, LOWEST_RATE, Scene
 from linkage_ros.messages import CrankSample, JointStateWriter, NANOSECONDS
-from linkage_ros.stages.drives import SampledCrank, TopicDrive
+from linkage_ros.stages.drives import sample_inputs, TopicDrive
 from linkage_ros.tools.study.budget import JointError, Knob, Price, Setting
 from linkage_ros.tools.study.joint_errors import error_of, joint_distances, joints_at
 from linkage_ros.tools.study.measuring import Candidate, Spread, time_in_turn
@@ -223,7 +223,8 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     _, use = motion.scene_linkage.drive
     if not use.is_measured or motion.scene_linkage.dependent_joint:
         return Spread(0.0, 0.0, 0.0)
-    read, drive = use.reader(motion.context), SampledCrank(use, True)
+    read = use.reader(motion.context)
+    drive = sample_inputs(use, True, motion.closure.linkage.inputs)
 
     def run() -> None:
         for _ in range(_BLOCK):
@@ -298,7 +299,7 @@ class _CommandSamples:
         inputs = self._motion.closure.linkage.inputs
         found: list[Crank | None] = []
         for tick in ticks:
-            drive = SampledCrank(use, True, inputs)
+            drive = sample_inputs(use, True, inputs)
             for stamp, come in samples_before(tick):
                 crank = cranks_at(self._motion, [stamp])[0]
                 if crank is not None:

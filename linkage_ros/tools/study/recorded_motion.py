@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 from linkage_ros.bag import Bag, read_raw_metadata
 from linkage_ros.dynamics import LARGEST
 from linkage_ros.errors import BagError, list_names
-from linkage_ros.messages import JOINT_STATE_TYPE, JointStateReader, Rejection
-from linkage_ros.stages.drives import SampledCrank, TopicDrive
+from linkage_ros.messages import input_reader, JOINT_STATE_TYPE, Rejection
+from linkage_ros.stages.drives import sample_inputs, TopicDrive
 from linkage_ros.tools.study.member_motion import Command, Crank, LinkageMotion
 
 
@@ -82,7 +82,7 @@ def follow_samples(
 def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
     """Return the good samples of the topic that has most of them."""
     _, use = motion.scene_linkage.drive
-    read: Any = JointStateReader(motion.context.inputs_in_messages).read
+    read: Any = input_reader(motion.context.inputs_in_messages)
     if use.is_measured:
         read = use.reader(motion.context)
     else:
@@ -96,7 +96,7 @@ def _samples_of(motion: LinkageMotion, bag: Bag, topic: str) -> list[_Sample]:
             if not isinstance(sample, Rejection):
                 received.setdefault(heard, []).append((log_time, sample))
     most = max(received.values(), key=len, default=[])
-    drive = SampledCrank(use, needs_rate=True, inputs=motion.closure.linkage.inputs)
+    drive = sample_inputs(use, True, motion.closure.linkage.inputs)
     found: list[_Sample] = []
     for log_time, sample in sorted(most, key=lambda one: one[0]):
         if drive.offer(sample, log_time) is None and drive.sample is not None:

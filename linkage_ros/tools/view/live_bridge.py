@@ -41,7 +41,14 @@ from linkage_ros.errors import (
     quote,
     shorten,
 )
-from linkage_ros.messages import CrankSample, JointStateReader, JointStateWriter, NANOSECONDS
+from linkage_ros.messages import (
+    CrankSample,
+    input_reader,
+    JointStateReader,
+    JointStateWriter,
+    NANOSECONDS,
+    Rejection,
+)
 from linkage_ros.node import (
     CHANGES_QOS,
     leave_out_shared_memory,
@@ -359,16 +366,20 @@ class LiveBridge:
             # Other nodes may publish on the same topic, or the crank comes by it.
             read = self._read_joints.read(message)
             joints = read if isinstance(read, CrankSample) else joints
-            inputs = self._read_inputs.read(message)
-            self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
+            self._take_cranks(message)
         for message in _take_all(self._crank_states):
-            inputs = self._read_inputs.read(message)
-            self._cranks = inputs if isinstance(inputs, CrankSample) else self._cranks
+            self._take_cranks(message)
         if joints is not None:
             self._last_heard = monotonic()
             self._publish_news(
                 'state', {'state': run.state_content(joints, self._cranks, time_ns())}
             )
+
+    def _take_cranks(self, message: bytes) -> None:
+        """Take the inputs that a message names."""
+        inputs = self._read_inputs(message)
+        if isinstance(inputs, CrankSample):
+            self._cranks = inputs.merged_over(self._cranks)
 
     def _check_node(self) -> None:
         """Find out whether the node is there, and give up what it does not answer."""
@@ -503,8 +514,9 @@ class LiveBridge:
                 'input', f'{quote(number)} is not the index of an input', f'name one of {count}'
             )
         at = [0.0] * len(run.topic_driven.input_names)
-        if self._cranks is not None and run.topic_driven is run.drawn_linkage:
-            at = list(self._cranks.angles)
+        known = self._cranks if run.topic_driven is run.drawn_linkage else None
+        if known is not None and all(map(isfinite, known.angles)):
+            at = list(known.angles)
         else:
             at[number] = target
         self._hand.set_target(number, target, at, monotonic())
@@ -589,11 +601,11 @@ def _branch_of(scene_linkage: SceneLinkage) -> CrankBranch:
     )
 
 
-def _crank_reader(scene_linkage: SceneLinkage) -> JointStateReader | DependentSampleReader:
+def _crank_reader(scene_linkage: SceneLinkage) -> Callable[[bytes], CrankSample | Rejection]:
     """Return the reader of its inputs, as samples or published joints name them."""
     if not scene_linkage.dependent_joint:
-        return JointStateReader(scene_linkage.input_names)
-    return DependentSampleReader(_branch_of(scene_linkage), scene_linkage.sampled_joints[0])
+        return input_reader(scene_linkage.input_names)
+    return DependentSampleReader(_branch_of(scene_linkage), scene_linkage.sampled_joints[0]).read
 
 
 def _crank_writer(scene_linkage: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:

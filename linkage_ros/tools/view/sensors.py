@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.description import parse_scene, SCENE_FILE, SceneLinkage
 from linkage_ros.kinematics import Closure
-from linkage_ros.stages.drives import SampledCrank, TopicDrive
+from linkage_ros.stages.drives import SampledCrank, SampledInputs, TopicDrive
 from linkage_ros.stages.effects import ForceEffect, SensorReading
 from linkage_ros.tick import LinkagePipeline
 from linkage_ros.tools.view.report import link_poses
@@ -94,8 +94,8 @@ class Sensors:
             share = (time - since) / (t - since) if t > since else 1.0
             angles = tuple(a + share * (b - a) for a, b in zip(before, inputs, strict=True))
             now = round(time * _NANOSECONDS)
-            assert isinstance(line.drive, SampledCrank)
-            line.drive.sample = now, angles, tuple(rates), (0.0,) * self.count
+            assert isinstance(line.drive, SampledCrank | SampledInputs)
+            line.drive.hold(now, angles, tuple(rates))
             self._reading = line.interpret(now).reading
         return self._readings_content(inputs)
 

@@ -6,14 +6,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Route a message to the linkages whose joints it names."""
+"""Route a message to those whose joints it names: linkages, or inputs of one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 
-from linkage_ros.messages import head_of, STAMP_END
+from linkage_ros.messages.joint_state import head_of
+from linkage_ros.messages.layout import STAMP_END
 
 _MOST = 1000
 """Most kinds of messages in the cache; a limit against ever new names."""
@@ -28,15 +29,15 @@ class SampleRouter(Generic[Receiver]):
     """
     Finds the receivers of a message; parses a message only if its joint names are new.
 
-    A message must name all joints that its receiver requires.
+    A message must name one of the joints that its receiver wants.
     """
 
     __slots__ = ('_all', '_ends', '_found', '_wanted')
 
-    def __init__(self, required_joints: Mapping[Receiver, Sequence[str]]) -> None:
-        self._all = tuple(required_joints)
+    def __init__(self, wanted_joints: Mapping[Receiver, Sequence[str]]) -> None:
+        self._all = tuple(wanted_joints)
         self._wanted = {
-            to: {joint.encode() for joint in joints} for to, joints in required_joints.items()
+            to: {joint.encode() for joint in joints} for to, joints in wanted_joints.items()
         }
         self._ends: dict[int, list[int]] = {}
         """Possible ends of the names, by length of the message."""
@@ -52,7 +53,7 @@ class SampleRouter(Generic[Receiver]):
         if head is None:
             return self._all
         names, end = head
-        receivers = tuple(to for to, joints in self._wanted.items() if joints <= names)
+        receivers = tuple(to for to, joints in self._wanted.items() if joints & names)
         if end > _LONGEST:
             return receivers
         if len(self._found) >= _MOST:
