@@ -372,6 +372,7 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'degrees_of_freedom': freedom.mobility,
         'redundant_equations': freedom.redundant,
         'spinning_rods': list(closure.idle),
+        'held_joints': list(closure.held),
         'unwrapped': False,
         'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
         'limits': _limits_json(linkage),

@@ -63,6 +63,8 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
     yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
     if account['spinning_rods']:
         yield 'rods that may spin', ', '.join(account['spinning_rods'])
+    if account['held_joints']:
+        yield 'held still', f'{", ".join(account["held_joints"])}: turns of rods about themselves'
     for given in account['inputs']:
         turns = given['unit'] == 'rad'
         unit = 'angle' if turns else f'length [{units.length}]'

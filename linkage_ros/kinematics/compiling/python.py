@@ -75,7 +75,8 @@ def python_body(path: Path, bail_out: str, prefix: str = 'k') -> PythonBody:
 
     def write_constant(value: Any) -> str:
         if isinstance(value, int | float) and math.isfinite(value):
-            return repr(value)
+            # The repr of a NumPy number includes its type.
+            return repr(float(value) if isinstance(value, float) else value)
         known = f'{prefix}{len(constants)}'
         constants[known] = value
         return known

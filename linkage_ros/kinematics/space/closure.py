@@ -23,6 +23,8 @@ from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.plane.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.carried_points import CarriedPoints
+from linkage_ros.kinematics.space.free_platforms import carry_platforms, free_platforms
+from linkage_ros.kinematics.space.hinge_balls import plan_balls_of_hinges
 from linkage_ros.kinematics.space.linkage import (
     check_space_linkage,
     size_of,
@@ -92,21 +94,38 @@ class SpaceClosure(StepwiseClosure):
         check_space_linkage(linkage)
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
-        self._plan = plan = SpacePlan(linkage, _add_knot)
+        planned, hung, one_with, self.held = plan_balls_of_hinges(linkage)
+        """Hinges of rods that keep their value."""
+        plan = SpacePlan(planned, _add_knot)
+        if platforms := free_platforms(plan):
+            planned = carry_platforms(planned, platforms)
+            hung = hung and carry_platforms(hung, platforms)
+            plan = SpacePlan(planned, _add_knot)
+        if hung is not None:
+            plan.hang_rods(hung)
+        plan.finish()
+        self._plan = plan
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy
             find_freedom,  # local import: it loads numpy
         )
 
-        freedom = find_freedom(linkage, plan.carried_points)
+        freedom = find_freedom(planned, CarriedPoints(planned, plan.scale))
         at_change_point = freedom.free and plan.finds_all
         if not at_change_point:
-            check_freedom(linkage, plan, freedom)
+            check_freedom(planned, plan, freedom)
+        plan.frames |= {gone: plan.frames[kept] for gone, kept in one_with.items()}
+        plan.pose_frames |= {gone: plan.pose_frames[kept] for gone, kept in one_with.items()}
         self.turns_with = plan.turns_with
         corrections = replace(linkage.corrections, tilted_by=plan.tilt)
         linkage = replace(linkage, corrections=corrections)
         self._set_linkage(linkage, name, plan.scale)
-        self.groups, self._knots = plan.groups, plan.knots
+        named = {*linkage.link_names}
+        self.groups = [
+            group._replace(links=tuple(link for link in group.links if link in named))
+            for group in plan.groups
+        ]
+        self._knots = plan.knots
         self.idle = plan.idle
         """Rods that may turn about themselves."""
         self._error_line = StraightLine(self._list_errors, lambda: None)
@@ -118,7 +137,7 @@ class SpaceClosure(StepwiseClosure):
         )
         if at_change_point:
             freedom = self._freedom_beside_pose() or freedom
-            check_freedom(linkage, plan, freedom)
+            check_freedom(planned, plan, freedom)
         self.freedom: Freedom = freedom
 
     def _freedom_beside_pose(self) -> Freedom | None:
@@ -144,7 +163,7 @@ class SpaceClosure(StepwiseClosure):
             axis = frame.turn(drawn.resolve(joint.axis))
             return replace(joint, at=scale(self.scale, at), axis=axis)
 
-        linkage = self.linkage
+        linkage = plan.linkage
         return replace(
             linkage,
             points=self.points(position),
@@ -361,13 +380,17 @@ class SpaceClosure(StepwiseClosure):
         """
         found: dict[int, list[dict[str, float]]] = {}
         for number, knot in self._knots.items():
+            # A platform that only rods carry has no joints of the file.
+            joints = self.linkage.pair_joints
             units = [1.0 if name in self.linkage.hinges else self.scale for name in knot.unknown]
             found[number] = [
                 {
                     name: value * unit
                     for name, value, unit in zip(knot.unknown, values, units, strict=True)
+                    if name in joints
                 }
                 for values in knot.other_solutions(starts)
+                if not joints.keys().isdisjoint(knot.unknown)
             ]
         return found
 

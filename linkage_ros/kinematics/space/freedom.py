@@ -107,8 +107,8 @@ class _MotionEquations:
     def _ball_rows(self) -> Iterator[Array]:
         """Yield the rows of the balls between two links; count all equations as needed ones."""
         carried, balls = self._carried, defaultdict[tuple[str, str], list[Array]](list)
-        for point in self._linkage.points:
-            first, *others = carried.carriers.get(point) or ('',)
+        for point in dict.fromkeys(carried.same[point] for point in self._linkage.points):
+            first, *others = carried.carriers[point] or ('',)
             for link in others:
                 if not _is_on_hinge(self._linkage, carried, point, {first, link}):
                     balls[first, link].append(_velocity_rows(carried.places[point]))

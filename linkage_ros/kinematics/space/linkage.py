@@ -72,6 +72,17 @@ class SpatialJoint:
     value: float = 0.0
     limits: Limits = NO_LIMITS
 
+    def __post_init__(self) -> None:
+        for field_name in ('axis', 'at'):
+            object.__setattr__(self, field_name, _as_doubles(getattr(self, field_name)))
+        object.__setattr__(self, 'value', float(self.value))
+
+
+def _as_doubles(vector: Iterable[float]) -> Vector:
+    """Return a vector of Python's numbers: NumPy's divide by 0, and print, in their own way."""
+    x, y, z = map(float, vector)
+    return x, y, z
+
 
 @dataclass(frozen=True)
 class SpaceLinkage:
@@ -100,6 +111,8 @@ class SpaceLinkage:
         What belongs to no loop of the robot that it is read from.
     corrections
         What was corrected in the pose.
+    held
+        Values of published joints that are left out of the hinges, since they never change.
 
     """
 
@@ -115,6 +128,11 @@ class SpaceLinkage:
     masses: Mapping[str, SpatialMass] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     corrections: PoseCorrections = field(default_factory=PoseCorrections)
+    held: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        points = {name: _as_doubles(place) for name, place in self.points.items()}
+        object.__setattr__(self, 'points', points)
 
     @cached_property
     def pair_joints(self) -> dict[str, SpatialJoint]:

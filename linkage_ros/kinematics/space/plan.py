@@ -112,10 +112,10 @@ class SpacePlan:
     Makes the steps of a spatial linkage; lengths are in the unit of ``scale`` metres.
 
     ``add_knot`` adds links that only close together as the next step, and says whether it could.
+    `finish` adds what is published.
     """
 
     def __init__(self, linkage: SpaceLinkage, add_knot: Callable[[SpacePlan], bool]) -> None:
-        self.linkage = linkage
         self._add_knot = add_knot
         self.scale = unit_of(linkage)
         self.steps: list[Any] = []
@@ -131,9 +131,7 @@ class SpacePlan:
         self.pose_frames: dict[str, SpaceFrame] = {GROUND: GROUND_FRAME}
         self.points: dict[str, int] = {}
         """Indices, among the pins, of the points that are placed."""
-        self.carried_points = known = CarriedPoints(linkage, self.scale)
-        self.places, self.axes, self.same = known.places, known.axes, known.same
-        self.carriers, self.carried = known.carriers, known.carried
+        self._take_linkage(linkage)
         count = len(linkage.driven)
         self.turns_with = {
             k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
@@ -149,6 +147,15 @@ class SpacePlan:
         self.add_step(GroundStep())
         while self._find_next():
             pass
+
+    def hang_rods(self, linkage: SpaceLinkage) -> None:
+        """Add the steps of the same linkage with the hinges on which its rods hang."""
+        self._take_linkage(linkage)
+        while self._find_next():
+            pass
+
+    def finish(self) -> None:
+        """Tell which rods may spin, and measure what is published."""
         unknown = self._unknown_links()
         self.idle = tuple(
             link
@@ -157,6 +164,13 @@ class SpacePlan:
         )
         """Rods whose ends are known: nothing holds their turn about themselves."""
         self._measure_published()
+
+    def _take_linkage(self, linkage: SpaceLinkage) -> None:
+        """Plan this linkage from here on."""
+        self.linkage = linkage
+        self.carried_points = known = CarriedPoints(linkage, self.scale)
+        self.places, self.axes, self.same = known.places, known.axes, known.same
+        self.carriers, self.carried = known.carriers, known.carried
 
     def add_step(self, step: Any) -> None:
         if not step.close(self.state).status.has_pose:
@@ -584,7 +598,10 @@ class SpacePlan:
         for name in dict.fromkeys(wanted):
             if name in self.coordinates:
                 continue
-            if name in linkage.struts:
+            if name in linkage.held:
+                self.coordinates[name] = len(self.state.coordinates)
+                self.add_step(FollowerJoint(name, 0, 0, 0.0, 0.0, linkage.held[name]))
+            elif name in linkage.struts:
                 ends = [self.same[point] for point in linkage.struts[name]]
                 if not all(map(self.is_known, ends)):
                     self.lost.append(name)

@@ -7,6 +7,7 @@
 # language governing permissions and limitations under the License.
 """Spatial linkages from file to joints: exact, consistent, and those of the books."""
 
+from dataclasses import replace
 from math import acos, atan2, cos, dist, hypot, pi, radians, remainder, sin, sqrt, tan, tau
 from pathlib import Path
 from random import Random
@@ -37,6 +38,24 @@ NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.
 def closure_of(name):
     own = FOLDER / f'{name}.yaml'
     return load_in_space(own if own.is_file() else name)
+
+
+def test_a_linkage_of_numpys_numbers_has_the_same_bits():
+    for name in spatial_linkage_names():
+        linkage = closure_of(name).linkage
+        joints = [
+            {
+                each: replace(joint, axis=np.array(joint.axis), at=np.array(joint.at))
+                for each, joint in kind.items()
+            }
+            for kind in (linkage.hinges, linkage.slides)
+        ]
+        points = {each: np.array(place) for each, place in linkage.points.items()}
+        other = SpaceClosure(
+            replace(linkage, points=points, hinges=joints[0], slides=joints[1]), name
+        )
+        inputs = [value + 0.01 for value in linkage.pose.inputs]
+        assert other.position(*inputs) == closure_of(name).position(*inputs)
 
 
 def states_of(closure, count, reach=0.3):

@@ -1,0 +1,118 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Rods whose balls are three hinges through one point, as robots' files have them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from linkage_ros import load
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics import SpaceClosure, SpatialJoint
+import numpy as np
+import pytest
+
+from ...robot_models.heads import head
+from ...robot_models.walked import Walked
+
+ROBOT = Path(__file__).parents[2] / 'robot_models' / 'robots' / 'rods_on_three_hinges.urdf'
+WITH_RODS = ('rssr', 'delta', 'ankle', 'ankle_motors')
+RNG = np.random.default_rng(29)
+
+
+def axes_across(rng):
+    """Return three directions at right angles, as exporters write them; one along no rod."""
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return axes.T
+
+
+def written_as_hinges(linkage, rod, point, rng):
+    """Return the linkage with a rod's ball as three hinges through two links of their own."""
+    on = next(link for link in linkage.links if point in linkage.links[link] and link != rod)
+    ends = [on, f'{point}_1', f'{point}_2', rod]
+    hinges = dict(linkage.hinges)
+    for number, axis in enumerate(axes_across(rng)):
+        one, other = ends[number : number + 2][:: rng.choice((1, -1))]
+        # Any point of the axis, with the noise of CAD.
+        at = linkage.points[point] + axis * rng.uniform(-1, 1) + rng.normal(size=3) * 1e-12
+        hinges[f'{point}_hinge{number}'] = SpatialJoint(one, other, tuple(axis), tuple(at))
+    names = rng.permutation(list(hinges))
+    left = tuple(other for other in linkage.links[rod] if other != point)
+    links = {**linkage.links, rod: left}
+    return replace(linkage, hinges={name: hinges[name] for name in names}, links=links)
+
+
+@pytest.mark.parametrize('name', WITH_RODS)
+@pytest.mark.parametrize('both', [False, True], ids=['one end', 'both ends'])
+@pytest.mark.parametrize('seed', range(2))
+def test_states_are_those_of_the_linkage_with_balls(name, both, seed):
+    rng = np.random.default_rng(seed)
+    balls = load(name)
+    linkage = balls.linkage
+    for rod in balls.idle:
+        ends = rng.permutation(linkage.links[rod])
+        for point in ends[: 2 if both else 1]:
+            linkage = written_as_hinges(linkage, rod, str(point), rng)
+    added = [name for name in linkage.hinges if name not in balls.linkage.hinges]
+    closure = SpaceClosure(replace(linkage, published=(*linkage.published, *added)))
+    assert len(closure.held) == len(balls.idle)
+    count = len(balls.joint_names)
+    pose = np.array(balls.linkage.pose.inputs)
+    for inputs in pose + rng.uniform(-0.2, 0.2, (20, len(pose))):
+        expected, found = balls.position(*inputs), closure.position(*inputs)
+        assert found.status is expected.status
+        assert found.joints[:count] == pytest.approx(expected.joints, abs=1e-8)
+        values = dict(zip(closure.joint_names, found.joints, strict=True))
+        assert all(values[each] == 0.0 for each in closure.held)
+
+
+def test_a_robot_with_such_rods_closes_where_its_tree_says():
+    """The values of pitch and roll are of own Newton; the tree is walked by yourdfpy."""
+    closure = load(ROBOT, {'input': ['m1', 'm2']})
+    at = closure.position(*np.radians((5.0, -3.0)))
+    named = dict(zip(closure.joint_names, at.joints, strict=True))
+    assert np.degrees((named['pitch'], named['roll'])) == pytest.approx(
+        (-2.901734, 1.129640), abs=1e-6
+    )
+    walked = Walked(ROBOT.read_bytes())
+    for m1, m2 in RNG.uniform(-0.3, 0.3, (50, 2)):
+        found = closure.position(m1, m2)
+        walked.pose((*closure.input_names, *closure.joint_names), (m1, m2, *found.joints))
+        assert walked.gap() < 1e-12
+
+
+def test_a_head_on_six_rods_is_where_its_tree_says(tmp_path):
+    """Nothing but rods carries the head: no joint leads to it, and it has no closed form."""
+    robot = tmp_path / 'head.urdf'
+    robot.write_text(head(RNG))
+    closure = load(robot, {'input': [f'motor{number}' for number in range(1, 7)]})
+    assert len(closure.held) == 6
+    walked = Walked(robot.read_bytes())
+    for motors in RNG.uniform(-0.1, 0.1, (50, 6)):
+        found = closure.position(*motors)
+        walked.pose((*closure.input_names, *closure.joint_names), (*motors, *found.joints))
+        assert walked.gap() < 1e-12
+
+
+def test_a_spin_that_is_an_input_stays_one():
+    closure = load(ROBOT, {'input': ['m1', 'm2', 'r1z', 'r2z']})
+    assert closure.held == ()
+    assert closure.position(0.05, -0.03, 0.4, -0.2).joints[:2] == pytest.approx(
+        load(ROBOT, {'input': ['m1', 'm2']}).position(0.05, -0.03).joints[:2], abs=1e-9
+    )
+
+
+def test_a_ball_that_is_no_ball_leaves_its_rod_free():
+    """The third axis misses the point of the first two by 1 mm."""
+    balls = load('rssr')
+    linkage = written_as_hinges(balls.linkage, 'rod', 'A', np.random.default_rng(3))
+    hinge = linkage.hinges['A_hinge2']
+    away = np.cross(hinge.axis, (0.3, 0.5, 0.7))
+    off = replace(hinge, at=tuple(np.array(hinge.at) + 1e-3 * away / np.linalg.norm(away)))
+    with pytest.raises(DefinitionError, match='1 input for 2 degrees of freedom'):
+        SpaceClosure(replace(linkage, hinges={**linkage.hinges, 'A_hinge2': off}))
