@@ -40,8 +40,14 @@ _WIDTH = 0.125
 _LEVELS = 5
 """Number of widths; each is half the one before."""
 
-_KEPT = 4096
-"""Most cells that are kept: any other is made again, to the same bits."""
+_KEPT = 2**20
+"""Most numbers of cells that are kept: any other is made again, to the same bits."""
+
+_FILLED = 4096
+"""Most cells that are made at once."""
+
+_WAYS = 2**15
+"""Most cells of which it is kept what leads on from them."""
 
 _FARTHEST = 128
 """Widest cells from the pose to the farthest state: some 16 rad, or lengths."""
@@ -162,6 +168,8 @@ class Grid:
         """The inputs of the pose, at the centre of the first cell."""
         self._given = GridCell(self.home, tuple(unknowns), (level,) * count, bends)
         self._kept: dict[Key, _Found] = {}
+        self._ways: dict[Key, _Found] = {}
+        self._most_kept = _KEPT // len(self._given.numbers)
         self._look_up = self._write_look_up()
         self.widths = [ldexp(_WIDTH, -level) for level in range(_LEVELS)]
         self._corners: list[tuple[float, ...]] = list(product((-0.5, 0.5), repeat=count))
@@ -279,7 +287,7 @@ class Grid:
         """
         Make all cells within the limits of the inputs; return their numbers by level and place.
 
-        None where an input has no limits, or where these are more cells than are kept.
+        None where an input has no limits, or where these are too many.
         """
         cells: dict[Key, tuple[float, ...]] = {}
         limits = [(given.low, given.high) for given in self._inputs]
@@ -288,7 +296,7 @@ class Grid:
         waiting = [(0, self._keys_between(0, limits))]
         while waiting:
             level, keys = waiting.pop()
-            if len(cells) + prod(map(len, keys)) > _KEPT:
+            if len(cells) + prod(map(len, keys)) > _FILLED:
                 return None
             for key in product((level,), *keys):
                 if key in cells:
@@ -372,55 +380,66 @@ class Grid:
 
     def _follow(self, key: Key) -> _Found:
         """Return a cell, made from its neighbour on the straight line to the pose."""
+        found = self._kept.get(key)
+        if found is not None:
+            return found
+        level, *places = key
+        count = max(map(abs, places), default=0)
+        found = _Found(self._start, self._start, None)
+        if count > _FARTHEST << level:
+            return found._replace(cell=None)
         way: list[Key] = []
-        while (found := self._kept.get(key)) is None:
-            way.append(key)
-            level, *places = key
-            count = max(map(abs, places), default=0)
-            if count > _FARTHEST << level:
-                return _Found(None, self._start, None)
-            if not count:
-                found = _Found(self._start, self._start, None)
+        for left in range(count, 0, -1):
+            places = [round(k * (left - 1) / left) for k in places]
+            before = (level, *places)
+            passed = self._ways.get(before)
+            if passed is not None:
+                found = passed
                 break
-            key = (level, *[round(k * (count - 1) / count) for k in places])
-        else:
-            if way:
-                found = self._on_the_way(key) or found
-        for key in reversed(way):
+            way.append(before)
+        for before in reversed(way):
             if found.cell is None:
                 break
-            passed = None if key is way[0] else self._on_the_way(key)
-            found = passed or self._keep_cell(key, found)
-        return found
+            found = self._pass_cell(before, found.cell)
+        return found if found.cell is None else self._keep_cell(key, found.cell)
 
-    def _on_the_way(self, key: Key) -> _Found | None:
+    def _pass_cell(self, key: Key, before: GridCell) -> _Found:
         """
-        Return what leads on from a cell instead of it: a wider proven one, if there is one.
+        Return what leads on from a cell: a wider proven one, or else the cell itself.
 
         Wider cells lead to where they are no longer proven. That the narrow one may be kept, since
         a state was in it, or kept as not proven, changes nothing.
         """
-        cell = self._wider_cell(key)
-        return None if cell is None else _Found(cell, cell, cell.numbers)
-
-    def _keep_cell(self, key: Key, before: _Found) -> _Found:
-        """Return a cell that a neighbour leads to, and keep it."""
-        cell = None if before.cell is None else self._make_cell(key, before.cell)
-        found = _Found(cell, cell or before.last, cell.numbers if cell else None)
-        tell_progress('cells of links that close only together made', len(self._kept))
-        if len(self._kept) >= _KEPT:
-            del self._kept[next(iter(self._kept))]
-        self._kept[key] = found
+        wider = self._wider_cell(key)
+        found = self._kept.get(key)
+        if wider is not None:
+            found = _Found(wider, wider, None)
+        elif found is None:
+            found = self._keep_cell(key, before)
+        if len(self._ways) >= _WAYS:
+            self._ways.clear()
+        self._ways[key] = found
         return found
 
     def _wider_cell(self, key: Key) -> GridCell | None:
         """Return the widest proven cell, of wider ones, at the centre of a cell."""
         level, *places = key
         for wider in range(level):
-            cell = self._follow((wider, *[round(k / (1 << level - wider)) for k in places])).cell
+            width = 1 << level - wider
+            cell = self._follow((wider, *[round(k / width) for k in places])).cell
             if cell is not None:
                 return cell
         return None
+
+    def _keep_cell(self, key: Key, before: GridCell) -> _Found:
+        """Return a cell that a neighbour leads to, and keep it."""
+        cell = self._make_cell(key, before)
+        found = _Found(cell, cell or before, cell.numbers if cell else None)
+        tell_progress('cells of links that close only together made', len(self._kept))
+        if len(self._kept) >= self._most_kept:
+            del self._kept[next(iter(self._kept))]
+        self._kept[key] = found
+        return found
 
     def _make_cell(self, key: Key, known: GridCell) -> GridCell | None:
         """Return a cell, if it is proven from a known one."""

@@ -14,18 +14,17 @@ derivatives by the inputs. Each is straight-line code, with the steps before the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import combinations_with_replacement, islice
+from collections.abc import Callable, Sequence
+from functools import reduce
+from itertools import combinations_with_replacement
 from math import inf
-from operator import mul
 from typing import Any
 
-from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError, where
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.iterated.elimination import subtract
+from linkage_ros.kinematics.iterated.elimination import add, multiply, subtract
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput
 from linkage_ros.kinematics.iterated.group import (
-    compile_later,
     Equations,
     GroupPose,
     IteratedGroup,
@@ -33,6 +32,7 @@ from linkage_ros.kinematics.iterated.group import (
 )
 from linkage_ros.kinematics.iterated.newton_system import NewtonSystem
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
+from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 
@@ -73,9 +73,25 @@ class GridGroup(IteratedGroup):
     ) -> None:
         super().__init__(equations, before, start, inputs)
         self._given_inputs, self._system = given_inputs, system
-        given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
-        self._system_line = compile_later(self._list_system, given, pose)
-        self._forms_line = compile_later(self._list_forms, given, pose)
+        self._proof_line = self._compile_later(self._list_proof)
+        self._step_line = self._compile_later(self._list_step)
+        self._forms_line = self._compile_later(self._list_forms)
+
+    def _compile_later(self, function: Callable[..., list[Any]]) -> StraightLine:
+        """
+        Return a function of all inputs and the unknowns as a straight line.
+
+        It takes the inputs of the group; those on which nothing depends are as in the pose.
+        """
+
+        def compute(inputs: Sequence[Any], unknowns: Sequence[Any]) -> list[Any]:
+            given: list[Any] = [*self._before.inputs]
+            for k, value in zip(self.inputs, inputs, strict=True):
+                given[k] = value
+            return function(LinkState(given, []), LinkState([*unknowns], []))
+
+        home = [self._before.inputs[k] for k in self.inputs]
+        return StraightLine(compute, lambda: (home, [*self._start]))
 
     @BuiltProperty
     def grid(self) -> Grid:
@@ -90,10 +106,9 @@ class GridGroup(IteratedGroup):
         for inputs, unknowns in self.grid.home_corners():
             count, size, values = 0, inf, unknowns
             while size > _HALFWAY and count < _MOST_STEPS:
-                found = self._evaluate_system(inputs, values)
-                if found is None:
+                step = self._step_line(inputs, values)
+                if step is None:
                     break
-                step = found[: len(values)]
                 size, count = sum(map(abs, step)), count + 1
                 values = [a - b for a, b in zip(values, step, strict=True)]
             most = max(most, count)
@@ -152,27 +167,8 @@ class GridGroup(IteratedGroup):
         The norm is the largest change of an unknown: all in one unit, the largest step; or each in
         its own, its step and some times what the next may be at most. The better one counts.
         """
-        found = self._evaluate_system(inputs, unknowns)
-        if found is None:
-            return inf
-        count = len(unknowns)
-        numbers, pairs = iter(map(abs, found)), count * (count + 1) // 2
-        steps = [step + SMALLEST for step in islice(numbers, count)]
-        columns = [[*islice(numbers, count)] for _ in range(count)]
-        bounds = [[*islice(numbers, pairs)] for _ in range(count)]
-
-        def changes_within(units: Sequence[float]) -> list[float]:
-            """Return how much the matrix, and so the step, may change by these changes."""
-            squares = [a * b for a, b in combinations_with_replacement(units, 2)]
-            bends = [sum(map(mul, bound, squares)) for bound in bounds]
-            return [sum(map(mul, row, bends)) for row in zip(*columns, strict=True)]
-
-        even = [max(steps)] * count
-        fitted = [a + _SECOND * b for a, b in zip(steps, changes_within(steps), strict=True)]
-        return min(
-            max(a / b for a, b in zip(changes_within(units), units, strict=True))
-            for units in (even, fitted)
-        )
+        found = self._proof_line(inputs, unknowns)
+        return found[0] if found else inf
 
     def solve_from(
         self, inputs: Sequence[float], unknowns: Sequence[float]
@@ -180,17 +176,17 @@ class GridGroup(IteratedGroup):
         """Return the solution that Newton's method leads to, until no step is shorter."""
         values, last = [*unknowns], inf
         while True:
-            found = self._evaluate_system(inputs, values)
-            size = sum(map(abs, found[: len(values)])) if found else inf
-            if found is None or not size < last:
+            step = self._step_line(inputs, values)
+            size = sum(map(abs, step)) if step else inf
+            if step is None or not size < last:
                 return values if last <= _LEAST_STEP else None
-            values, last = [a - b for a, b in zip(values, found, strict=False)], size
+            values, last = [a - b for a, b in zip(values, step, strict=True)], size
 
     def forms_at(
         self, inputs: Sequence[float], unknowns: Sequence[float]
     ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
         """Return slopes and bends at a solution, as a cell has them."""
-        found = self._forms_line(self._complete(inputs), LinkState([*unknowns], []))
+        found = self._forms_line(inputs, unknowns)
         if found is None:
             return None
         size = len(unknowns)
@@ -198,32 +194,42 @@ class GridGroup(IteratedGroup):
         count = len(inputs)
         return rows[:count], rows[count:]
 
-    def _complete(self, inputs: Sequence[float]) -> LinkState:
-        given = [*self._before.inputs]
-        for k, value in zip(self.inputs, inputs, strict=True):
-            given[k] = value
-        return LinkState(given, [])
-
-    def _evaluate_system(
-        self, inputs: Sequence[float], unknowns: Sequence[float]
-    ) -> list[float] | None:
-        return self._system_line(self._complete(inputs), LinkState([*unknowns], []))
-
     # The functions of the straight lines
 
-    def _list_system(self, given: LinkState, pose: LinkState) -> list[Any]:
-        """Return a step of Newton's method, the inverse by columns, and bounds by equations."""
-        known, count = (
-            require_state(self._before.known_at(given.coordinates)),
-            len(pose.coordinates),
-        )
+    def _list_step(self, given: LinkState, pose: LinkState) -> list[Any]:
+        """Return a step of Newton's method."""
+        known = require_state(self._before.known_at(given.coordinates))
         errors, solve = self._equations.linearize(known, pose.coordinates)
-        found = solve(errors)
-        for k in range(count):
-            found += solve([float(i == k) for i in range(count)])
-        for k in range(count):
-            found += self._equations.bound_bends(k, known, pose.coordinates)
-        return found
+        return solve(errors)
+
+    def _list_proof(self, given: LinkState, pose: LinkState) -> list[Any]:
+        """Return η·ω, by the size of a step of Newton's method, of the inverse and of bends."""
+        known = require_state(self._before.known_at(given.coordinates))
+        unknowns, count = pose.coordinates, len(pose.coordinates)
+        errors, solve = self._equations.linearize(known, unknowns)
+        steps = [abs(step) + SMALLEST for step in solve(errors)]
+        inverse = [
+            [abs(entry) for entry in solve([float(i == k) for i in range(count)])]
+            for k in range(count)
+        ]
+        bounds = [
+            [abs(bend) for bend in self._equations.bound_bends(k, known, unknowns)]
+            for k in range(count)
+        ]
+
+        def changes_by(bends: Sequence[Any]) -> list[Any]:
+            """Return how much a step changes if the equations bend by so much."""
+            return [_sum_products(row, bends) for row in zip(*inverse, strict=True)]
+
+        def ratios_within(units: Sequence[Any]) -> list[Any]:
+            """Return how much the matrix, and so the step, may change by these changes."""
+            squares = [a * b for a, b in combinations_with_replacement(units, 2)]
+            return changes_by([_sum_products(bound, squares) for bound in bounds])
+
+        even = _greatest(steps) * _greatest(changes_by([reduce(add, bound) for bound in bounds]))
+        units = [a + _SECOND * b for a, b in zip(steps, ratios_within(steps), strict=True)]
+        fitted = _greatest([a / b for a, b in zip(ratios_within(units), units, strict=True)])
+        return [where(fitted < even, fitted, even)]
 
     def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""
@@ -249,3 +255,12 @@ class GridGroup(IteratedGroup):
                 alone = zip(squares[one, one], squares[other, other], strict=True)
                 bends += [0.5 * (value - a - b) for value, (a, b) in zip(both, alone, strict=True)]
         return [*slopes, *bends]
+
+
+def _sum_products(one: Sequence[Any], other: Sequence[Any]) -> Any:
+    return reduce(add, map(multiply, one, other))
+
+
+def _greatest(values: Sequence[Any]) -> Any:
+    """Return the greatest of numbers, without a decision."""
+    return reduce(lambda most, value: where(value > most, value, most), values)

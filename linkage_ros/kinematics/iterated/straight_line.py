@@ -21,7 +21,7 @@ from linkage_ros.kinematics.step import LinkState
 
 class StraightLine:
     """
-    A function of states as straight-line code for numbers, with the bits of a tape.
+    A function of states, or of lists, as straight-line code for numbers, with a tape's bits.
 
     ``examples`` returns states as symbols; what is a number there is the same at all states.
     Without them the code is compiled at the first states. It returns None where the function
@@ -33,13 +33,13 @@ class StraightLine:
     def __init__(
         self,
         function: Callable[..., Sequence[Any]],
-        examples: Callable[[], Sequence[LinkState] | None],
+        examples: Callable[[], Sequence[Sequence[Any]] | None],
     ) -> None:
         self.function = function
         self._examples = examples
         self._line: Callable[..., Any] | None = None
 
-    def __call__(self, *states: LinkState) -> list[float] | None:
+    def __call__(self, *states: Sequence[Any]) -> list[float] | None:
         """Return the numbers of the function."""
         if self._line is None:
             with BUILD_LOCK:
@@ -50,7 +50,7 @@ class StraightLine:
             return None  # Numbers overflow: it is no function of them.
         return found and list(found[0])
 
-    def _compile(self, states: Sequence[LinkState]) -> Callable[..., Any]:
+    def _compile(self, states: Sequence[Sequence[Any]]) -> Callable[..., Any]:
         examples = list_numbers(states)
         varying = list(map(_is_symbol, examples))
         values = [one.operation.value if _is_symbol(one) else one for one in examples]
