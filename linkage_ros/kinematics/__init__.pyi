@@ -64,7 +64,6 @@ from linkage_ros.kinematics.analysis.sweep_analysis import (
     check_turns as check_turns,
     conditioning_curves as conditioning_curves,
     find_extremes as find_extremes,
-    find_worst_states as find_worst_states,
     grid_positions as grid_positions,
     InputSweep as InputSweep,
     pose_alone as pose_alone,
@@ -73,6 +72,7 @@ from linkage_ros.kinematics.analysis.sweep_analysis import (
     transmission_angles as transmission_angles,
     usual_inputs as usual_inputs,
 )
+from linkage_ros.kinematics.analysis.worst_states import find_worst_states as find_worst_states
 from linkage_ros.kinematics.arithmetic import (
     all_finite as all_finite,
     call as call,

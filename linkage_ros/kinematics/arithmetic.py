@@ -19,7 +19,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Sequence
 import math
-from math import fsum, pi, remainder as math_remainder
+from math import fsum, pi
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.status import Status
@@ -173,7 +173,7 @@ def resolve_along(vector: complex, unit: complex) -> tuple[float, float]:
 
 def acute_angle(angle: float) -> float:
     """Return the acute angle between two lines, given any angle between them, in [rad]."""
-    return abs(math_remainder(angle, pi))
+    return abs(remainder(angle, pi))
 
 
 def exact_sum(*lengths: float) -> float:

@@ -516,9 +516,13 @@ class StepwiseClosure:
         """Return place, velocity and acceleration of points by name, of traced ones at least."""
         raise NotImplementedError
 
-    def residual(self, position: Position) -> float:
-        """Return the closure error of a closed position, in [m]."""
+    def closing_errors(self, position: Position) -> list[float]:
+        """Return by how much each equation of a closed position is off, in [m]."""
         raise NotImplementedError
+
+    def residual(self, position: Position) -> float:
+        """Return the closure error of a closed position, in [m]: the largest of all equations."""
+        return max(map(abs, self.closing_errors(position)), default=0.0)
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
         """Return how near a closed position is to a singularity."""

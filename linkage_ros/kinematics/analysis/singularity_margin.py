@@ -10,12 +10,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
-from math import atan, inf, pi, remainder, sin, sqrt, tau
+from math import atan, inf, pi, remainder, sqrt, tau
 from operator import attrgetter
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.arithmetic import sin
 from linkage_ros.kinematics.plane.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.plane.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.plane.dyads.rpr import RPRDyad
@@ -35,20 +36,23 @@ _STATES = 4096
 """Number of states that are kept during the search for singular inputs."""
 
 
+class StepMargin(NamedTuple):
+    """The margin of a step to a singularity, and the group that it belongs to."""
+
+    transmission_angle: float
+    conditioning: float
+    group: int
+
+
+_FARTHEST = StepMargin(0.5 * pi, 1.0, -1)
+"""The margin where nothing can be singular."""
+
+
 def singularity_margin(closure: LoopClosure, position: Position) -> SingularityMargin:
     """Return the margin of a closed position to a singularity."""
-    angle, conditioning, weakest = 0.5 * pi, 1.0, -1
-    groups = closure.step_groups
-    for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
-        if step.has_transmission_angle:
-            angle = min(angle, of_dyad := step.transmission_angle(pose))
-            found = sqrt(2.0) * sin(0.5 * of_dyad)
-        elif step.iterates:
-            found = step.conditioning(pose)
-        else:
-            continue
-        if weakest < 0 or found < conditioning:
-            conditioning, weakest = min(found, 1.0), group
+    found = [*step_margins(closure, position)]
+    angle = min((each.transmission_angle for each in found), default=0.5 * pi)
+    weakest = min(found, key=lambda each: min(each.conditioning, 1.0), default=_FARTHEST)
     distance = inf
     if len(closure.linkage.inputs) == 1:
         sliding = bool(closure.linkage.inputs[0].slider)
@@ -56,7 +60,18 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
         value = _move_within(closure, position.state.coordinates[1] * unit)
         for singular in closure.singular_inputs:
             distance = min(distance, abs(signed_distance(closure, value, singular.value)))
-    return SingularityMargin(angle, conditioning, distance, weakest)
+    return SingularityMargin(angle, min(weakest.conditioning, 1.0), distance, weakest.group)
+
+
+def step_margins(closure: LoopClosure, position: Position) -> Iterator[StepMargin]:
+    """Yield the margins of the steps of a closed position, of numbers or symbols."""
+    groups = closure.step_groups
+    for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
+        if step.has_transmission_angle:
+            angle = step.transmission_angle(pose)
+            yield StepMargin(angle, sqrt(2.0) * sin(0.5 * angle), group)
+        elif step.iterates:
+            yield StepMargin(0.5 * pi, step.conditioning(pose), group)
 
 
 def signed_distance(closure: LoopClosure, value: float, place: float) -> float:

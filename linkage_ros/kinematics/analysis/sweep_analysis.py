@@ -36,7 +36,6 @@ from linkage_ros.kinematics.results import (
     InputRange,
     LoopClosure,
     Position,
-    SingularityMargin,
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
@@ -471,37 +470,6 @@ def _as_input_function(
         return method(pose) if pose.status.has_pose else nan
 
     return pose_value
-
-
-class WorstStates(NamedTuple):
-    """The worst of many positions: where they miss by most, and nearest to a singularity."""
-
-    residual: float  # In [m]
-    inputs: tuple[float, ...]  # Where that is, in [rad] or [m]
-    positions: int  # How many there are
-    margin: SingularityMargin | None  # The least, of several inputs
-    nearest: tuple[float, ...]  # Where that is
-
-
-def find_worst_states(closure: LoopClosure) -> WorstStates | None:
-    """Return the worst states over the range, or over a grid of several inputs; None if empty."""
-    several = len(closure.linkage.inputs) > 1
-    if several:
-        tried = grid_positions(closure)
-    else:
-        sweep = InputSweep(closure)
-        values = [value for interval in sweep.ranges for value in sample_inputs(interval)]
-        tried = (((value,), sweep.position_at(value)) for value in values)
-    found = [(inputs, position) for inputs, position in tried if position.status.has_pose]
-    if not found:
-        return None
-    residual, at = max((closure.residual(position), inputs) for inputs, position in found)
-    if not several:
-        return WorstStates(residual, at, len(found), None, ())
-    margins = ((closure.singularity_margin(position), inputs) for inputs, position in found)
-    # Symmetrical linkages have several: the first, whatever the last digits are.
-    margin, nearest = min(margins, key=lambda each: round(each[0].conditioning, 9))
-    return WorstStates(residual, at, len(found), margin, nearest)
 
 
 # Checks that a linkage closes, and that it can be within its limits.

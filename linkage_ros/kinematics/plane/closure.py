@@ -305,16 +305,15 @@ class Closure(StepwiseClosure):
             for name, slide in self.slides.items()
         }
 
-    def residual(self, position: Position) -> float:
+    def closing_errors(self, position: Position) -> list[float]:
         """
-        Return the closure error of a closed position, in [m].
+        Return the distances between the two places of each pin, or slider's point, in [m].
 
-        Each link is placed by its own pin or slider and its angle. The result is the largest
-        distance between the two places of a pin, or of a slider's point. Ratios between joints
-        join no places, and are not counted.
+        Each link is placed by its own pin or slider and its angle. Ratios between joints join no
+        places, and are not counted.
         """
         points, angles = self.points(position), self.link_angles(position)
-        worst = 0.0
+        errors = []
         for joint in self.structure.joints:
             if joint.kind == 'R':
                 error = points[joint.link, joint.name] - points[joint.to, joint.name]
@@ -324,8 +323,8 @@ class Closure(StepwiseClosure):
                 line = complex(*slider.direction) * rect(1.0, angles[joint.to])
                 along = self.slide_values(position)[joint.name]
                 error = between - along * line / abs(line)
-            worst = max(worst, abs(error))
-        return worst
+            errors.append(abs(error))
+        return errors
 
     @BuiltProperty
     def closing_ranges(self) -> tuple[InputRange, ...]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
-from linkage_ros.kinematics.iterated.straight_line import StraightLine
+from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
 from linkage_ros.kinematics.plane.linkage import SlideJoint
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.carried_points import CarriedPoints
@@ -294,16 +294,17 @@ class SpaceClosure(StepwiseClosure):
                 found[link] = (points[one], _shortest_turn(drawn_way, way))
         return found
 
-    def residual(self, position: Position) -> float:
+    def closing_errors(self, position: Position) -> list[float]:
         """
-        Return the closure error of a closed position, in [m].
+        Return by how much each equation of a closed position is off, in [m].
 
-        It is the largest by which a point of two links has two places, a rod or strut another
-        length, a joint between known links another axis, or a joint is off its ratio (times the
-        size): of all equations, redundant or not.
+        A point of two links has two places, a rod or strut another length, a joint between known
+        links another axis, or a joint is off its ratio (times the size): all equations, redundant
+        or not.
         """
-        errors = self._error_line(position.state) or self._list_errors(position.state)
-        return max(map(abs, errors), default=0.0) * self.scale
+        state = position.state
+        errors = None if has_symbols(state) else self._error_line(state)
+        return [self.scale * error for error in errors or self._list_errors(state)]
 
     def _list_errors(self, state: LinkState) -> list[float]:
         """Return the error of each equation, in the unit of the steps, with a sign or without."""

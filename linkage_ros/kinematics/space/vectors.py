@@ -78,19 +78,28 @@ def is_zero(number: float) -> bool:
     return type(number) is float and number == 0.0
 
 
+# The next three are called most of all: what `is_zero` says is written out in them.
+
+
 def multiply(one: float, other: float) -> float:
     """Return a product; 0 without an operation if a factor is 0."""
-    return 0.0 if is_zero(one) or is_zero(other) else one * other
+    if (type(one) is float and one == 0.0) or (type(other) is float and other == 0.0):
+        return 0.0
+    return one * other
 
 
 def add(one: float, other: float) -> float:
     """Return a sum; without an operation if a term is 0."""
-    return other if is_zero(one) else one if is_zero(other) else one + other
+    if type(one) is float and one == 0.0:
+        return other
+    return one if type(other) is float and other == 0.0 else one + other
 
 
 def subtract(one: float, other: float) -> float:
     """Return a difference; without a subtraction if a term is 0."""
-    return one if is_zero(other) else -other if is_zero(one) else one - other
+    if type(other) is float and other == 0.0:
+        return one
+    return -other if type(one) is float and one == 0.0 else one - other
 
 
 def plus(one: Vector, other: Vector) -> Vector:

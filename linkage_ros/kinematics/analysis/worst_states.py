@@ -1,0 +1,68 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""The worst of many states of a linkage: its closure errors, and how near singularities are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from operator import itemgetter
+from typing import NamedTuple
+
+from linkage_ros.kinematics.analysis.ranges import is_iterated, sample_inputs
+from linkage_ros.kinematics.analysis.singularity_margin import step_margins
+from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, InputSweep
+from linkage_ros.kinematics.compiling import Compiled, motion_at, TracedMotion
+from linkage_ros.kinematics.results import LoopClosure, SingularityMargin
+
+
+class WorstStates(NamedTuple):
+    """The worst of many positions: where they miss by most, and nearest to a singularity."""
+
+    residual: float  # In [m]
+    inputs: tuple[float, ...]  # Where that is, in [rad] or [m]
+    positions: int  # How many there are
+    margin: SingularityMargin | None  # The least, of several inputs
+    nearest: tuple[float, ...]  # Where that is
+
+
+def find_worst_states(closure: LoopClosure) -> WorstStates | None:
+    """Return the worst states over the range, or over a grid of several inputs; None if empty."""
+    several = len(closure.linkage.inputs) > 1
+    tried: Iterable[tuple[float, ...]] = inputs_on_grid(closure)
+    if not several:
+        ranges = InputSweep(closure).ranges
+        tried = ((value,) for interval in ranges for value in sample_inputs(interval))
+
+    def measure(motion: TracedMotion) -> Sequence[Sequence[float]]:
+        position = motion.position
+        if not position.status.has_pose:
+            return [[], []]
+        margins = step_margins(closure, position) if several else ()
+        errors = closure.closing_errors(position)
+        return [[0.0, *errors], [1.0, *(each.conditioning for each in margins)]]
+
+    compiled = None
+    if several and not is_iterated(closure):
+        compiled = Compiled(closure, 0, measure, within_limits=False)
+    found = []
+    for inputs in tried:
+        errors, margins = (
+            compiled(*inputs).values if compiled else measure(motion_at(closure, [inputs]))
+        )
+        if errors:
+            found.append((max(map(abs, errors)), round(min(margins), 9), inputs))
+    if not found:
+        return None
+    residual, _, at = max(found, key=itemgetter(0, 2))
+    if not several:
+        return WorstStates(residual, at, len(found), None, ())
+    # Symmetrical linkages have several: the first, whatever the last digits are.
+    nearest = min(found, key=itemgetter(1))[2]
+    margin = closure.singularity_margin(closure.close_unlimited(*nearest))
+    return WorstStates(residual, at, len(found), margin, nearest)
