@@ -69,6 +69,7 @@ class Output(NamedTuple):
 
     name: str
     turning: bool
+    number: int  # Among all published joints
     wanted: OutputSelection  # Its value, rate and acceleration, each in a group
 
 
@@ -80,7 +81,7 @@ def joint_output(closure: LoopClosure, name: str) -> Output:
         end = number + 1
         return [part.joints[number:end] for part in motion if part is not None]
 
-    return Output(name, closure.turning[number], joint_values)
+    return Output(name, closure.turning[number], number, joint_values)
 
 
 class CrankBranch:
@@ -404,12 +405,18 @@ class CrankBranch:
 
 
 class OutputFunction:
-    """An output over the crank, with its slope, both NaN where the linkage does not close."""
+    """
+    An output over the crank, with its slope, both NaN where the linkage does not close.
 
-    def __init__(self, closure: LoopClosure, output: Output) -> None:
-        compiled = Compiled(closure, 1, output.wanted, within_limits=False)
-        self._compiled = compiled
-        self.fast = compiled.fast
+    ``compiled`` has all published joints; without it the output is compiled alone.
+    """
+
+    def __init__(
+        self, closure: LoopClosure, output: Output, compiled: Compiled | None = None
+    ) -> None:
+        self._number = output.number if compiled else 0
+        self._compiled = compiled or Compiled(closure, 1, output.wanted, within_limits=False)
+        self.fast = self._compiled.fast
         self.turning = output.turning
         self.crank_turns = not closure.linkage.inputs[0].slider
         self.size = tau if output.turning else closure.scale
@@ -420,19 +427,24 @@ class OutputFunction:
         values = self.fast(crank, 1.0)
         if values is None:
             values = self._compiled.run_interpreted(crank, 1.0).values
-        (value,), (slope,) = ((*group, nan)[:1] for group in values)
+        value, slope = (group[self._number] if group else nan for group in values)
         return value, slope
 
 
 def crank_branches(
-    closure: LoopClosure, output: Output, *, limited: bool = True
+    closure: LoopClosure,
+    output: Output,
+    *,
+    limited: bool = True,
+    compiled: Compiled | None = None,
 ) -> list[CrankBranch]:
     """
     Return the branches of an output over a single input, by the crank at which they begin.
 
     If ``limited``, limits of joints cut them. An output that does not move raises DefinitionError.
+    ``compiled`` is as in `OutputFunction`: then the branches do not look for cranks.
     """
-    evaluate = OutputFunction(closure, output)
+    evaluate = OutputFunction(closure, output, compiled)
     ranges = InputSweep(closure).ranges if limited else closure.closing_ranges
     branches: list[CrankBranch] = []
     for interval in ranges:

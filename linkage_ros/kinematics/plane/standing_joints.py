@@ -27,6 +27,7 @@ from linkage_ros.kinematics.analysis.crank_branches import crank_branches, joint
 from linkage_ros.kinematics.analysis.singularity_margin import signed_distance
 from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid
 from linkage_ros.kinematics.batch import Array, CODES
+from linkage_ros.kinematics.compiling import Compiled
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 import numpy as np
@@ -47,10 +48,12 @@ _ROUNDS = 100
 def turning_points(closure: StepwiseClosure) -> dict[str, list[float]]:
     """Return for each published joint where it turns back over a single input, in its limits."""
     found: dict[str, list[float]] = {}
+    compiled = Compiled(closure, 1, within_limits=False)
     for name in closure.joint_names:
         places: list[float] = []
+        output = joint_output(closure, name)
         with suppress(DefinitionError):  # It does not move.
-            for branch in crank_branches(closure, joint_output(closure, name)):
+            for branch in crank_branches(closure, output, compiled=compiled):
                 ends = zip((branch.first, branch.last), branch.turns_back, strict=True)
                 for place in (end for end, turns in ends if turns):
                     if all(abs(signed_distance(closure, place, one)) > _SAME for one in places):
