@@ -28,7 +28,7 @@ import re
 from textwrap import wrap
 
 from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import read_linkage
+from linkage_ros.description.linkage_file import read_any_closure
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import DefinitionError
@@ -45,6 +45,9 @@ from linkage_ros.kinematics import (
     RevoluteJoint,
     SlideJoint,
     Slider,
+    SpaceLinkage,
+    SpatialJoint,
+    SpatialMass,
     starts_at_pose,
     usual_inputs,
 )
@@ -59,7 +62,10 @@ _WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
 
 Content = float | str | list['Content'] | dict[str, 'Content']
 
-_IN_ROWS = ('links', 'sliders', 'joints', 'ratios', 'masses')
+_IN_ROWS = (
+    *('links', 'sliders', 'joints', 'ratios', 'masses'),
+    *('points', 'hinges', 'slides', 'struts'),
+)
 """Keys whose parts have a line each, even if short."""
 
 _PART = 0.96
@@ -72,26 +78,29 @@ _SAME = 1e-9
 """Distance beyond the end of a range that still counts as the end, in [rad] or of a length."""
 
 
-def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
+def linkage_text(linkage: Linkage | SpaceLinkage, comment: Sequence[str] = ()) -> str:
     """
     Return the text of a linkage file; ``comment`` has the paragraphs of the comment at the top.
 
     The numbers must be finite and the names printable.
     """
     lines = list(_comment_lines(comment))
-    for key, value in content_of(linkage).items():
+    content = content_of(linkage) if isinstance(linkage, Linkage) else _space_content(linkage)
+    for key, value in content.items():
         lines += _entry_lines(key, value, '', in_rows=key in _IN_ROWS)
     return '\n'.join(lines) + '\n'
 
 
-def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
+def write_linkage(
+    linkage: Linkage | SpaceLinkage, file: str | Path, comment: Sequence[str] = ()
+) -> None:
     """
     Write or replace a linkage file atomically, as `linkage_text`; a symbolic link is followed.
 
     A LinkageError says that it cannot be written, or that its text would not be a valid linkage.
     """
     data = linkage_text(linkage, comment).encode()
-    read_linkage(parse_yaml(data, str(file)))
+    read_any_closure(parse_yaml(data, str(file)))
     atomic_write(file, data)
 
 
@@ -130,6 +139,38 @@ def content_of(linkage: Linkage) -> dict[str, Content]:
     }
     needed = ('links', 'input', 'joints')
     return {key: value for key, value in content.items() if value or key in needed}
+
+
+def _space_content(linkage: SpaceLinkage) -> dict[str, Content]:
+    """Return the content of a spatial file, without optional entries that are empty."""
+    driven = linkage.driven
+    content: dict[str, Content] = {
+        'points': {name: [*place] for name, place in linkage.points.items()},
+        'links': {link: [*points] for link, points in linkage.links.items()},
+        'hinges': {
+            name: _pair_content(joint, {'at': [*joint.at]})
+            for name, joint in linkage.hinges.items()
+        },
+        'slides': {name: _pair_content(joint, {}) for name, joint in linkage.slides.items()},
+        'struts': {name: [*pair] for name, pair in linkage.struts.items()},
+        'input': driven[0] if len(driven) == 1 else [*driven],
+        'joints': [name for name in linkage.published if name not in driven],
+        'ratios': {name: _ratio_content(ratio) for name, ratio in linkage.ratios.items()},
+        'traced': [*linkage.traced],
+        'masses': {link: _body_content(body) for link, body in linkage.masses.items()},
+    }
+    return {key: value for key, value in content.items() if value or key == 'points'}
+
+
+def _pair_content(joint: SpatialJoint, place: dict[str, Content]) -> dict[str, Content]:
+    value: dict[str, Content] = {'value': joint.value} if joint.value else {}
+    ends: dict[str, Content] = {'parent': joint.parent, 'child': joint.child}
+    return {**ends, **place, 'axis': [*joint.axis], **value, **_limits_content(joint.limits)}
+
+
+def _body_content(body: SpatialMass) -> dict[str, Content]:
+    place: dict[str, Content] = {'center': [*body.center], 'inertia': [*body.inertia]}
+    return {'mass': body.mass, **(place if body.mass else {})}
 
 
 def _slider_content(slider: Slider) -> dict[str, Content]:

@@ -14,15 +14,26 @@ import os
 import resource
 
 from hypothesis import example, given, settings, strategies as st
+from linkage_ros import load
 from linkage_ros.description import (
     linkage_text,
     number_text,
     parse_yaml,
+    read_any_closure,
     read_linkage,
     write_linkage,
 )
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import AssemblyPose, Limits, Linkage, Mass, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics import (
+    AssemblyPose,
+    Limits,
+    Linkage,
+    Mass,
+    PoseCorrections,
+    RevoluteJoint,
+    SlideJoint,
+)
+from linkage_ros.resources import spatial_linkage_names
 import pytest
 import yaml
 
@@ -54,6 +65,45 @@ def test_every_shipped_linkage_is_written_as_it_stands(file):
         said = {key: value for key, value in theirs.items() if value != {}}
         assert yaml.safe_load(written) == said
     assert max(map(len, written.splitlines())) <= 99
+
+
+EVERY_KEY = """
+units: mm
+angles: degrees
+points: {P: [300, 30, 100], Q: [100, 20, -100], T: [1500, 0, 400], "no": [1, -0.0, 1.0e-7]}
+links: {ground: [Q], boom: [P, "no"], tip: [T]}
+hinges:
+  boom_joint: {parent: ground, child: boom, at: [0, 0, 0], axis: [0, -1, 0.1], value: 20,
+               limits: [-90, 90], velocity: 100, effort: 7}
+  bucket: {parent: boom, child: tip, at: [1500, 0, 400], axis: [0, -1, 0]}
+slides: {lever: {parent: ground, child: knob, axis: [0, 2, 1], value: 10, limits: [-.inf, 20]}}
+struts: {cylinder: [P, Q]}
+ratios:
+  bucket: {of: cylinder, ratio: 0.002, offset: -32.43163817237363}
+  lever: {of: cylinder, ratio: 0.1, offset: -18.30194339616981}
+input: cylinder
+joints: [lever, boom_joint]
+traced: ["no", T]
+masses:
+  boom: {mass: 3, center: [1, 2, 3], inertia: [1, 0.1, 0.2, 1.1, 0.3, 1.2]}
+  tip: {mass: 0}
+  knob: {mass: 1, center: [0, 0, 0], inertia: [0, 0, 0, 0, 0, 0]}
+"""
+
+
+def spatial_linkage(text: str):
+    """Return a linkage of a file, without what the file does not say."""
+    linkage = read_any_closure(parse_yaml(text.encode(), 'linkage.yaml')).linkage
+    return replace(linkage, corrections=PoseCorrections())
+
+
+@pytest.mark.parametrize('name', [*spatial_linkage_names(), 'every key'])
+def test_a_spatial_linkage_is_read_back_to_the_last_bit(name):
+    linkage = spatial_linkage(EVERY_KEY) if name == 'every key' else load(name).linkage
+    linkage = replace(linkage, corrections=PoseCorrections())
+    written = linkage_text(linkage, ['One.'])
+    assert repr(spatial_linkage(written)) == repr(linkage)
+    assert yaml.safe_load(written) == parse_yaml(written.encode(), 'linkage.yaml').mapping
 
 
 ODD = [
