@@ -25,7 +25,6 @@ from linkage_ros.cli.arguments import (
     output_path as output_path,
     PICTURES as PICTURES,
     read_inputs as read_inputs,
-    read_joint_value as read_joint_value,
     RESULTS as RESULTS,
     robot_of as robot_of,
     SCENE_HELP as SCENE_HELP,

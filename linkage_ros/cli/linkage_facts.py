@@ -93,7 +93,7 @@ def _correction_facts(
         tilt = f'{units.convert(tilted_by):.2g} {units.angle}'
         yield 'parallel', f'axes that are up to {tilt} apart'
     if account['left_out']:
-        yield 'left out, in no loop', ', '.join(account['left_out'])
+        yield 'left out', ', '.join(account['left_out'])
 
 
 def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:

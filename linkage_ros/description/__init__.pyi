@@ -28,6 +28,7 @@ from linkage_ros.description.linkage_file import (
     read_any_closure as read_any_closure,
     read_closure as read_closure,
     read_linkage as read_linkage,
+    urdf_content as urdf_content,
     written_linkage as written_linkage,
 )
 from linkage_ros.description.linkage_grammar import FARTHEST as FARTHEST
@@ -117,14 +118,7 @@ from linkage_ros.description.tables import (
 )
 from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.urdf_file import (
-    MOVING as MOVING,
-    pin_frames as pin_frames,
-    PLACE as PLACE,
     read_urdf as read_urdf,
-    read_urdf_file as read_urdf_file,
-    UrdfFile as UrdfFile,
-    UrdfJoint as UrdfJoint,
-    UrdfLink as UrdfLink,
 )
 from linkage_ros.description.violations import (
     find_violations as find_violations,

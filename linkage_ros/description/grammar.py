@@ -181,20 +181,21 @@ class Together(Rule):
 
 @dataclass(frozen=True, slots=True)
 class InsteadOf(Rule):
-    """A key that stands in place of others, which are needed without it."""
+    """A key that stands in place of others, which are needed without it, or may be written."""
 
     key: str
     others: tuple[str, ...]
+    optional: tuple[str, ...] = ()
 
     def needed_keys(self, content: Section) -> Sequence[str]:
         return (self.key,) if self.key in content else self.others
 
     def unknown_keys(self, content: Section) -> Sequence[str]:
-        return self.others if self.key in content else ()
+        return (*self.others, *self.optional) if self.key in content else ()
 
     def json_schema(self) -> Schema:
         return {
             'if': {'required': [self.key]},
-            'then': {'properties': dict.fromkeys(self.others, False)},
+            'then': {'properties': dict.fromkeys((*self.others, *self.optional), False)},
             'else': {'required': list(self.others)},
         }

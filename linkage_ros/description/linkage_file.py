@@ -96,13 +96,18 @@ def load(
 def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:
     """Return the content of a linkage file or a robot; refuse a scene, and name its linkage."""
     if file.suffix.lower() == '.urdf':
-        return robot_content(Section(str(file), '', {'urdf': str(file), **(robot or {})}), file)
+        return urdf_content(file, robot or {})
     if robot:
         raise FileError(file, '', 'is no URDF', f'leave out {list_names(robot)}')
     content, _ = read_yaml(file)
     if 'linkage' in content or 'linkages' in content:
         raise content.error('', 'is a scene', f'name {_linkage_of(content, file)}')
     return content
+
+
+def urdf_content(file: Path, robot: Mapping[str, Any]) -> Section:
+    """Return the content of a robot, with what is said beside its URDF as in a scene."""
+    return robot_content(Section(str(file), '', {'urdf': str(file), **robot}), file)
 
 
 def robot_content(content: Section, file: Path) -> Section:
@@ -241,7 +246,10 @@ def _parse_linkage(
         name: ratio_in_si(one, units.get(name), units.get(one.of), content.units)
         for name, one in (read('ratios') or {}).items()
     }
-    return Linkage(points, inputs, assembly, published, sliders, traced, pose, masses, ratios)
+    x, y = read('axes')
+    return Linkage(
+        points, inputs, assembly, published, sliders, traced, pose, masses, ratios, axes=(x, y)
+    )
 
 
 def _mass_of(

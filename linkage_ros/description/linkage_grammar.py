@@ -45,6 +45,7 @@ from linkage_ros.description.parameters import (
     Schema,
     text,
     TextOf,
+    whole_number,
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES, Units
@@ -133,6 +134,7 @@ def _coordinate(meaning: str, default: float, unit: str = '') -> Any:
     return number(meaning, default, unit=unit, least=-FARTHEST, most=FARTHEST)
 
 
+_PLANES = ('xy', 'xz', 'yz')
 _LEFT, _AHEAD = ('left', 'right'), ('ahead', 'behind')
 LIMITS = {
     'limits': declare(
@@ -187,7 +189,8 @@ _ENDS = {
     'slider': text('the slider, instead of parent and child', None),
     **LIMITS,
 }
-_SLIDER_OR_LINKS = (InsteadOf('slider', ('parent', 'child')), _SlidesOnSlider())
+_LINKS = ('parent', 'child')
+_SLIDER_OR_LINKS = (InsteadOf('slider', _LINKS), _SlidesOnSlider())
 _INPUT = Keys(
     'The driven joint; several in a list.',
     _build_input,
@@ -197,8 +200,11 @@ _INPUT = Keys(
 _JOINT = Keys(
     "The child's angle less the parent's [rad], or the slide of a slider [m].",
     _build_joint,
-    _ENDS,
-    _SLIDER_OR_LINKS,
+    {
+        **_ENDS,
+        'turns': whole_number('turns that are added to the angle', None, least=-1000, most=1000),
+    },
+    (InsteadOf('slider', _LINKS, ('turns',)), _SlidesOnSlider()),
 )
 _SLIDER = Keys(
     'A point that stays on a line of the link `along`.',
@@ -283,6 +289,7 @@ def _by_name(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
 
 
 WRITTEN_OUT = {
+    'axes': choice('Names of the axes of its plane: those of a robot.', _PLANES, _PLANES[0]),
     'links': declare(
         Named(
             'Links, each with its points; a point on two links is a pin; one link is the ground.',

@@ -120,7 +120,9 @@ def number_text(value: float) -> str:
 def content_of(linkage: Linkage) -> dict[str, Content]:
     """Return the content of the file in its order, without optional entries that are empty."""
     inputs: list[Content] = [_input_content(given) for given in linkage.inputs]
+    axes = ''.join(linkage.axes)
     content: dict[str, Content] = {
+        'axes': '' if axes == 'xy' else axes,
         'links': {
             link: {name: [*point] for name, point in points.items()}
             for link, points in linkage.links.items()
@@ -197,7 +199,8 @@ def _joint_content(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
     limits = _limits_content(joint.limits)
     if isinstance(joint, SlideJoint):
         return {'slider': joint.slider, **limits}
-    return {'parent': joint.parent, 'child': joint.child, **limits}
+    turns: dict[str, Content] = {'turns': joint.turns} if joint.turns else {}
+    return {'parent': joint.parent, 'child': joint.child, **turns, **limits}
 
 
 def _ratio_content(given: Ratio) -> dict[str, Content]:

@@ -11,7 +11,8 @@ Read a robot whose URDF has loops as a spatial linkage: its tree, and what close
 A loop leads from an end of what closes it up the tree to the common ancestor, and down to the
 other end. The joints on such ways are the linkage, and inputs above them. All others are left out,
 and what hangs on them stands still in its own loops: the topmost link of each loop is the ground,
-unless an input carries it. Joints keep their names, signs and zeroes.
+unless an input carries it. Coordinates are in the frame of that link, or of the root if there are
+several. Joints keep their names, signs and zeroes.
 
 The pose has the values of joints that are told, or else 0. If the loops miss it by rounding, the
 joints that are not driven are moved until they close (Newton's method, damped): no length changes.
@@ -20,9 +21,8 @@ joints that are not driven are moved until they close (Newton's method, damped):
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, combinations, islice
 from math import atan2, hypot, inf, remainder, tau
 from typing import Any, NamedTuple
 
@@ -51,6 +51,7 @@ from linkage_ros.description.urdf_file import (
 )
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
 from linkage_ros.kinematics import (
+    CarriedPoints,
     check_limits,
     Closure,
     closure_as_drawn,
@@ -66,6 +67,7 @@ from linkage_ros.kinematics import (
     Limits,
     minus,
     ONE_PLACE,
+    PARALLEL,
     plus,
     PoseCorrections,
     Ratio,
@@ -77,6 +79,7 @@ from linkage_ros.kinematics import (
     SpatialMass,
     turn_about,
     turned_tensor,
+    unit_of,
     Vector,
     ZERO,
 )
@@ -95,6 +98,15 @@ _DAMPING, _MOST_STEPS = 1e-10, 12
 
 _MOST_JOINTS, _MOST_LOOPS = 100, 20
 """Most joints in loops, and most loops: a pose is sought in seconds."""
+
+_LINE = 'line'
+"""What closes a loop by frames SLIDER_on_LINK on the x axis of SLIDER_line_on_LINK."""
+
+_SLIDING = ('slide', _LINE)
+"""What closes a loop but for a slide along the x axis."""
+
+_MOST_TRIED = 20
+"""Most choices of mimics that are tried."""
 
 _NUDGES = (0.0, 0.5)
 """How much joints are moved before a pose is sought, which a stretched one does not lead to."""
@@ -135,7 +147,7 @@ def read_robot_closure(
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
 
-    def close(without: Sequence[str] = ()) -> Closure | SpaceClosure:
+    def close(without: Sequence[str]) -> Closure | SpaceClosure:
         linkage = robot.linkage(publish_inputs, without)
         closure = closure_as_drawn(linkage, name, publish_model_joints=publish_model_joints)
         check_limits(closure)
@@ -143,11 +155,14 @@ def read_robot_closure(
 
     try:
         robot = _Robot(urdf, given['input'], given['at'], given['close'])
-        if robot.needless:
-            # A robot may say roughly by a mimic what its loops do exactly.
-            with suppress(DefinitionError):
-                return close(robot.needless)
-        return close()
+        errors: list[DefinitionError] = []
+        for without in robot.needless_choices(publish_inputs):
+            try:
+                return close(without)
+            except DefinitionError as error:  # noqa: PERF203
+                errors.append(error)
+        # The first is without all; the next the likeliest of as many as are needed.
+        raise errors[:2][-1]
     except DefinitionError as error:
         section, _, part = error.where.partition('.')
         if section in ('input', 'at', 'close', 'pose'):
@@ -173,6 +188,7 @@ class _Robot:
 
     def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
         self._urdf, self._told = urdf, {**urdf.start, **told}
+        self._mount = urdf.root
         self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
         for joint in urdf.joints.values():
             self._above[joint.child] = (joint, *self._above[joint.parent])
@@ -192,7 +208,8 @@ class _Robot:
         groups = self._find_groups()
         groups = [group for group in groups if group[1]] or groups
         tied = set().union(*(names for names, _ in groups))
-        moving = [name for name in urdf.order if urdf.joints[name].kind in MOVING]
+        order = dict.fromkeys((*urdf.start, *urdf.order))
+        moving = [name for name in order if urdf.joints[name].kind in MOVING]
         self._carriers = [name for name in self._driven if name in moving and name not in tied]
         """Inputs in no loop, which carry the loops beyond them."""
         if groups:
@@ -203,11 +220,14 @@ class _Robot:
         self._closed = [loop for loop in self._loops if loop.kind != 'rod']
         self._directed = [loop for loop in self._loops if _is_directed(loop)]
         looped = {name for loop in self._loops for name in self._names_of(loop)}
-        self.needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
+        self._needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
         """Joints that follow others in loops, which may move them as well."""
         kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
         self._check(moving, known, kept, told)
+        children = {urdf.joints[name].child for name in self._moving}
+        mounts = {self._body(urdf.joints[name].parent) for name in self._moving} - children
+        self._mount = mounts.pop() if len(mounts) == 1 else urdf.root
         frames = self._place_links({})
         places = [frames[urdf.joints[name].child].origin for name in self._moving]
         places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
@@ -247,14 +267,21 @@ class _Robot:
         for name in self._driven or ('',):
             if name not in known:
                 reason = 'the robot does not say which joint drives it'
-                reason = f'{quote(name)} is in no loop' if name else reason
                 remedy = f'name one of {list_names(name for name in moving if name in known)}'
+                if name:
+                    reason = f'{quote(name)} is in no loop'
+                else:
+                    remedy += ': input: JOINT in a scene, --input JOINT'
                 raise DefinitionError('input', reason, remedy)
+            if name in self._ratios and name not in self._needless:
+                leader = self._ratios[name].of
+                reason = f'{quote(name)} follows {quote(leader)}'
+                raise DefinitionError('input', reason, f'drive {quote(leader)}')
         if len(kept) > _MOST_JOINTS or len(self._loops) > _MOST_LOOPS:
             reason = f'has {len(kept)} joints in {len(self._loops)} loops that move together'
             raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
         for loop in self._loops:
-            if loop.kind not in LOOP_KINDS.values():
+            if loop.kind not in (*LOOP_KINDS.values(), _LINE):
                 reason = f'{quote(loop.kind)} is no type of what closes a loop'
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
@@ -265,6 +292,37 @@ class _Robot:
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)
+
+    def needless_choices(self, publish_inputs: bool) -> Iterator[list[str]]:
+        """
+        Yield choices of joints that need not follow others, as loops move them.
+
+        A robot may say roughly by a mimic what its loops do exactly. None of these follow, or as
+        many as are needed; those that turn against the link that the followed joint turns against,
+        as gears do, are the first.
+        """
+        yield self._needless
+        if not self._needless:
+            return
+        from linkage_ros.kinematics import find_freedom  # local import: it loads numpy
+
+        linkage = self.linkage(publish_inputs, self._needless)
+        mobility = find_freedom(linkage, CarriedPoints(linkage, unit_of(linkage))).mobility
+        needed = min(max(0, mobility - len(self._driven)), len(self._needless))
+        names = sorted(self._needless, key=lambda name: not self._is_geared(name))
+        for kept in islice(combinations(names, needed), _MOST_TRIED) if needed else ():
+            yield [name for name in self._needless if name not in kept]
+
+    def _is_geared(self, name: str) -> bool:
+        """Return whether a joint turns against a link that the joint that it follows does."""
+        joints = (self._urdf.joints[name], self._urdf.joints[self._ratios[name].of])
+        one, other = ({self._body(of.parent), of.child} for of in joints)
+        return not one.isdisjoint(other)
+
+    def _body(self, link: str) -> str:
+        """Return the link that moves a link, or the root."""
+        moving = (joint.child for joint in self._above[link] if joint.kind != 'fixed')
+        return next(moving, self._urdf.root)
 
     def _read_close(self, asked: str) -> UrdfLoop:
         """Read FRAME=FRAME[:KIND]; the axis of a hinge is the z axis of the first frame."""
@@ -283,11 +341,20 @@ class _Robot:
             ends.append(LoopEnd(link, (x, y, z), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), directed))
         if len(ends) != 2:
             raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
-        return UrdfLoop(pair, kind, (ends[0], ends[1]))
+        body, other = (self._body(end.link) for end in ends)
+        if body == other:
+            reason = f'{quote(asked)} is within {quote(body)}, in which nothing moves'
+            raise DefinitionError('close', reason, 'name frames of two links that move')
+        return UrdfLoop(f'{ends[0].link}_pin', kind, (ends[0], ends[1]))
 
     def _read_pins(self) -> Iterator[UrdfLoop]:
         """Yield the pins that frames called PIN_on_LINK say, and joints that Gazebo closes."""
-        for pin, (first, *others) in pin_frames(self._urdf).items():
+        pins = pin_frames(self._urdf)
+        for pin, (first, *others) in pins.items():
+            slider = pin.removesuffix('_line')
+            if slider != pin and not others and len(pins.get(slider, ())) == 1:
+                ends = LoopEnd(first, ZERO), LoopEnd(pins[slider][0], ZERO)
+                yield UrdfLoop(slider, _LINE, ends)
             for number, other in enumerate(others):
                 ends = LoopEnd(first, ZERO), LoopEnd(other, ZERO)
                 yield UrdfLoop(f'{pin}_{number}' if number else pin, 'ball', ends)
@@ -342,9 +409,11 @@ class _Robot:
     # The pose
 
     def _place_links(self, values: Mapping[str, float]) -> dict[str, SpaceFrame]:
-        """Return the frame of each link at values of the joints, in that of the root."""
-        frames = {self._urdf.root: GROUND_FRAME}
+        """Return the frame of each link on the mount at values of the joints, in its frame."""
+        frames = {self._mount: GROUND_FRAME}
         for joint in self._urdf.joints.values():
+            if joint.parent not in frames:
+                continue
             base = _compose_frames(frames[joint.parent], self._bases[joint.name])
             if value := values.get(joint.name, 0.0):
                 axis = base.turn(direction_of(joint.axis))
@@ -373,9 +442,27 @@ class _Robot:
         for loop in self._closed:
             one, other = (_end_frame(end, frames) for end in loop.ends)
             gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
-            along = dot(gap, axis) if loop.kind == 'slide' else 0.0
-            gaps.append(minus(gap, scale(along, axis)))
+            along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
+            gap = minus(gap, scale(along, axis))
+            if normal := self._normal_of(loop, frames):
+                gap = minus(gap, scale(dot(gap, normal), normal))
+            gaps.append(gap)
         return gaps
+
+    def _normal_of(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> Vector | None:
+        """Return the normal of a loop that moves in a plane: pins may end beside each other."""
+        ways = chain(*self._ways(*(end.link for end in loop.ends)))
+        moving = [joint for joint in ways if joint.kind in MOVING]
+        axes = [frames[joint.child].turn(direction_of(joint.axis)) for joint in moving]
+        slides = [joint.kind == 'prismatic' for joint in moving]
+        if all(slides):
+            return None
+        normal = axes[slides.index(False)]
+        tilts = (
+            abs(dot(axis, normal)) if slide else length(cross(axis, normal))
+            for axis, slide in zip(axes, slides, strict=True)
+        )
+        return normal if max(tilts) < PARALLEL else None
 
     def _turns(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
         """Return by how much the second frame of each directed loop is turned, in [rad]."""
@@ -406,8 +493,10 @@ class _Robot:
         for number, loop in enumerate(loops):
             ways = self._ways(*(end.link for end in loop.ends))
             turns = number >= len(self._closed)
+            slides = loop.kind in _SLIDING and not turns
             for end, way, sign in zip(loop.ends, ways, (-1.0, 1.0), strict=True):
-                place = _end_frame(end, frames).origin
+                # A line is carried along to the place that slides on it.
+                place = _end_frame(loop.ends[1] if slides else end, frames).origin
                 for joint in way:
                     of = ratios.get(joint.name, Ratio(joint.name, 1.0))
                     if of.of in rates and joint.kind in MOVING:
@@ -419,10 +508,10 @@ class _Robot:
                             rate = cross(rate, minus(place, frame.origin))
                         before = rates[of.of][number]
                         rates[of.of][number] = plus(before, scale(sign * of.ratio, rate))
-            if turns and loop.kind == 'hinge':
+            if slides or (turns and loop.kind == 'hinge'):
                 first, _ = loop.ends
                 axis = _end_frame(first, frames).turn(direction_of(first.axis))
-                for row in rates.values():  # The turn about the hinge itself is free.
+                for row in rates.values():  # What moves along or about the axis is free.
                     row[number] = minus(row[number], scale(dot(row[number], axis), axis))
         return [[*chain(*row)] for row in rates.values()]
 
@@ -513,6 +602,7 @@ class _Robot:
         traced = tuple(self._add_traced(on, frames, made))
         published = [k for k in self._moving if k in found and k not in self._driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
+        left_out += [f'mimic of {name}' for name in without]
         linkage = SpaceLinkage(
             *made,
             struts={},
@@ -520,7 +610,7 @@ class _Robot:
             published=(*(self._driven if publish_inputs else ()), *published),
             ratios={name: of for name, of in ratios.items() if name in found},
             traced=traced,
-            left_out=(*left_out, *(f'mimic of {name}' for name in without)),
+            left_out=(*left_out, *(f'{tag} (not read)' for tag in self._urdf.unread)),
             corrections=PoseCorrections(open_by[0], turned_by[0]),
         )
         links = linkage.link_names[1:]
@@ -531,11 +621,10 @@ class _Robot:
     ) -> dict[str, SpatialMass]:
         """Return the masses of links, with what hangs on them and does not move with a loop."""
         parts: dict[str, list[SpatialMass]] = {}
-        for name, link in self._urdf.links.items():
+        for name, body in self._urdf.links.items():
             way = (name, *(joint.parent for joint in self._above[name]))
             carrier = next((on[each] for each in way if on[each] in links), None)
-            if link.inertial is not None and carrier is not None:
-                body = link.inertial
+            if body is not None and carrier is not None:
                 at = _compose_frames(frames[name], _frame(body.xyz, body.rpy))
                 part = SpatialMass(body.mass, at.origin, turned_tensor(at[:3], body.tensor))
                 parts.setdefault(carrier, []).append(part)
@@ -545,8 +634,10 @@ class _Robot:
         self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], made: _LinkageParts
     ) -> Iterator[str]:
         """Add the frames called POINT_on_LINK that meet no other as points of links that move."""
+        ends = {end.link for loop in self._loops for end in loop.ends}
         for point, (frame, *others) in pin_frames(self._urdf).items():
-            if not others and point not in made.points and (link := on[frame]) != GROUND:
+            is_alone = not others and point not in made.points and frame not in ends
+            if is_alone and (link := on[frame]) != GROUND:
                 made.points[point] = frames[frame].origin
                 made.links[link] = (*made.links.get(link, ()), point)
                 yield point
@@ -554,7 +645,9 @@ class _Robot:
     def _limits_in_pose(self, joint: UrdfJoint, value: float, told: float) -> Limits:
         """Return the limits of a joint, whose value in the pose is corrected."""
         turns, limits = joint.kind != 'prismatic', joint.limits
-        if turns and limits.high - limits.low >= tau:  # It does not limit an angle.
+        # A turn or more does not limit an angle, unless an input may turn one way for ever.
+        is_one_way = (limits.low > -inf) != (limits.high < inf) and joint.name in self._driven
+        if turns and limits.high - limits.low >= tau and not is_one_way:
             limits = replace(limits, low=-inf, high=inf)
         if value != told and limits.low <= told <= limits.high:
             # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
@@ -577,6 +670,10 @@ class _Robot:
         if loop.kind in ('hinge', 'slide'):
             joints = made.hinges if loop.kind == 'hinge' else made.slides
             joints[name] = SpatialJoint(on[0], on[1], axes[0], places[0])
+        elif loop.kind == _LINE:
+            across = _end_frame(loop.ends[0], frames).z
+            made.slides[name] = SpatialJoint(on[0], name, axes[0], places[0])
+            made.hinges[f'{name} turn'] = SpatialJoint(name, on[1], across, places[1])
         elif loop.kind == 'universal':
             made.hinges[f'{name} 1'] = SpatialJoint(on[0], name, axes[0], places[0])
             made.hinges[f'{name} 2'] = SpatialJoint(name, on[1], axes[1], places[0])

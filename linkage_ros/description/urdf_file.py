@@ -85,14 +85,6 @@ class Inertial(NamedTuple):
     tensor: tuple[float, float, float, float, float, float]
 
 
-class UrdfLink(NamedTuple):
-    """A link."""
-
-    inertial: Inertial | None  # Its inertial data, or None
-    bodied: bool  # Whether it has a shape or a mass
-    marks: tuple[tuple[str, Vector], ...]  # Names of its visuals, with their positions, in [m]
-
-
 class UrdfJoint(NamedTuple):
     """A joint."""
 
@@ -137,7 +129,7 @@ class UrdfFile(NamedTuple):
     file: str  # Name of the file, for messages
     name: str  # Name of the robot
     root: str  # The link that is not a child
-    links: Mapping[str, UrdfLink]  # Links by name
+    links: Mapping[str, Inertial | None]  # What links weigh, by name
     joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
     order: tuple[str, ...]  # Names of the joints in the order of the file
     inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
@@ -151,12 +143,6 @@ class UrdfFile(NamedTuple):
     pinned: tuple[tuple[str, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
 
-    @property
-    def closings(self) -> list[tuple[str, str]]:
-        """Return the pairs of places that are pins in the plane: LINK.x,y,z."""
-        pins = [loop.ends for loop in self.loops if loop.kind in ('ball', 'hinge')]
-        return [(_place_text(one), _place_text(other)) for one, other in pins]
-
 
 def pin_frames(urdf: UrdfFile) -> dict[str, list[str]]:
     """Return the links that are called PIN_on_LINK and hang on LINK, by pin."""
@@ -166,10 +152,6 @@ def pin_frames(urdf: UrdfFile) -> dict[str, list[str]]:
         if on and name and not parent:
             found.setdefault(name, []).append(joint.child)
     return found
-
-
-def _place_text(end: LoopEnd) -> str:
-    return f'{end.link}.{",".join(map(repr, end.xyz))}'
 
 
 def read_urdf_file(file: Path) -> bytes:
@@ -218,7 +200,7 @@ class _Reader:
                 raise self._file_error(
                     '', 'is written in xacro', 'run first: xacro FILE > FILE.urdf'
                 )
-        links: dict[str, UrdfLink] = {}
+        links: dict[str, Inertial | None] = {}
         for element in root.findall('link'):
             name = self._checked_name(element, links, 'link')
             links[name] = self._read_link(element, f'link {name}')
@@ -257,7 +239,7 @@ class _Reader:
             tuple(dict.fromkeys(_unread_tags(root))),
         )
 
-    def _read_loops(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[UrdfLoop]:
+    def _read_loops(self, root: ET.Element, links: Mapping[str, object]) -> Iterator[UrdfLoop]:
         """Yield what closes loops; of two at one place the first."""
         there = set()
         found = [each for each in root if each.tag in _LOOP_TAGS]
@@ -274,7 +256,7 @@ class _Reader:
             there.add(places)
 
     def _read_loop_ends(
-        self, element: ET.Element, where: str, links: Mapping[str, UrdfLink]
+        self, element: ET.Element, where: str, links: Mapping[str, object]
     ) -> tuple[LoopEnd, LoopEnd]:
         for tags in _LOOP_ENDS:
             # Some write link1 twice.
@@ -298,14 +280,14 @@ class _Reader:
             ends.append(LoopEnd(link, xyz, rpy, way, is_directed))
         return ends[0], ends[1]
 
-    def _read_couplings(self, root: ET.Element, links: Mapping[str, UrdfLink]) -> Iterator[Any]:
+    def _read_couplings(self, root: ET.Element, links: Mapping[str, object]) -> Iterator[Any]:
         for element in root.findall('coupling'):
             where, ratio = f'coupling {element.get("name", "")}', element.find('ratio')
             ends = [self._read_end(element, end, where, links) for end in _LOOP_ENDS[2]]
             yield where, *ends, self._read_values(ratio, 'value', where, 1, '1')[0]
 
     def _pinned_places(
-        self, root: ET.Element, links: Mapping[str, UrdfLink]
+        self, root: ET.Element, links: Mapping[str, object]
     ) -> Iterator[tuple[str, str]]:
         """Yield places on links, and the links that joints of <gazebo> pin them to."""
         for joint in filter(_is_pin_of_gazebo, root.findall('gazebo/joint')):
@@ -351,16 +333,9 @@ class _Reader:
         x, y, z = self._read_values(element, key, where, 3, default)
         return x, y, z
 
-    def _read_link(self, element: ET.Element, where: str) -> UrdfLink:
-        seen = [*element.findall('visual'), *element.findall('collision')]
-        marks = tuple(
-            (each.get('name', ''), self._read_vector(each.find('origin'), 'xyz', where, '0 0 0'))
-            for each in seen
-            if each.get('name')
-        )
+    def _read_link(self, element: ET.Element, where: str) -> Inertial | None:
         inertial = element.find('inertial')
-        weighed = self._read_inertial(inertial, where) if inertial is not None else None
-        return UrdfLink(weighed, bool(seen) or weighed is not None, marks)
+        return None if inertial is None else self._read_inertial(inertial, where)
 
     def _read_inertial(self, element: ET.Element, where: str) -> Inertial | None:
         mass = element.find('mass')
@@ -382,7 +357,7 @@ class _Reader:
         )
 
     def _read_joint(
-        self, element: ET.Element, name: str, links: Mapping[str, UrdfLink]
+        self, element: ET.Element, name: str, links: Mapping[str, object]
     ) -> UrdfJoint:
         where, kind = f'joint {name}', element.get('type', '')
         if kind not in _KINDS:
@@ -440,20 +415,20 @@ class _Reader:
             raise self._file_error(
                 where,
                 f'its limits, {low:g} to {high:g}, leave nothing between them',
-                'correct <limit>, or import with --no-limits',
+                'correct <limit>, or leave lower and upper out',
             )
         rates = [told.get(key, 0.0) for key in ('velocity', 'effort')]
         velocity, effort = (value if value > 0.0 else inf for value in rates)
         return Limits(low, high, velocity, effort)
 
     def _read_end(
-        self, element: ET.Element, end: str, where: str, links: Mapping[str, UrdfLink]
+        self, element: ET.Element, end: str, where: str, links: Mapping[str, object]
     ) -> str:
         found = element.find(end)
         link = found.get('link', '') if found is not None else ''
         return self._checked_link(link, end, where, links)
 
-    def _checked_link(self, link: str, end: str, where: str, links: Mapping[str, UrdfLink]) -> str:
+    def _checked_link(self, link: str, end: str, where: str, links: Mapping[str, object]) -> str:
         if link not in links:
             remedy = did_you_mean(link, links, 'name a link')
             raise self._file_error(where, f'its {end} {quote(link)} is not a link', remedy)
@@ -477,7 +452,7 @@ class _Reader:
                 )
 
     def _order_joints(
-        self, links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint]
+        self, links: Mapping[str, object], joints: Mapping[str, UrdfJoint]
     ) -> tuple[str, list[UrdfJoint]]:
         held: dict[str, UrdfJoint] = {}
         for joint in joints.values():
@@ -524,16 +499,9 @@ def _unread_tags(root: ET.Element) -> Iterator[str]:
             continue
         ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
-    others: dict[str, list[str]] = {}
     for element in root:
-        kind = LOOP_KINDS.get(element.get('type', '').removesuffix('_joint'))
-        if element.tag in _LOOP_TAGS and kind not in ('ball', 'hinge'):
-            others.setdefault(element.tag, []).append(element.get('name', ''))
-        elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
+        if isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
             yield f'<{element.tag}>'
-    for tag, names in others.items():
-        which = 'which are not pins' if names[1:] else 'which is not a pin'
-        yield f'<{tag}> {list_names(names)}, {which}'
 
 
 def _joints_below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:

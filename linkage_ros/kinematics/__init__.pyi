@@ -165,7 +165,6 @@ from linkage_ros.kinematics.plane.standing_joints import (
 )
 from linkage_ros.kinematics.plane.topology import (
     assur_groups as assur_groups,
-    count_mobility as count_mobility,
     Driven as Driven,
     Dyad as Dyad,
     GearedLinks as GearedLinks,
@@ -197,6 +196,7 @@ from linkage_ros.kinematics.space.linkage import (
     ONE_PLACE as ONE_PLACE,
     SpaceLinkage as SpaceLinkage,
     SpatialJoint as SpatialJoint,
+    unit_of as unit_of,
 )
 from linkage_ros.kinematics.space.masses import (
     check_inertia as check_inertia,
@@ -206,6 +206,7 @@ from linkage_ros.kinematics.space.masses import (
     turned_tensor as turned_tensor,
 )
 from linkage_ros.kinematics.space.one_plane import closure_as_drawn as closure_as_drawn
+from linkage_ros.kinematics.space.planar_loops import PARALLEL as PARALLEL
 from linkage_ros.kinematics.space.rod_joints import with_rod_joints as with_rod_joints
 from linkage_ros.kinematics.space.vectors import (
     cross as cross,

@@ -48,7 +48,7 @@ READS = {
     'demo': ([], PARSE),
     'import': (
         ['robot.urdf', '-o', 'x.yaml'],
-        'linkage_ros.tools.models.import_command:read_urdf',
+        'linkage_ros.description.robot_file:read_urdf',
     ),
     'synthesize': (['--pairs', 'pairs.csv'], 'csv:reader'),
 }

@@ -16,7 +16,6 @@ from linkage_ros.description import read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, Limits
 from linkage_ros.tools.models import (
-    linkage_from_urdf,
     ModelPart,
     mujoco_model,
     urdf_model,
@@ -24,6 +23,7 @@ from linkage_ros.tools.models import (
 import mujoco
 import pytest
 
+from ..support.robots import robot_of
 from ..support.scenes import closure_of
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
@@ -57,9 +57,7 @@ GIVEN = {
 @pytest.mark.parametrize('name', GIVEN)
 def test_the_same_limits_come_back(name):
     linkage = closed(GIVEN[name]).linkage
-    made = linkage_from_urdf(
-        read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')
-    ).linkage
+    made = robot_of(urdf_model('it', [ModelPart(Closure(linkage))])).linkage
     assert made.limits == linkage.limits
 
 
@@ -71,9 +69,7 @@ WIDTH = st.floats(0.5, 3.0)
 def test_any_limits_of_the_input_come_back(low, width, rate):
     said = f'limits: [{low!r}, {low + width!r}]' + (f', velocity: {rate!r}' if rate else '')
     linkage = closed(f', input: {{{said}}}').linkage
-    made = linkage_from_urdf(
-        read_urdf(urdf_model('it', [ModelPart(Closure(linkage))]), 'it.urdf')
-    ).linkage
+    made = robot_of(urdf_model('it', [ModelPart(Closure(linkage))])).linkage
     assert made.limits == linkage.limits
 
 
@@ -99,13 +95,13 @@ def test_what_somebody_has_changed_is_kept():
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
             joint.find('limit').set('upper', '2.0')
-    made = linkage_from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
+    made = robot_of(ET.tostring(robot)).linkage
     assert made.limits == {'rocker_joint': Limits(float(limit['lower']), 2.0)}
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
             joint.find('limit').set('lower', '1.0')
             joint.find('limit').set('velocity', '3')
-    made = linkage_from_urdf(read_urdf(ET.tostring(robot), 'it.urdf')).linkage
+    made = robot_of(ET.tostring(robot)).linkage
     assert made.limits == {'rocker_joint': Limits(1.0, 2.0, velocity=3.0)}
     assert limit['upper'] != '2.0'
 
@@ -121,7 +117,7 @@ def without_book(data):
 
 def test_a_urdf_of_ours_without_a_book_has_none():
     data = without_book(urdf_model('it', [ModelPart(closed(''))]))
-    assert linkage_from_urdf(read_urdf(data, 'it.urdf')).linkage.limits == {}
+    assert robot_of(data).linkage.limits == {}
 
 
 def test_a_urdf_of_others_says_limits():
@@ -133,11 +129,9 @@ def test_a_urdf_of_others_says_limits():
             joint.find('limit').attrib.update(lower='-0.5', upper='1.5', effort='4', velocity='0')
     data = ET.tostring(robot)
     at = dict(zip(('coupler_joint', 'rocker_joint'), closed('').position(0.0).joints, strict=True))
-    made = linkage_from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at)
+    made = robot_of(data, input='crank_joint', at=at)
     assert made.linkage.limits['crank_joint'] == Limits(-0.5, 1.5, effort=4.0)
     assert made.linkage.limits['rocker_joint'].velocity == 100.0
-    none = linkage_from_urdf(read_urdf(data, 'it.urdf'), (), ['crank_joint'], at, limits=False)
-    assert none.linkage.limits == {}
 
 
 @pytest.mark.parametrize(('lower', 'upper'), [('2', '1'), ('1', '1')])
@@ -150,7 +144,7 @@ def test_limits_of_a_urdf_that_cross_are_refused(lower, upper):
         read_urdf(ET.tostring(robot), 'it.urdf')
     assert str(error.value) == (
         f'it.urdf: joint rocker_joint: its limits, {lower} to {upper}, leave nothing between '
-        'them; correct <limit>, or import with --no-limits'
+        'them; correct <limit>, or leave lower and upper out'
     )
 
 

@@ -11,12 +11,9 @@
 from math import hypot, remainder, tau
 from random import Random
 
-from linkage_ros.description import read_urdf
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, InputSweep, Ratio, sample_inputs
 from linkage_ros.tools.models import (
-    ImportedLinkage,
-    linkage_from_urdf,
     ModelPart,
     mujoco_model,
     urdf_model,
@@ -27,6 +24,7 @@ import pytest
 from .test_import import joint, weighed
 from .walked import Walked
 from ..kinematics.test_ratios import geared_five_bar, rack_and_pinion
+from ..support.robots import robot_of
 from ..support.scenes import closure_of, LINKAGES
 
 MOTOR = '<mimic joint="left_joint" multiplier="{}" offset="{}"/>'
@@ -57,10 +55,11 @@ def hand(random: Random, multiplier: float, offset: float, axis: str) -> tuple[s
     return f'<robot name="hand">{"".join(parts)}</robot>', places
 
 
-def imported(text: str, places: list[str], **options: object) -> ImportedLinkage:
-    close = list(zip(places[::2], places[1::2], strict=True))
-    urdf_file = read_urdf(text.encode(), 'h.urdf')
-    return linkage_from_urdf(urdf_file, close, ['left_joint'], **options)  # type: ignore[arg-type]
+def hand_of(text: str, places: list[str], **told: object) -> Closure:
+    """Return the linkage of a hand whose places meet."""
+    close = [f'{one}={other}' for one, other in zip(places[::2], places[1::2], strict=True)]
+    closure: Closure = robot_of(text, close=close, input='left_joint', **told)
+    return closure
 
 
 @pytest.mark.parametrize('axis', ['0 0 1', '0 0 -1'])
@@ -70,10 +69,9 @@ def test_mimic_becomes_a_ratio(multiplier: float, offset: float, axis: str) -> N
     random = Random(f'{multiplier} {offset} {axis}')
     for _ in range(3):
         text, places = hand(random, multiplier, offset, axis)
-        made = imported(text, places, at={'right_joint': offset})
-        assert made.left_out == ()
-        assert made.linkage.ratios == {'right_joint': Ratio('left_joint', multiplier, offset)}
-        closure = Closure(made.linkage)
+        closure = hand_of(text, places, at={'right_joint': offset})
+        assert closure.linkage.left_out == ()
+        assert closure.linkage.ratios == {'right_joint': Ratio('left_joint', multiplier, offset)}
         walked = Walked(text.replace(MOTOR.format(multiplier, offset), '').encode())
         for motor in (-0.05, 0.0, 0.04):
             joints = closure.position(motor).joints
@@ -97,9 +95,9 @@ def test_mimics_that_the_loops_move_are_named() -> None:
         '</joint><joint name="right_tip_joint"',
         f'{MOTOR.format(0.9, 0.0)}</joint><joint name="right_tip_joint"',
     )
-    made = imported(text, places)
-    assert set(made.linkage.ratios) == {'right_joint'}
-    assert made.left_out == ('mimic of right_in_joint: the loops move it',)
+    linkage = hand_of(text, places).linkage
+    assert set(linkage.ratios) == {'right_joint'}
+    assert linkage.left_out == ('mimic of right_in_joint',)
 
 
 def test_mimic_alone_needs_no_loop() -> None:
@@ -112,15 +110,16 @@ def test_mimic_alone_needs_no_loop() -> None:
         + joint('rack_joint', 'base', 'rack', '0 0.012 0', '', 'prismatic', '1 0 0', mimic)
         + '</robot>'
     ).replace('rpy=""', '')
-    made = linkage_from_urdf(read_urdf(text.encode(), 'r.urdf'), [], ['pinion_joint'])
-    assert Closure(made.linkage).position(2.0)['rack_joint'] == pytest.approx(0.025, rel=1e-15)
+    assert robot_of(text, input='pinion_joint').position(2.0)['rack_joint'] == pytest.approx(
+        0.025, rel=1e-15
+    )
 
 
 def test_place_on_no_link_is_refused() -> None:
     """One line says which links there are."""
     text, places = hand(Random(1), -1.0, 0.0, '0 0 1')
     with pytest.raises(FileError, match='there is no link'):
-        imported(text, [places[0].replace('left_tip', 'left_top'), *places[1:]])
+        hand_of(text, [places[0].replace('left_tip', 'left_top'), *places[1:]])
 
 
 SHAPES = {
@@ -137,8 +136,9 @@ def test_urdf_there_and_back(name: str) -> None:
     """The ratio is a mimic, and the joints come back the same."""
     closure = Closure(SHAPES[name]())
     data = urdf_model('r', [ModelPart(closure)])
-    again = Closure(linkage_from_urdf(read_urdf(data, 'r.urdf')).linkage)
-    assert again.linkage.ratios == closure.linkage.ratios
+    again = robot_of(data)
+    # Frames of the model that turn with links follow as well.
+    assert again.linkage.ratios.items() >= closure.linkage.ratios.items()
     for interval in InputSweep(closure).ranges:
         for value in sample_inputs(interval, 24)[1:-1]:
             here, there = closure.position(value), again.position(value)

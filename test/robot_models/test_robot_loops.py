@@ -248,18 +248,6 @@ def test_rods_may_be_links_without_a_joint(tmp_path):
         assert joints == pytest.approx((found['m1'], found['m2']), abs=1e-14)
 
 
-def test_a_planar_loop_is_that_of_the_planar_import(tmp_path, capsys):
-    pose = [f'--at={name}={value}' for name, value in KNEE.items()]
-    file = str(tmp_path / 'planar.yaml')
-    assert main(['import', str(ROBOTS / 'four_bar.urdf'), '--input', 'crank_joint', *pose,
-                 '-o', file]) == 0  # fmt: skip
-    planar, closure = load(file), load(ROBOTS / 'four_bar.urdf', CHOICES['four_bar'][0])
-    for inputs in near_pose(closure, 3.0, 30):
-        joints = planar.position(*inputs).joints
-        away = np.subtract(closure.position(*inputs).joints, joints)
-        assert np.abs(np.remainder(away + np.pi, 2 * np.pi) - np.pi).max() < 1e-12
-
-
 MOTOR = '<link name="rotor"/><joint name="motor" type="continuous"><parent link="arm"/>'
 MOTOR += '<child link="rotor"/><axis xyz="0 1 0"/></joint>'
 COUPLED = '<coupling name="gear"><predecessor link="{}"/><successor link="{}"/>{}</coupling>'

@@ -54,6 +54,7 @@ traced: [A]
     'plane': """
 units: mm
 angles: degrees
+axes: xz
 links:
   ground: {O2: [0, 0], O4: [100, 0]}
   crank: {O2: [0, 0], A: [40, 0]}
@@ -63,7 +64,7 @@ input: {joint: crank_joint, parent: ground, child: crank, limits: [0, 90], veloc
 pose: {inputs: [30], points: {B: [120, 80]}}
 joints:
   rocker_joint: {parent: ground, child: rocker, limits: [0, 180], velocity: 9, effort: 9}
-  coupler_joint: {parent: crank, child: coupler}
+  coupler_joint: {parent: crank, child: coupler, turns: -1}
 ratios: {}
 """,
     'geared': """

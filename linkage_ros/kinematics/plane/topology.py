@@ -172,12 +172,6 @@ def assur_groups(linkage: Linkage) -> Structure:
     return structure
 
 
-def count_mobility(linkage: Linkage) -> int:
-    """Return the degrees of freedom by Grübler's count, with the inputs free."""
-    links, blocks, joints = _links_and_joints(linkage)
-    return Structure(links, blocks, (), joints, len(linkage.ratios)).mobility
-
-
 def _links_and_joints(
     linkage: Linkage,
 ) -> tuple[dict[str, Mapping[str, Point]], dict[str, str], tuple[Joint, ...]]:

@@ -7,18 +7,12 @@
 # language governing permissions and limitations under the License.
 
 from linkage_ros.tools.models.array_functions import make_array_functions as make_array_functions
-from linkage_ros.tools.models.from_urdf import (
-    ImportedLinkage as ImportedLinkage,
-    linkage_from_urdf as linkage_from_urdf,
-)
 from linkage_ros.tools.models.mjcf import mujoco_model as mujoco_model
-from linkage_ros.tools.models.onto import urdf_onto as urdf_onto
 from linkage_ros.tools.models.part import (
     ModelPart as ModelPart,
     PartError as PartError,
     prefix_names as prefix_names,
 )
-from linkage_ros.tools.models.planar import find_pinned as find_pinned
 from linkage_ros.tools.models.robot_model_command import model_of as model_of
 from linkage_ros.tools.models.scene_model import make_scene_model as make_scene_model
 from linkage_ros.tools.models.tree import grow_tree as grow_tree, Tree as Tree

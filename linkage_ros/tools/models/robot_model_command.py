@@ -16,7 +16,6 @@ bodies, masses, springs and the closed loops.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 import sys
 from threading import Event
@@ -28,13 +27,10 @@ from linkage_ros.description import (
     kind_of,
     read_any_closure,
     read_closure,
-    read_urdf,
-    read_urdf_file,
     read_yaml,
 )
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
-from linkage_ros.tools.models.onto import urdf_onto
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.scene_model import make_scene_model, Write
 from linkage_ros.tools.models.urdf import urdf_model
@@ -54,36 +50,13 @@ EXAMPLE = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('file', metavar='SCENE', help=SCENE_HELP)
-    command = parser.get_default('command')
-    add_output(parser, SUFFIXES[command], 'the model is printed')
-    if command == 'urdf':
-        parser.add_argument(
-            '--onto',
-            type=Path,
-            metavar='URDF',
-            help='the robot that the linkage was imported from: keep it as it is, and add only '
-            'what closes the loops',
-        )
+    add_output(parser, SUFFIXES[parser.get_default('command')], 'the model is printed')
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the model."""
-    write = WRITERS[arguments.command]
-    if arguments.command == 'urdf' and arguments.onto:
-        write = _writer_onto(arguments.onto)
-    write_or_print(model_of(arguments.file, write), arguments.output)
+    write_or_print(model_of(arguments.file, WRITERS[arguments.command]), arguments.output)
     return 0
-
-
-def _writer_onto(file: Path) -> Write:
-    """Return a writer that keeps a robot as it is, and adds what closes the loops."""
-    data = read_urdf_file(file)
-    robot = read_urdf(data, str(file))
-
-    def write(_: str, parts: Sequence[ModelPart]) -> bytes:
-        return urdf_onto(robot, data, parts)
-
-    return write
 
 
 def model_of(named: str, write: Write) -> bytes:

@@ -309,8 +309,8 @@ def _write_linkage(robot: ET.Element, model: _Model) -> None:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
         mimic = followed.get(of, Ratio(of, 1.0) if joint.mimics else None)
-        computed[of] = add_joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
-    start = start_element(model.part.closure, names, computed)
+        computed[of] = _add_joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
+    start = _start_element(model.part.closure, names, computed)
     if start is not None:
         robot.append(start)
 
@@ -358,7 +358,7 @@ def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex)
             ET.SubElement(material, 'color', rgba=format_numbers(*body.colour))
 
 
-def add_joint(
+def _add_joint(
     robot: ET.Element,
     joint: TreeJoint,
     span: AngleSpan | None,
@@ -395,14 +395,14 @@ def _write_origin(element: ET.Element, place: complex, turn: float = 0.0) -> Non
     ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
 
 
-def start_element(
+def _start_element(
     closure: Closure, names: PrefixedNames, computed: Mapping[str, Mapping[str, str]]
 ) -> ET.Element | None:
     """
     Return the data that URDF has no elements for: the inputs, and a pose that closes the loops.
 
-    It also tells which joint limits were made up. Readers of URDF ignore unknown elements;
-    ``linkage import`` reads these. None if several inputs do not close where each is in range.
+    It also tells which joint limits were made up. Readers of URDF ignore unknown elements; every
+    command reads these. None if several inputs do not close where each is in range.
     """
     inputs = usual_inputs(closure)
     given = zip(closure.linkage.inputs, inputs, strict=True)
