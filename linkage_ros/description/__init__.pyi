@@ -23,10 +23,12 @@ from linkage_ros.description.linkage_file import (
     checked_closure as checked_closure,
     find_assemblies as find_assemblies,
     find_closures as find_closures,
+    is_planar_file as is_planar_file,
     linkage_content as linkage_content,
     load as load,
     read_any_closure as read_any_closure,
     read_closure as read_closure,
+    read_content as read_content,
     read_linkage as read_linkage,
     urdf_content as urdf_content,
     written_linkage as written_linkage,
@@ -38,6 +40,7 @@ from linkage_ros.description.linkage_writer import (
     number_text as number_text,
     pose_text as pose_text,
     scene_text_for as scene_text_for,
+    text_in_plane as text_in_plane,
     write_linkage as write_linkage,
 )
 from linkage_ros.description.notes import (

@@ -61,8 +61,8 @@ _MOST_SIDES = 5
 
 
 def looks_like_linkage(content: Section) -> bool:
-    """Return whether a file of unknown kind has the keys of a linkage."""
-    return any(key in content for key in ('links', 'points', *SHORTHANDS))
+    """Return whether a file of unknown kind has the keys of a linkage, or of a robot."""
+    return any(key in content for key in ('links', 'points', 'urdf', *SHORTHANDS))
 
 
 def load(
@@ -93,13 +93,19 @@ def load(
     return read_any_closure(linkage_content(file, robot), file.stem)
 
 
-def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:
-    """Return the content of a linkage file or a robot; refuse a scene, and name its linkage."""
+def read_content(file: Path, robot: Mapping[str, Any] | None = None) -> tuple[Section, bytes]:
+    """Return the content of a file, also of a robot, and its bytes."""
     if file.suffix.lower() == '.urdf':
-        return urdf_content(file, robot or {})
+        content = urdf_content(file, robot or {})
+        return content, content.named_data
     if robot:
         raise FileError(file, '', 'is no URDF', f'leave out {list_names(robot)}')
-    content, _ = read_yaml(file)
+    return read_yaml(file)
+
+
+def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:
+    """Return the content of a linkage file or a robot; refuse a scene, and name its linkage."""
+    content, _ = read_content(file, robot)
     if 'linkage' in content or 'linkages' in content:
         raise content.error('', 'is a scene', f'name {_linkage_of(content, file)}')
     return content
@@ -181,9 +187,14 @@ def read_closure(content: Section, name: str = '', *, publish_inputs: bool = Fal
     return checked_closure(content, linkage, name, shorthand)
 
 
+def is_planar_file(content: Section) -> bool:
+    """Return whether a linkage is written as a planar one: neither a robot nor in space."""
+    return not (is_spatial(content) or 'urdf' in content)
+
+
 def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[Linkage, str]:
     """Return a linkage as it is written, and the shorthand that it is written in, or ''."""
-    if is_spatial(content) or 'urdf' in content:
+    if not is_planar_file(content):
         key = 'urdf' if 'urdf' in content else 'points'
         raise content.error(key, 'make it a spatial linkage', PLANAR_ONLY)
     content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))

@@ -10,8 +10,12 @@
 
 from io import BytesIO
 from math import cos, pi, sin
+from pathlib import Path
+import re
 
 from linkage_ros import load
+from linkage_ros.cli.main import main
+from linkage_ros.description import write_linkage
 from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.kinematics import Closure, SpaceClosure, Status, usual_inputs
 from linkage_ros.resources import linkage_names
@@ -195,3 +199,57 @@ def test_its_motor_has_the_effort_of_the_planar_files(tmp_path, name):
         mechanics = Mechanics(closure, Loads((0.3, -9.81)))
         efforts += mechanics.drive_efforts(position, velocity, acceleration)
     assert efforts[1] == pytest.approx(efforts[0], rel=1e-11)
+
+
+LINKS = Path(__file__).parents[1] / 'kinematics' / 'space' / 'linkages'
+ROBOTS = Path(__file__).with_name('robots')
+DRAWN = {
+    'robot': (ROBOTS / 'palletizer.urdf', ['--input=shoulder', '--input=counterweight']),
+    'spatial file': (LINKS / 'four_bar.yaml', []),
+}
+OUTPUTS = {
+    'parts': (['draw'], 'x.dxf'),
+    'animation': (['animate', '--seconds=1'], 'x.gif'),
+    'engine': (['mjcf'], 'x.xml'),
+    'page': (['view'], 'x.html'),
+    'assemblies': (['draw', '--assemblies'], 'x.svg'),
+}
+
+
+@pytest.mark.parametrize('output', OUTPUTS)
+@pytest.mark.parametrize('source', DRAWN)
+def test_what_takes_planar_files_alone_takes_what_lies_in_a_plane(
+    tmp_path, monkeypatch, source, output, capsys
+):
+    """The output is that of the planar file with the same content and name."""
+    monkeypatch.chdir(tmp_path)
+    (file, told), (command, name) = DRAWN[source], OUTPUTS[output]
+    (planar := tmp_path / 'planar' / f'{file.stem}.yaml').parent.mkdir()
+    robot = {'input': [one.partition('=')[2] for one in told]} if told else None
+    write_linkage(load(file, robot).linkage, planar, [f'From {file.name}.'])
+    found = []
+    for given in ([str(file), *told], [str(planar)]):
+        assert main([*command, *given, '-o', name, '--force']) == 0
+        # A DXF has identifiers of its own and the time.
+        found.append(
+            re.sub(
+                rb'{[-0-9A-F]{36}}|\d{7}\.\d+|\d+-\d+-\d+T[\d:.+]+',
+                b'',
+                (tmp_path / name).read_bytes(),
+            )
+        )
+    assert found[0] == found[1]
+    capsys.readouterr()
+    spatial = [str(ROBOTS / 'ankle.urdf'), '--input=pitch', '--input=roll', '-o', f'y{name}']
+    assert main([*command, *spatial]) == 2
+    assert 'ankle.urdf: is a spatial linkage; ' in capsys.readouterr().err
+
+
+def test_a_scene_of_a_robot_in_a_plane_has_a_page(tmp_path):
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(
+        f'linkage: {{urdf: {ROBOTS / "palletizer.urdf"}, input: [shoulder, counterweight]}}\n'
+        'drive: {topic: {}}\n'
+    )
+    assert main(['view', str(scene), '-o', str(tmp_path / 'x.html')]) == 0
+    assert 'counterweight' in (tmp_path / 'x.html').read_text('utf-8')

@@ -27,23 +27,33 @@ from linkage_ros.cli import (
     add_at,
     add_file,
     add_output,
+    add_robot,
     bounded_number,
     DEGREES,
     output_or,
     PICTURES,
     read_inputs,
+    robot_of,
 )
 from linkage_ros.description import (
     atomic_write,
-    find_assemblies,
+    find_closures,
+    is_planar_file,
     linkage_content,
+    linkage_text,
+    parse_yaml,
     pose_text,
     read_any_closure,
-    read_yaml,
-    written_linkage,
+    Section,
 )
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Closure, prepare_view, read_drawn_pose, usual_inputs
+from linkage_ros.kinematics import (
+    Closure,
+    prepare_view,
+    read_drawn_pose,
+    SpaceClosure,
+    usual_inputs,
+)
 from linkage_ros.resources import named_file
 from linkage_ros.tools.drawing.dxf import links_dxf
 from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture
@@ -54,6 +64,7 @@ EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_file(parser)
+    add_robot(parser)
     add_output(parser, (*PICTURES, '.dxf'), 'FILE.png in this folder')
     add_at(
         parser,
@@ -94,20 +105,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
     named = named_file(arguments.file, 'linkages')
-    content = linkage_content(named)
+    content = linkage_content(named, robot_of(arguments))
     is_dxf = arguments.output and arguments.output.suffix.lower() == '.dxf'
-    if 'points' in content and (arguments.assemblies or is_dxf):
+    # The sides of a planar file are all chosen, and need not be written.
+    chosen = arguments.assemblies and is_planar_file(content)
+    closure: Any = None if chosen else read_any_closure(content, named.stem)
+    spatial = isinstance(closure, SpaceClosure)
+    if spatial and (arguments.assemblies or is_dxf):
         remedies = [
             *(['leave --assemblies out'] if arguments.assemblies else []),
             *([f'write -o {arguments.output.with_suffix(".svg")}'] if is_dxf else []),
         ]
         raise LinkageError(arguments.file, 'is a spatial linkage', ', and '.join(remedies))
-    for option in () if 'points' in content else ('azimuth', 'elevation'):
+    for option in () if spatial else ('azimuth', 'elevation'):
         if getattr(arguments, option) is not None:
             raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
     if arguments.assemblies:
-        return _draw_assemblies(arguments)
-    closure: Any = read_any_closure(content, named.stem)
+        if not chosen:
+            content = parse_yaml(linkage_text(closure.linkage).encode(), content.file)
+        return _draw_assemblies(arguments, content)
     if is_dxf:
         return _write_parts(closure, arguments)
     for option in ('width', 'hole'):
@@ -138,12 +154,10 @@ def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _draw_assemblies(arguments: argparse.Namespace) -> int:
+def _draw_assemblies(arguments: argparse.Namespace, content: Section) -> int:
     """Draw all assemblies at the same inputs; one that is open there, at inputs of its own."""
-    found = list(find_assemblies(arguments.file).values())
+    found = list(find_closures(content, Path(arguments.file).stem).values())
     first = found[0]
-    content, _ = read_yaml(named_file(arguments.file, 'linkages'))
-    written_linkage(content)  # it sets the units
     units = arguments.angles = DEGREES.of_file(content.units)
     if arguments.at:
         pose = read_inputs(first.linkage, arguments.at[0], '--at', units)

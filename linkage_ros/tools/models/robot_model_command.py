@@ -16,19 +16,20 @@ bodies, masses, springs and the closed loops.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli import add_output, SCENE_HELP
+from linkage_ros.cli import add_output, add_robot, robot_of, SCENE_HELP
 from linkage_ros.description import (
     atomic_write,
     kind_of,
     read_any_closure,
-    read_closure,
-    read_yaml,
+    read_content,
 )
+from linkage_ros.kinematics import check_planar
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.part import ModelPart, PartError
@@ -50,33 +51,35 @@ EXAMPLE = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('file', metavar='SCENE', help=SCENE_HELP)
+    add_robot(parser)
     add_output(parser, SUFFIXES[parser.get_default('command')], 'the model is printed')
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the model."""
-    write_or_print(model_of(arguments.file, WRITERS[arguments.command]), arguments.output)
+    write, robot = WRITERS[arguments.command], robot_of(arguments)
+    write_or_print(model_of(arguments.file, write, robot), arguments.output)
     return 0
 
 
-def model_of(named: str, write: Write) -> bytes:
+def model_of(named: str, write: Write, robot: Mapping[str, Any] | None = None) -> bytes:
     """
-    Return the model of a linkage or scene, given by its file or its shipped name.
+    Return the model of a linkage, robot or scene, given by its file or its shipped name.
 
     Linkages of a scene are those that the node would solve, with the deviations of their parts.
     """
     file = named_file(named, 'linkages', 'scenes')
-    content, _ = read_yaml(file)
+    content, _ = read_content(file, robot)
     if kind_of(content) == 'scene':
         from linkage_ros.description import load_scene
         from linkage_ros.tick import Pipeline
 
         scene = load_scene(file)
         return make_scene_model(scene, Pipeline(scene).closures, write)
-    if write is urdf_model:
-        closure: Any = read_any_closure(content, publish_model_joints=True)
-    else:
-        closure = read_closure(content)
+    is_urdf = write is urdf_model
+    closure: Any = read_any_closure(content, file.stem, publish_model_joints=is_urdf)
+    if not is_urdf:
+        check_planar(content.file, closure.linkage)
     try:
         return write(file.stem, [ModelPart(closure)])
     except PartError as error:

@@ -21,7 +21,14 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.bag import is_bag_name, layout_of
-from linkage_ros.cli import add_output, open_bag, output_or, show_progress
+from linkage_ros.cli import (
+    add_output,
+    add_robot,
+    open_bag,
+    output_or,
+    robot_of,
+    show_progress,
+)
 from linkage_ros.description import linkage_content, read_any_closure
 from linkage_ros.kinematics import check_planar, prepare_view, usual_inputs
 from linkage_ros.resources import named_file
@@ -55,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'how long it lasts; without it {_TURN:g} s, or as long as the run, up to 10 s',
     )
     add_window(parser)
+    add_robot(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -83,9 +91,9 @@ def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> Ani
         trusted = arguments.trust_effects
         found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
         return find_run_motion(found, scene.name if scene else given.name, arguments.seconds)
-    content = linkage_content(named_file(arguments.file, 'linkages'))
+    content = linkage_content(named_file(arguments.file, 'linkages'), robot_of(arguments))
     closure: Any = read_any_closure(content, given.stem)
-    check_planar(closure.name, closure.linkage)
+    check_planar(arguments.file, closure.linkage)
     shown = prepare_view(closure, usual_inputs(closure))._replace(length=content.units.length)
     seconds = _TURN if arguments.seconds is None else arguments.seconds
     return range_motion(shown, given.stem, seconds)

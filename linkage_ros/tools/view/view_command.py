@@ -18,6 +18,7 @@ the report. With -o it is written to a file, where it moves without a server and
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 import os
 from pathlib import Path
 import sys
@@ -26,8 +27,16 @@ from typing import Any, NamedTuple
 import webbrowser
 
 from linkage_ros.bag import is_bag_name
-from linkage_ros.cli import add_output
-from linkage_ros.description import kind_of, load_scene, read_closure, read_yaml, SCENE_FILE
+from linkage_ros.cli import add_output, add_robot, robot_of
+from linkage_ros.description import (
+    kind_of,
+    load_scene,
+    read_closure,
+    read_content,
+    read_yaml,
+    SCENE_FILE,
+    text_in_plane,
+)
 from linkage_ros.errors import (
     check_installed,
     escape_unprintable,
@@ -65,6 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--no-browser', action='store_true', help='print the address only, and open no browser'
     )
+    add_robot(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -96,27 +106,34 @@ class _NamedLinkage(NamedTuple):
     path: Path
     data: bytes
     scene: tuple[str, dict[str, str], str] | None
+    is_planar_file: bool  # Whether the page can save into the file
 
 
-def _read_linkage(named: str) -> _NamedLinkage:
+def _read_linkage(named: str, robot: Mapping[str, Any]) -> _NamedLinkage:
     """Read a linkage, or the first one of a scene; errors name the file."""
     file = named_file(named, 'linkages', 'scenes')
-    content, data = read_yaml(file)
+    content, data = read_content(file, robot)
     if kind_of(content) == 'linkage':
+        if text := text_in_plane(content, file.stem):
+            return _NamedLinkage(file.stem, file, text.encode(), None, is_planar_file=False)
         read_closure(content, file.stem)
-        return _NamedLinkage(file.stem, file, data, None)
+        return _NamedLinkage(file.stem, file, data, None, is_planar_file=True)
     scene = load_scene(file)
     for each in scene.linkages:
         check_planar(scene.name, each.linkage)
-    path = Path(scene.linkages[0].linkage_content.file)
+    content = scene.linkages[0].linkage_content
+    path = Path(content.file)
+    if text := text_in_plane(content, path.stem):
+        # Its sensors read a linkage file.
+        return _NamedLinkage(path.stem, path, text.encode(), None, is_planar_file=False)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
     folder = str(Path(scene.folder).absolute())
-    return _NamedLinkage(path.stem, path, first, (scene.name, texts, folder))
+    return _NamedLinkage(path.stem, path, first, (scene.name, texts, folder), is_planar_file=True)
 
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
-    shown = _read_linkage(arguments.file)
+    shown = _read_linkage(arguments.file, robot_of(arguments))
     from linkage_ros.tools.view.model import build_model
     from linkage_ros.tools.view.page import page_html
 
@@ -128,7 +145,7 @@ def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:
     from linkage_ros.tools.view.sensors import SceneFiles
 
     shipped = arguments.file in (*linkage_names(), *scene_names())
-    file = None if shipped else UserFile(shown.path)
+    file = UserFile(shown.path) if shown.is_planar_file and not shipped else None
     scene = None if shown.scene is None else SceneFiles(*shown.scene)
     pages = _Pages(shown, file)
     pages()  # an error ends this command before a browser opens
