@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -48,6 +48,7 @@ from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.freedom import Freedom
+    from linkage_ros.kinematics.space.point_tracker import SpatialTracker
 
 Quaternion = tuple[float, float, float, float]
 
@@ -257,6 +258,20 @@ class SpaceClosure(StepwiseClosure):
                 )
                 found[point] = (place, rate, change)
         return found
+
+    def point_tracker(
+        self, points: Sequence[tuple[str, Vector]], links: Sequence[str] = ()
+    ) -> SpatialTracker:
+        """
+        Return a tracker of certain points of links, and of the turns of certain links.
+
+        Each point is the name of its link and its place in the pose, in [m].
+        """
+        from linkage_ros.kinematics.space.point_tracker import (
+            SpatialTracker,  # local import: only forces need it
+        )
+
+        return SpatialTracker(self._plan, points, links)
 
     def frames(self, position: Position) -> dict[str, tuple[Vector, Quaternion]]:
         """
