@@ -7,6 +7,7 @@
 # language governing permissions and limitations under the License.
 
 from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
+from linkage_ros.dynamics.equation import Mechanics as Mechanics, Terms as Terms
 from linkage_ros.dynamics.integrators import (
     gauss_legendre as gauss_legendre,
     GAUSS_MATRIX as GAUSS_MATRIX,
@@ -36,7 +37,6 @@ from linkage_ros.dynamics.loads import (
     WrenchLoad as WrenchLoad,
 )
 from linkage_ros.dynamics.longest_step import EXACT as EXACT
-from linkage_ros.dynamics.mechanics import Mechanics as Mechanics, Terms as Terms
 from linkage_ros.dynamics.motion import (
     LARGEST as LARGEST,
     last_before as last_before,

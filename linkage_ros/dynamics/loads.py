@@ -14,12 +14,16 @@ Points are named by link and point. SI units throughout.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from linkage_ros.description import choice, each_part, number, number_rows, point, text
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics import SpaceLinkage
 
 GREATEST_LOAD, STIFFEST = 1e9, 1e12
 """Bounds on loads, in [N], [N·m], [m] and [kg·m²], and on stiffness and damping, in SI units."""
@@ -187,8 +191,8 @@ class AppliedLoads:
 class Loads:
     """Gravity, springs, the inertia of the drive, and the loads on joints and points."""
 
-    # Acceleration of gravity in the frame of the ground, in [m/s²].
-    gravity: tuple[float, float] = (0.0, 0.0)
+    # Acceleration of gravity in the frame of the ground, in [m/s²]; in space of three numbers.
+    gravity: tuple[float, ...] = (0.0, 0.0)
     springs: tuple[Spring, ...] = ()  # All springs
     # Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
     drive_inertia: float = 0.0
@@ -255,7 +259,7 @@ class Friction:
         return next((name for name, joint in self.joints.items() if joint.coefficient), '')
 
 
-def check_masses(linkage: Linkage, loads: Loads) -> None:
+def check_masses(linkage: Linkage | SpaceLinkage, loads: Loads) -> None:
     """
     Refuse a linkage in which a link that moves has no mass; the error has the key ``masses``.
 
@@ -263,23 +267,41 @@ def check_masses(linkage: Linkage, loads: Loads) -> None:
     """
     if not linkage.masses and loads.without_masses:
         return
-    for link in linkage.links:
+    for link in linkage.link_names:
         if link != GROUND and link not in linkage.masses:
+            body = (
+                '{mass: 0.1, center: [0, 0], inertia: 1.0e-5}'
+                if isinstance(linkage, Linkage)
+                else '{mass: 0.1, center: [0, 0, 0], inertia: [1e-5, 0, 0, 1e-5, 0, 1e-5]}'
+            )
             raise DefinitionError(
                 'masses',
                 f'link {quote(link)} has no mass, and forces are asked for',
-                f'add masses: {{{link}: {{mass: 0.1, center: [0, 0], inertia: 1.0e-5}}}} '
+                f'add masses: {{{link}: {body}}} '
                 'in [kg], [m] and [kg·m²]; for a massless link write {mass: 0}',
             )
 
 
-def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None) -> None:
+def check_vector(linkage: Linkage | SpaceLinkage, key: str, vector: Sequence[float]) -> None:
+    """Refuse a vector that has not as many coordinates as the linkage has directions."""
+    planar = isinstance(linkage, Linkage)
+    axes, moves = ('[x, y]', 'planar') if planar else ('[x, y, z]', 'spatial')
+    if len(vector) != axes.count(',') + 1:
+        numbers = ', '.join(f'{number:g}' for number in vector)
+        raise DefinitionError(key, f'[{numbers}], and the linkage is {moves}', f'write {axes}')
+
+
+def check_loads(
+    linkage: Linkage | SpaceLinkage, loads: Loads, friction: Friction | None = None
+) -> None:
     """
     Refuse loads and friction on parts that the linkage does not have.
 
-    The error has the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no
-    name) or ``effects.friction.joints.NAME``.
+    The error has the key ``loads.gravity``, ``loads.springs.NAME`` (the number of the spring, from
+    1, if it has no name) or ``effects.friction.joints.NAME``.
     """
+    if any(loads.gravity):
+        check_vector(linkage, 'loads.gravity', loads.gravity)
     for count, spring in enumerate(loads.springs, 1):
         key = f'loads.springs.{spring.name or count}'
         for link, end in spring.ends:
@@ -297,10 +319,17 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
                 f'both its ends lie on {spring.from_link!r}, so that nothing stretches it',
                 'name points of two links',
             )
+    if friction is not None and (friction.joints or friction.holds):
+        _check_friction(linkage, friction)
+
+
+def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None:
+    if not isinstance(linkage, Linkage):
+        raise DefinitionError('effects.friction', 'is for planar linkages', 'leave it out')
     carried = [name for names in linkage.links.values() for name in names]
     carried += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {name for name in carried if carried.count(name) > 1}
-    for name, joint in friction.joints.items() if friction else ():
+    for name, joint in friction.joints.items():
         key = f'effects.friction.joints.{name}'
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
@@ -325,7 +354,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
                 f'friction by the force in a pin needs both, and {missing} is missing',
                 f'write {missing} too',
             )
-    if friction and friction.holds and friction.load_dependent_joint:
+    if friction.holds and friction.load_dependent_joint:
         raise DefinitionError(
             'effects.friction.holds',
             f'at rest the force in {quote(friction.load_dependent_joint)} has no certain value, '

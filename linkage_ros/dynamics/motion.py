@@ -9,7 +9,7 @@
 """
 The motion of a linkage of one freedom under a force: sticking, slipping, and stopped at its ends.
 
-The equation of motion (`linkage_ros.dynamics.mechanics`)::
+The equation of motion (`linkage_ros.dynamics.equation`)::
 
     I(q)·q̈ + ½·I'(q)·q̇² + V'(q) + C(q)·q̇ + (F(q) + B)·sign(q̇) = τ
 
@@ -48,8 +48,8 @@ from enum import Enum
 from math import copysign, inf, ulp
 from typing import NamedTuple, TYPE_CHECKING, TypeVar
 
+from linkage_ros.dynamics.equation import Terms
 from linkage_ros.dynamics.integrators import Step
-from linkage_ros.dynamics.mechanics import Terms
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.laws import Law

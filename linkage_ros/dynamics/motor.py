@@ -36,9 +36,9 @@ from itertools import combinations, pairwise
 from math import copysign, inf
 from typing import Any, TYPE_CHECKING, TypeVar
 
+from linkage_ros.dynamics.equation import Terms
 from linkage_ros.dynamics.laws import LawTerm
 from linkage_ros.dynamics.longest_step import check_step
-from linkage_ros.dynamics.mechanics import Terms
 from linkage_ros.dynamics.motion import LARGEST, SingleDofMechanism
 
 if TYPE_CHECKING:

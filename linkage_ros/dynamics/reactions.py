@@ -33,14 +33,14 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.dynamics.joint_matrix import JointMatrix
-from linkage_ros.dynamics.mechanics import (
+from linkage_ros.dynamics.bodies import PLANE, spring_length
+from linkage_ros.dynamics.equation import (
     FrictionJoint,
     joint_friction,
     Mechanics,
     slip_direction,
-    spring_length,
 )
+from linkage_ros.dynamics.joint_matrix import JointMatrix
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics import (
     Acceleration,
@@ -380,7 +380,7 @@ class Reactions:
         if self._springs:
             velocities = self._follower.velocities(position, velocity, places)
             for spring, (start, end), rows in self._springs:
-                length, growth = spring_length(places, velocities, start, end)
+                length, growth = spring_length(PLANE, places, velocities, (start, end))
                 if not length:
                     continue
                 force = spring.tension(length, growth) / length * (places[end] - places[start])

@@ -42,7 +42,7 @@ from dataclasses import dataclass, replace
 from math import copysign, ulp
 from typing import NamedTuple
 
-from linkage_ros.dynamics.mechanics import Terms
+from linkage_ros.dynamics.equation import Terms
 from linkage_ros.dynamics.motion import last_before, Motion, NARROW, SingleDofMechanism
 
 TRIALS = 3

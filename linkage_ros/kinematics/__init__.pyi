@@ -202,6 +202,7 @@ from linkage_ros.kinematics.space.masses import (
     check_inertia as check_inertia,
     combine_masses as combine_masses,
     SpatialMass as SpatialMass,
+    tensor_rows as tensor_rows,
     thin_rod as thin_rod,
     turned_tensor as turned_tensor,
 )

@@ -48,7 +48,7 @@ from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.freedom import Freedom
-    from linkage_ros.kinematics.space.point_tracker import SpatialTracker
+    from linkage_ros.kinematics.space.point_tracker import RodAxis, SpatialTracker
 
 Quaternion = tuple[float, float, float, float]
 
@@ -272,6 +272,16 @@ class SpaceClosure(StepwiseClosure):
         )
 
         return SpatialTracker(self._plan, points, links)
+
+    def rod_axis(self, link: str) -> RodAxis:
+        """Return the axis of a rod that may spin, in the pose, in [m]."""
+        from linkage_ros.kinematics.space.point_tracker import (
+            rod_axis,  # local import: only forces need it
+        )
+
+        axis = rod_axis(self._plan, link)
+        start, end = scale(self.scale, axis.start), scale(self.scale, axis.end)
+        return axis._replace(start=start, end=end)
 
     def frames(self, position: Position) -> dict[str, tuple[Vector, Quaternion]]:
         """

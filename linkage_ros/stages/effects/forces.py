@@ -15,7 +15,7 @@ With friction that grows with the forces in the joints it comes from these force
 `linkage_ros.dynamics.reactions`; a linkage that jams has no effort.
 
 It covers the inertia of links and drive, gravity, springs and friction: see
-`linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
+`linkage_ros.dynamics.equation` for the equation and its source. It uses the crank's acceleration
 from the drive; a topic's acceleration counts as 0 unless it is estimated.
 
 Under the torque drive, the effort that causes a motion is the commanded one. An input at rest

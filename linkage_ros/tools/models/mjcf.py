@@ -447,7 +447,7 @@ def _refuse_massless(parts: Sequence[ModelPart]) -> None:
                 )
 
 
-def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, float]:
+def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, ...]:
     gravities = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
     for count, gravity in enumerate(gravities):
         if gravity != gravities[0]:

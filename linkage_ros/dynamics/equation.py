@@ -9,11 +9,12 @@
 """
 The equation of motion of a linkage, and the efforts of its drives, by virtual work.
 
-With one input q, each centre of mass moves with r' = dr/dq and each link turns with θ' = dθ/dq,
-which are the velocities at q̇ = 1; r'' and θ'' are the accelerations at q̇ = 1 and q̈ = 0. So::
+A body takes part by the velocity c of its centre of mass and its turn s, with a constant matrix K
+(`linkage_ros.dynamics.bodies`): so plane and space differ in no formula. With one input q, a body
+moves with c and s at q̇ = 1, and with c' and s' at q̇ = 1 and q̈ = 0. So::
 
-    I(q) = Id + Σ (m·|r'|² + J·θ'²)            ½·dI/dq = Σ (m·r'·r'' + J·θ'·θ'')
-    V(q) = −Σ m·g·r + Σ ½·k·(ℓ − ℓ0)²          dV/dq = −Σ m·g·r' + Σ k·(ℓ − ℓ0)·ℓ'
+    I(q) = Id + Σ (m·c·c + s·K·s)              ½·dI/dq = Σ (m·c·c' + s·K·s')
+    V(q) = −Σ m·g·r + Σ ½·k·(ℓ − ℓ0)²          dV/dq = −Σ m·g·c + Σ k·(ℓ − ℓ0)·ℓ'
     C(q) = Σ c·ψ'² + Σ c·ℓ'²                   F(q) = Σ T·|ψ'|
 
     I·q̈ + ½·(dI/dq)·q̇² + dV/dq + C·q̇ + F·sign(q̇) = τ
@@ -25,7 +26,9 @@ in a pin or the slide in a slider, with the viscous coefficient c and the Coulom
 T; ℓ the length of a spring.
 
 With several inputs there is one such equation for each: its left side is the work of inertia,
-loads and friction over the velocities that this input alone would cause at a rate of 1.
+loads and friction over the velocities that this input alone would cause at a rate of 1. In space
+the moment of inertia forces is K·ṡ + s × K·s, whose second part works on nothing if s is the only
+one.
 """
 
 from __future__ import annotations
@@ -33,8 +36,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
 from linkage_ros.dynamics.loads import (
     check_loads,
     check_masses,
@@ -125,23 +129,11 @@ class Mechanics:
                 f'the linkage has {len(linkage.inputs)} inputs, and friction could hold either',
                 'leave it out',
             )
-        heavy = {link: linkage.masses[link] for link in linkage.links if link in linkage.masses}
-        heavy = {link: body for link, body in heavy.items() if body.mass or body.inertia}
-        points = [(link, complex(*body.center)) for link, body in heavy.items()]
-        for spring in self.loads.springs:
-            for link, name in spring.ends:
-                points.append((link, complex(*linkage.links[link][name])))
-        self._follower = closure.point_tracker(points)
-        at = iter(self._follower.indices)
-        self._bodies = tuple(
-            (body.mass, body.inertia, next(at), closure.angles[link].coordinate)
-            for link, body in heavy.items()
-        )
-        self._springs = tuple(
-            (spring.stiffness, spring.free_length, spring.damping, next(at), next(at))
-            for spring in self.loads.springs
-        )
-        self._gravity = complex(*self.loads.gravity)
+        self._model = model = _bodies_of(closure, self.loads)
+        self._points, self._bodies = model.points, model.bodies
+        gravity = self.loads.gravity
+        self._gravity = model.vectors.from_numbers(gravity) if any(gravity) else model.vectors.zero
+        self._springs = tuple(zip(self.loads.springs, model.springs, strict=True))
         self.friction_joints = tuple(self._find_friction_joints())
         """The joints that have friction."""
         self.applied = _make_applied(closure, self.loads)
@@ -169,26 +161,30 @@ class Mechanics:
             return None
         velocity = self.closure.velocity(position, 1.0)
         acceleration = self.closure.acceleration(position, velocity, 0.0)
-        places = self._follower.places(position)
-        velocities = self._follower.velocities(position, velocity, places)
-        accelerations = self._follower.accelerations(position, velocity, acceleration, places)
-        v, a = velocity.state.coordinates, acceleration.state.coordinates
-        inertia, half_slope, momentum = self.loads.drive_inertia, 0.0, 0j
-        for mass, gyration, point, turn in self._bodies:
-            speed, pull, spin = velocities[point], accelerations[point], v[turn]
-            moved = mass * speed
-            momentum += moved
-            inertia += moved.real * speed.real + moved.imag * speed.imag + gyration * spin * spin
-            half_slope += moved.real * pull.real + moved.imag * pull.imag
-            half_slope += gyration * spin * a[turn]
-        gravity = self._gravity
-        slope = -(gravity.real * momentum.real + gravity.imag * momentum.imag)
+        points, vectors = self._points, self._model.vectors
+        places = points.places(position)
+        velocities = points.velocities(position, velocity, places)
+        accelerations = points.accelerations(position, velocity, acceleration, places)
+        turns = self._model.turn_rates(position, velocity)
+        changes = self._model.turn_changes(position, velocity, acceleration)
+        v = velocity.state.coordinates
+        inertia, half_slope, momentum = self.loads.drive_inertia, 0.0, vectors.zero
+        for (mass, gyration, point), turn, change in zip(
+            self._bodies, turns, changes, strict=True
+        ):
+            speed, pull = velocities[point], accelerations[point]
+            moved, whirled = vectors.scale(mass, speed), vectors.momentum(gyration, turn)
+            momentum = vectors.plus(momentum, moved)
+            inertia += vectors.dot(moved, speed) + vectors.turn_dot(whirled, turn)
+            half_slope += vectors.dot(moved, pull)
+            half_slope += vectors.turn_dot(whirled, change)
+        slope = -vectors.dot(self._gravity, momentum)
         viscous = coulomb = 0.0
         slips: tuple[float, ...] = ()
-        for stiffness, free_length, damping, start, end in self._springs:
-            length, growth = spring_length(places, velocities, start, end)
-            slope += stiffness * (length - free_length) * growth
-            viscous += damping * growth * growth
+        for spring, ends in self._springs:
+            length, growth = spring_length(vectors, places, velocities, ends)
+            slope += spring.stiffness * (length - spring.free_length) * growth
+            viscous += spring.damping * growth * growth
         for rubbing in self.friction_joints:
             slip, limit = rubbing.slip_rate(v), rubbing.friction.coulomb
             viscous += rubbing.friction.viscous * slip * slip
@@ -270,26 +266,27 @@ class Mechanics:
 
     def potential_energy(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
-        places = self._follower.places(position)
-        moment = 0j
-        for mass, _, point, _ in self._bodies:
-            moment += mass * places[point]
-        energy = -(self._gravity.real * moment.real + self._gravity.imag * moment.imag)
-        for stiffness, free_length, _, start, end in self._springs:
-            stretch = abs(places[end] - places[start]) - free_length
-            energy += 0.5 * stiffness * stretch * stretch
+        vectors, places = self._model.vectors, self._points.places(position)
+        moment = vectors.zero
+        for mass, _, point in self._bodies:
+            moment = vectors.plus(moment, vectors.scale(mass, places[point]))
+        energy = -vectors.dot(self._gravity, moment)
+        for spring, (start, end) in self._springs:
+            length = vectors.length(vectors.minus(places[end], places[start]))
+            stretch = length - spring.free_length
+            energy += 0.5 * spring.stiffness * stretch * stretch
         return energy if self.applied is None else energy + self.applied.potential_energy(position)
 
     def kinetic_energy(self, position: Position, velocity: Velocity) -> float:
         """Return the kinetic energy, with the drive's inertia, in [J]."""
-        places = self._follower.places(position)
-        velocities = self._follower.velocities(position, velocity, places)
-        v = velocity.state.coordinates
-        twice = 0.0
-        for mass, gyration, point, turn in self._bodies:
+        vectors, places = self._model.vectors, self._points.places(position)
+        velocities = self._points.velocities(position, velocity, places)
+        turns = self._model.turn_rates(position, velocity)
+        v, twice = velocity.state.coordinates, 0.0
+        for (mass, gyration, point), turn in zip(self._bodies, turns, strict=True):
             speed = velocities[point]
-            twice += mass * (speed.real * speed.real + speed.imag * speed.imag)
-            twice += gyration * v[turn] * v[turn]
+            twice += mass * vectors.dot(speed, speed)
+            twice += vectors.turn_dot(vectors.momentum(gyration, turn), turn)
         for i, unit in enumerate(self._units, 1):
             twice += self.loads.drive_inertia * (unit * v[i]) ** 2
         return 0.5 * twice
@@ -317,32 +314,41 @@ class Mechanics:
         input forward; Coulomb friction is 0 in a joint at rest. The position is closed and not a
         toggle. ``given`` is as in `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
-        follower, count = self._follower, len(self._units)
-        places = follower.places(position)
-        velocities = follower.velocities(position, velocity, places)
-        accelerations = follower.accelerations(position, velocity, acceleration, places)
+        points, vectors, count = self._points, self._model.vectors, len(self._units)
+        places = points.places(position)
+        velocities = points.velocities(position, velocity, places)
+        accelerations = points.accelerations(position, velocity, acceleration, places)
+        turns = self._model.turn_rates(position, velocity)
+        changes = self._model.turn_changes(position, velocity, acceleration)
         v, a = velocity.state.coordinates, acceleration.state.coordinates
         pulls = [
-            spring.tension(*spring_length(places, velocities, start, end))
-            for spring, (_, _, _, start, end) in zip(
-                self.loads.springs, self._springs, strict=True
-            )
+            spring.tension(*spring_length(vectors, places, velocities, ends))
+            for spring, ends in self._springs
         ]
         drags = [joint_friction(rubbing, v) for rubbing in self.friction_joints]
+        forces = [
+            (
+                vectors.scale(mass, vectors.minus(accelerations[point], self._gravity)),
+                vectors.moment(gyration, turn, change),
+            )
+            for (mass, gyration, point), turn, change in zip(
+                self._bodies, turns, changes, strict=True
+            )
+        ]
         efforts: tuple[float, ...] = ()
         for i, unit in enumerate(self._units):
             alone = [0.0] * count
             alone[i] = 1.0
             virtual = self.closure.velocity(position, *alone)
             w = virtual.state.coordinates
-            moved = follower.velocities(position, virtual, places)
+            moved = points.velocities(position, virtual, places)
+            turned = self._model.turn_rates(position, virtual)
             effort = self.loads.drive_inertia * a[1 + i] * unit
-            for mass, gyration, point, turn in self._bodies:
-                force, way = mass * (accelerations[point] - self._gravity), moved[point]
-                effort += force.real * way.real + force.imag * way.imag
-                effort += gyration * a[turn] * w[turn]
-            for pull, (_, _, _, start, end) in zip(pulls, self._springs, strict=True):
-                effort += pull * spring_length(places, moved, start, end)[1]
+            for body, (force, moment), way in zip(self._bodies, forces, turned, strict=True):
+                effort += vectors.dot(force, moved[body.point])
+                effort += vectors.turn_dot(moment, way)
+            for pull, (_, ends) in zip(pulls, self._springs, strict=True):
+                effort += pull * spring_length(vectors, places, moved, ends)[1]
             for drag, rubbing in zip(drags, self.friction_joints, strict=True):
                 effort += drag * rubbing.slip_rate(w)
             if self.applied is not None:
@@ -388,7 +394,9 @@ class Mechanics:
 
     def _find_friction_joints(self) -> Iterator[FrictionJoint]:
         closure = self.closure
-        for index, joint in enumerate(closure.structure.joints):
+        # Spatial linkages have no friction, and no structure of pins and sliders.
+        joints = closure.structure.joints if self.friction.joints else ()
+        for index, joint in enumerate(joints):
             friction = self.friction.joints.get(joint.name)
             if friction is None:
                 continue
@@ -403,6 +411,15 @@ class Mechanics:
 
                 law = Stribeck(friction.breakaway_excess, friction.stribeck)
             yield FrictionJoint(index, friction, one, other, factor, law)
+
+
+def _bodies_of(closure: Any, loads: Loads) -> BodyModel:
+    """Return the bodies of a linkage in plane or space."""
+    if isinstance(closure, Closure):
+        return planar_bodies(closure, loads)
+    from linkage_ros.dynamics.spatial_bodies import spatial_bodies  # local import: in space only
+
+    return spatial_bodies(closure, loads)
 
 
 def _make_applied(closure: Closure, loads: Loads) -> AppliedForces | None:
@@ -437,14 +454,3 @@ def _is_at_rest(v: list[float], one: int, other: int) -> bool:
     """Return whether the difference of two rates is 0 within rounding."""
     rates = abs(v[one]) + abs(v[other]) + abs(v[1])
     return abs(v[one] - v[other]) <= _ROUNDING * rates
-
-
-def spring_length(
-    places: list[complex], velocities: list[complex], start: int, end: int
-) -> tuple[float, float]:
-    """Return the length of a spring and its rate; both 0 if its ends coincide."""
-    along, apart = places[end] - places[start], velocities[end] - velocities[start]
-    length = abs(along)
-    if not length:
-        return 0.0, 0.0
-    return length, (along.real * apart.real + along.imag * apart.imag) / length
