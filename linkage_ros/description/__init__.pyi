@@ -50,6 +50,7 @@ from linkage_ros.description.notes import (
 from linkage_ros.description.parameters import (
     choice as choice,
     ChoiceOf as ChoiceOf,
+    components as components,
     declared_fields as declared_fields,
     default_of as default_of,
     Each as Each,

@@ -166,10 +166,10 @@ def _linkage_notes(scene_linkage: SceneLinkage) -> Iterator[DefinitionError]:
                 )
     yield from islice(_noise_notes(scene_linkage), 1)
     if scene_linkage.loads is not None and 0.0 < hypot(*scene_linkage.loads.gravity) < _WEAK:
-        x, y = scene_linkage.loads.gravity
+        numbers = ', '.join(f'{part:g}' for part in scene_linkage.loads.gravity)
         yield DefinitionError(
             'loads.gravity',
-            f'[{x:g}, {y:g}] m/s² is very small',
+            f'[{numbers}] m/s² is very small',
             'write it in the unit of the file: 9.81 [m/s²] is 9810 [mm/s²]',
         )
 

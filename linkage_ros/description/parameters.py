@@ -35,7 +35,12 @@ _KEY = 'parameter'
 Schema = dict[str, Any]
 
 Parts = Mapping[str, Sequence[str]]
-"""The existing names for each kind of part; of joints and pins, 'slide' and 'slider' slide."""
+"""
+The existing names for each kind of part.
+
+Of joints and pins, 'slide' and 'slider' slide; 'axis' has the axes that vectors have components
+along.
+"""
 
 KINDS = {
     'joint': 'published joint',
@@ -220,6 +225,21 @@ class Point(NumberList):
 
     def values_text(self) -> str:
         return f'[x, y]{_each_at_most(self.most)}'
+
+
+@dataclass(frozen=True, slots=True)
+class Components(NumberList):
+    """The components of a vector along the axes of the linkage: [x, y], in space [x, y, z]."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
+        take = content.place if 'z' in parts.get('axis', ()) else content.point
+        return take(key, most=self.most, unit=self.unit)
+
+    def json_schema(self) -> Schema:
+        return {**NumberList.json_schema(self), 'minItems': 2, 'maxItems': 3}
+
+    def values_text(self) -> str:
+        return f'[x, y], in space [x, y, z]{_each_at_most(self.most)}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -525,6 +545,11 @@ def file(meaning: str) -> Any:
 def point(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
     """Declare a point or a vector, read as a tuple of two."""
     return declare(Point(meaning, unit, most), default)
+
+
+def components(meaning: str, default: Any = MISSING, *, unit: str = '', most: float = inf) -> Any:
+    """Declare a vector, read as a tuple of two, or of three in space."""
+    return declare(Components(meaning, unit, most), default)
 
 
 def part_name(meaning: str, kind: str, default: Any = MISSING) -> Any:

@@ -233,20 +233,24 @@ class Scene:
 
 def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     """Return the parts of a linkage that parameters can name, by kind."""
-    links = linkage.link_names
-    points = [point for carried in linkage.links.values() for point in carried]
+    links, carried = linkage.link_names, linkage.links.items()
+    parts = {
+        **_joints_of(linkage),
+        'link': tuple(link for link in links if link != GROUND),
+        'body': links,
+        'point': tuple(f'{link}.{point}' for link, points in carried for point in points),
+    }
     if isinstance(linkage, SpaceLinkage):
-        return {**_joints_of(linkage), 'link': links[1:], 'body': links, 'point': ()}
+        return {**parts, 'axis': ('x', 'y', 'z')}
+    points = [point for _, points in carried for point in points]
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {point: None for point in points if points.count(point) > 1}
     return {
-        **_joints_of(linkage),
+        **parts,
+        'axis': ('x', 'y'),
         'pin': (*pins, *linkage.sliders),
-        'link': tuple(link for link in links if link != GROUND),
-        'body': links,
         'slider': tuple(linkage.sliders),
-        'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
     }
 
 

@@ -458,7 +458,7 @@ def _refuse_in_space(
     """Refuse what only planar linkages have."""
     reason, remedy = 'is for planar linkages', 'leave it out'
     for name, effect in types.items():
-        if effect.is_planar or effect.needs_forces:
+        if effect.is_planar:
             raise effects.error(name, reason, remedy)
     drives = section_with('drive')
     if drive_class(drive).gives_torque:
@@ -466,8 +466,6 @@ def _refuse_in_space(
     topic = drive_section(drives)
     if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
-    if 'loads' in section_with('loads'):
-        raise section_with('loads').error('loads', reason, remedy)
 
 
 def _check_sampled(drives: Section, closure: Closure | SpaceClosure, joint: str) -> None:

@@ -28,6 +28,7 @@ from linkage_ros.description.grammar import (
 from linkage_ros.description.parameters import (
     CHARACTER,
     choice,
+    components,
     declare,
     declared_fields,
     example_of,
@@ -41,7 +42,6 @@ from linkage_ros.description.parameters import (
     ParameterGroup,
     parameters_schema,
     Parts,
-    point,
     read_parameters,
     Rule,
     Schema,
@@ -206,7 +206,9 @@ _LOADS = Keys(
     'The forces that act on the links, where effects or the drive ask for them.',
     _build_loads,
     {
-        'gravity': point('gravity: [x, y]', (0.0, 0.0), unit='m/s²', most=1e3),
+        'gravity': components(
+            'gravity: [x, y], in space [x, y, z]', (0.0, 0.0), unit='m/s²', most=1e3
+        ),
         'springs': declare(
             Named(
                 'springs between points of links, by name',

@@ -12,8 +12,8 @@ Loads that are applied to joints, points and links, and their work over the moti
 A joint effort acts on the joint's child, and the opposite on its parent; a force on a slide acts
 along its line. By virtual work, a load f adds f·λ to the force on an input, with the lever λ: the
 rate of its joint, or the velocity of its point along its direction, at a rate of the input of 1.
-A wrench is three such loads: two components of a force on a point, and a torque, whose lever is
-the rate of its link.
+A wrench is several such loads: the components of a force on a point, and of a torque, whose lever
+is the rate of its link.
 """
 
 from __future__ import annotations
@@ -21,11 +21,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, pairwise
 from math import hypot, sqrt, tau
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.dynamics import longest_step
+from linkage_ros.dynamics.bodies import PLANE, Vectors
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
-from linkage_ros.dynamics.loads import AppliedLoads, JointLoad, JointSpring, PointLoad, SoftStop
+from linkage_ros.dynamics.loads import (
+    AppliedLoads,
+    check_vector,
+    JointLoad,
+    JointSpring,
+    PointLoad,
+    SoftStop,
+)
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     call,
@@ -65,7 +73,7 @@ class JointCoordinate(NamedTuple):
         """Return its value, in [rad] or [m]; of a driven joint with all its turns."""
         return (position.inputs if self.driven else position.joints)[self.number]
 
-    def lever(self, velocity: Velocity, _position: Position, _moved: Sequence[complex]) -> float:
+    def lever(self, velocity: Velocity, _position: Position, _moved: Sequence[Any]) -> float:
         """Return its rate, in [rad/s] or [m/s]."""
         v = velocity.state.coordinates
         return self.factor * (v[self.one] - v[self.other])
@@ -83,14 +91,11 @@ def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
             unit = closure.scale if given.slider else 1.0
             names = (given.slider, '', '') if given.slider else ('', given.child, given.parent)
             return JointCoordinate(index, True, not given.slider, *names, 1 + index, 0, unit)
-    joint = linkage.joints[name]
-    place = list(linkage.joints).index(name)
+    joint, place = linkage.joints[name], list(linkage.joints).index(name)
+    term = closure.rate_term(place)
     if isinstance(joint, RevoluteJoint):
-        one, other = (closure.angles[link].coordinate for link in (joint.child, joint.parent))
-        return JointCoordinate(place, False, True, '', joint.child, joint.parent, one, other, 1.0)
-    slide = closure.slides[joint.slider]
-    factor = slide.sign * closure.scale
-    return JointCoordinate(place, False, False, joint.slider, '', '', slide.coordinate, 0, factor)
+        return JointCoordinate(place, False, True, '', joint.child, joint.parent, *term)
+    return JointCoordinate(place, False, False, joint.slider, '', '', *term)
 
 
 class LoadedPoint(NamedTuple):
@@ -100,23 +105,79 @@ class LoadedPoint(NamedTuple):
     link: str
     number: int
     tracked_index: int  # Its index among the tracked points
-    unit: complex  # Direction of the force, a unit vector
-    coordinate: int  # Index of the closure's coordinate that turns the direction; 0 for none
+    direction: Callable[[Position], Any]  # Of the force, a unit vector in the frame of the ground
+    dot: Callable[[Any, Any], float]  # The scalar product
 
-    def direction(self, position: Position) -> complex:
-        """Return the direction in the frame of the ground."""
-        if not self.coordinate:
-            return self.unit
-        return unit_vector(position.state.coordinates[self.coordinate]) * self.unit
-
-    def lever(self, _velocity: Velocity, position: Position, moved: Sequence[complex]) -> float:
+    def lever(self, _velocity: Velocity, position: Position, moved: Sequence[Any]) -> float:
         """Return the velocity of the point along the direction, in [m/s]."""
-        way, along = moved[self.tracked_index], self.direction(position)
-        return way.real * along.real + way.imag * along.imag
+        return self.dot(moved[self.tracked_index], self.direction(position))
+
+
+class LoadedParts(Protocol):
+    """What loads act on, by kind of linkage: `PlanarParts` or `SpatialParts`."""
+
+    vectors: Vectors
+    wrench_numbers: tuple[int, ...]
+    """Which of the six numbers of a wrench move the linkage: first those of the force."""
+
+    def place(self, link: str, point: str) -> Any:
+        """Return the place of a point for `point_tracker`; of the link's frame for ''."""
+
+    def direction(self, link: str, vector: Any, frame: str) -> Callable[[Position], Any]:
+        """Return a vector that stays in the frame 'ground', or turns with the 'link'."""
+
+    def axes(self, link: str, frame: str) -> list[Callable[[Position], Any]]:
+        """Return the axes of a frame."""
+
+    def turns(self, link: str, frame: str) -> Sequence[Loaded]:
+        """Return the turn of a link about each axis that it may have."""
+
+
+class PlanarParts:
+    """What loads act on in the plane."""
+
+    vectors = PLANE
+    wrench_numbers: tuple[int, ...] = (0, 1, 5)
+
+    def __init__(self, closure: Closure) -> None:
+        self._closure = closure
+
+    def place(self, link: str, point: str) -> complex:
+        return complex(*self._closure.linkage.links[link][point]) if point else 0j
+
+    def direction(self, link: str, vector: complex, frame: str) -> Callable[[Position], complex]:
+        if frame == 'ground':
+            return lambda _: vector
+        angle = self._closure.angles[link]
+        turned, coordinate = vector * angle.unit, angle.coordinate
+        return lambda position: unit_vector(position.state.coordinates[coordinate]) * turned
+
+    def axes(self, link: str, frame: str) -> list[Callable[[Position], complex]]:
+        return [self.direction(link, axis, frame) for axis in (1 + 0j, 1j)]
+
+    def turns(self, link: str, _frame: str) -> Sequence[Loaded]:
+        # A link turns as a joint between it and the ground.
+        names, coordinate = ('', link, GROUND), self._closure.angles[link].coordinate
+        return [JointCoordinate(0, False, True, *names, coordinate, 0, 1.0)]
+
+
+def _parts_of(closure: Any, applied: AppliedLoads) -> LoadedParts:
+    if isinstance(closure, Closure):
+        return PlanarParts(closure)
+    from linkage_ros.dynamics.spatial_parts import SpatialParts  # local import: in space only
+
+    return SpatialParts(closure, applied)
+
+
+class Loaded(Protocol):
+    """What a load acts on: a joint, a point, or a turn of a link."""
+
+    def lever(self, velocity: Velocity, position: Position, moved: Sequence[Any], /) -> float:
+        """Return its rate along the load; ``moved`` are the velocities of the loaded points."""
 
 
 class _Lawful(NamedTuple):
-    applied_to: JointCoordinate | LoadedPoint
+    applied_to: Loaded
     depends_on: JointCoordinate
     law: Law
 
@@ -134,22 +195,22 @@ class AppliedForces:
         self._closure, self._given = closure, applied
         self.begin = -1  # Time of the first pose, in [ns]; negative before it
         _check_loads(closure, applied)
+        parts = _parts_of(closure, applied)
         places = [name.rpartition('.') for name in applied.forces]
-        # The loaded points: link, and place in its frame, in [m].
-        self.points = [(link, complex(*linkage.links[link][name])) for link, _, name in places]
+        # The loaded points, as `point_tracker` takes them.
+        self.points = [(link, parts.place(link, name)) for link, _, name in places]
         for link, wrench in applied.wrenches.items():
-            point = linkage.links[link][wrench.point] if wrench.point else (0.0, 0.0)
-            self.points.append((link, complex(*point)))
+            self.points.append((link, parts.place(link, wrench.point)))
         self._tracker = closure.point_tracker(self.points)
         self._springs = tuple(
             (joint_coordinate(closure, name), spring)
             for name, spring in applied.joint_springs.items()
         )
-        self._constant: list[tuple[JointCoordinate | LoadedPoint, float]] = []
+        self._constant: list[tuple[Loaded, float]] = []
         self._lawful: list[_Lawful] = []
         laws: list[Law] = []
 
-        def add_law(at: JointCoordinate | LoadedPoint, of: JointCoordinate, law: Law) -> None:
+        def add_law(at: Loaded, of: JointCoordinate, law: Law) -> None:
             laws.append(law)
             self._lawful.append(_Lawful(at, of, law))
 
@@ -161,7 +222,7 @@ class AppliedForces:
             contact = Contact(limits.low, limits.high, stop.stiffness, stop.damping, middle)
             self._stops[name] = joint, contact
             add_law(joint, joint, contact)
-        loaded: list[tuple[JointCoordinate | LoadedPoint, JointCoordinate, JointLoad | PointLoad]]
+        loaded: list[tuple[Loaded, JointCoordinate, JointLoad | PointLoad]]
         loaded = []
         for name, effort in applied.efforts.items():
             joint = joint_coordinate(closure, name)
@@ -170,12 +231,11 @@ class AppliedForces:
         # Behind them follow the points of the wrenches.
         pairs = zip(places, applied.forces.values(), self._tracker.indices, strict=False)
         for count, ((link, _, _), force, index) in enumerate(pairs):
-            angle = closure.angles[link]
-            unit = complex(*force.direction) / hypot(*force.direction)
-            turns = force.frame == 'link'
-            if turns:
-                unit *= angle.unit
-            at = LoadedPoint(link, count, index, unit, angle.coordinate if turns else 0)
+            unit = parts.vectors.from_numbers(
+                [part / hypot(*force.direction) for part in force.direction]
+            )
+            way = parts.direction(link, unit, force.frame)
+            at = LoadedPoint(link, count, index, way, parts.vectors.dot)
             loaded.append((at, first, force))
         for part, of, load in loaded:
             if load.constant:
@@ -190,26 +250,23 @@ class AppliedForces:
                     )
                     add_law(part, of, TorqueTable(over, table, middle))
         self.wrenches: dict[str, HeldWrench] = {}
-        self._components: list[tuple[JointCoordinate | LoadedPoint, Component]] = []
+        self._components: list[tuple[Loaded, Component]] = []
         if applied.wrenches:
-            self._hold_wrenches(applied, len(places))
+            self._hold_wrenches(applied, len(places), parts)
         self.laws = (*laws, *(component for _, component in self._components))
 
-    def _hold_wrenches(self, applied: AppliedLoads, count: int) -> None:
+    def _hold_wrenches(self, applied: AppliedLoads, count: int, parts: LoadedParts) -> None:
         """Let a wrench act on each link that has one; ``count`` points precede theirs."""
         from linkage_ros.dynamics.wrenches import Component, HeldWrench  # local import: few scenes
 
         for number, (link, given) in enumerate(applied.wrenches.items(), count):
-            self.wrenches[link] = held = HeldWrench(given.max_age)
-            angle, place = self._closure.angles[link], self._tracker.indices[number]
-            axes, coordinate = (1 + 0j, 1j), 0
-            if given.frame == 'link':
-                axes, coordinate = (angle.unit, 1j * angle.unit), angle.coordinate
-            along: list[JointCoordinate | LoadedPoint]
-            along = [LoadedPoint(link, number, place, axis, coordinate) for axis in axes]
-            # A link turns as a joint between it and the ground.
-            names = ('', link, GROUND)
-            along.append(JointCoordinate(0, False, True, *names, angle.coordinate, 0, 1.0))
+            self.wrenches[link] = held = HeldWrench(given.max_age, parts.wrench_numbers)
+            place, dot = self._tracker.indices[number], parts.vectors.dot
+            along: list[Loaded] = [
+                LoadedPoint(link, number, place, axis, dot)
+                for axis in parts.axes(link, given.frame)
+            ]
+            along += parts.turns(link, given.frame)
             for component, at in enumerate(along):
                 self._components.append((at, Component(held, component)))
 
@@ -327,7 +384,7 @@ class AppliedForces:
 
     def acting_loads(
         self, position: Position, velocity: Velocity, given: Sequence[float]
-    ) -> Iterator[tuple[JointCoordinate | LoadedPoint, float]]:
+    ) -> Iterator[tuple[Loaded, float]]:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
 
@@ -357,7 +414,7 @@ class AppliedForces:
             work += force * at.lever(virtual, position, moved)
         return work
 
-    def _point_velocities(self, position: Position, velocity: Velocity) -> list[complex]:
+    def _point_velocities(self, position: Position, velocity: Velocity) -> list[Any]:
         """Return the velocities of the loaded points."""
         if not self._tracker.indices:
             return []
@@ -409,6 +466,7 @@ def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
             )
         if not any(force.direction):
             raise DefinitionError(f'{key}.direction', '[0, 0] is not a direction', 'write [1, 0]')
+        check_vector(linkage, f'{key}.direction', force.direction)
         if len(linkage.inputs) > 1 and (force.over_position or force.over_rate):
             raise DefinitionError(
                 key,
@@ -416,7 +474,7 @@ def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
                 'write over_time',
             )
     for link, wrench in applied.wrenches.items():
-        points = linkage.links[link]
+        points = linkage.links.get(link, ())
         if wrench.point and wrench.point not in points:
             raise DefinitionError(
                 f'loads.wrenches.{link}.point',

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from linkage_ros.description import choice, each_part, number, number_rows, point, text
+from linkage_ros.description import choice, components, each_part, number, number_rows, text
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage
 
@@ -110,7 +110,9 @@ class JointLoad:
 class PointLoad:
     """A force on a point of a link: the sum of a constant and tables."""
 
-    direction: tuple[float, float] = point('its direction: [x, y]', unit='', most=1e6)
+    direction: tuple[float, ...] = components(
+        'its direction: [x, y], in space [x, y, z]', unit='', most=1e6
+    )
     frame: str = choice('frame of the direction', ('ground', 'link'), 'ground')
     constant: float = number(
         'constant part', 0.0, unit='N', least=-GREATEST_LOAD, most=GREATEST_LOAD

@@ -57,7 +57,7 @@ from linkage_ros.kinematics import (
 from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledMotion
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics.applied import JointCoordinate, LoadedPoint
+    from linkage_ros.dynamics.applied import Loaded
     from linkage_ros.dynamics.load_dependent_friction import FrictionSolver
 
 _SOLVED = (Status.CLOSED, Status.LIMITED)
@@ -409,20 +409,25 @@ class Reactions:
     def _apply_load(
         self,
         sides: list[float],
-        at: JointCoordinate | LoadedPoint,
+        at: Loaded,
         load: float,
         position: Position,
         places: list[complex],
     ) -> None:
         """Add a load on a joint or a point to the right sides of its links."""
-        from linkage_ros.dynamics.applied import LoadedPoint  # local import: only with such loads
+        from linkage_ros.dynamics.applied import (
+            JointCoordinate,  # local import: only with such loads
+            LoadedPoint,  # local import: only with such loads
+        )
 
         rows = self._matrix.rows
         if isinstance(at, LoadedPoint):
             row = rows[at.link]
             force = load * at.direction(position)
             self._apply_force(sides, row, self._loaded[at.number], force, places)
-        elif at.slider:
+            return
+        assert isinstance(at, JointCoordinate)
+        if at.slider:
             number = self._sliders[at.slider]
             self._add_friction(sides, number, -load, position.state.coordinates, places)
         else:

@@ -19,32 +19,37 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from linkage_ros.messages import NANOSECONDS, PlanarWrench
+from linkage_ros.messages import NANOSECONDS
 
 NEVER = 1 << 63
 """A time after all others, in [ns]."""
 
-_NONE = PlanarWrench(0.0, 0.0, 0.0)
-
 
 class HeldWrench:
-    """The wrench on a link; a message is valid for ``max_age``, in [s]."""
+    """
+    The wrench on a link; a message is valid for ``max_age``, in [s].
 
-    __slots__ = ('max_age', 'stamp', 'until', 'wrench')
+    ``numbers`` are the indices of those numbers of a message that move the linkage, of force.x, y,
+    z in [N] and torque.x, y, z in [N·m]; the wrench has these alone.
+    """
 
-    def __init__(self, max_age: float) -> None:
+    __slots__ = ('_none', 'max_age', 'numbers', 'stamp', 'until', 'wrench')
+
+    def __init__(self, max_age: float, numbers: tuple[int, ...]) -> None:
         self.max_age = round(max_age * NANOSECONDS)
+        self.numbers = numbers
+        self._none = (0.0,) * len(numbers)
         # What acts now, the time at which it ends, and the time of the newest message, in [ns].
-        self.wrench, self.until, self.stamp = _NONE, NEVER, 0
+        self.wrench, self.until, self.stamp = self._none, NEVER, 0
 
-    def set_wrench(self, wrench: PlanarWrench, now: int) -> None:
+    def set_wrench(self, wrench: tuple[float, ...], now: int) -> None:
         """Let a wrench act from a time on, in [ns]."""
         self.wrench, self.until, self.stamp = wrench, now + self.max_age, now
 
     def expire(self, now: int) -> None:
         """End the wrench if it is too old at a time, in [ns]."""
         if now >= self.until:
-            self.wrench, self.until = _NONE, NEVER
+            self.wrench, self.until = self._none, NEVER
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,7 @@ class Component:
     """One number of a held wrench, as a law (`linkage_ros.dynamics.laws`)."""
 
     held_wrench: HeldWrench  # The wrench
-    number: int  # Index of the number in a `PlanarWrench`
+    number: int  # Index of the number in the held wrench
 
     def segment(self, _value: float, _rate: float, _time: float) -> int:
         """Return the only segment."""

@@ -257,6 +257,11 @@ class StepwiseClosure:
             step.accelerations(pose, rate, position.state, velocity.state, state_accelerations)
         return Acceleration(self._joint_rates(a), state_accelerations, self)
 
+    def rate_term(self, number: int) -> tuple[int, int, float]:
+        """Return i, j, factor of a published joint: its rate is factor·(v[i] − v[j])."""
+        one, other, factor, _ = self._terms[number]
+        return one, other, factor
+
     def jacobian(self, position: Position) -> Array:
         """
         Return the derivatives of the published joints by the inputs, (joints, inputs).

@@ -70,4 +70,4 @@ from linkage_ros.messages.single_values import (
     TIME_END as TIME_END,
     time_message as time_message,
 )
-from linkage_ros.messages.wrench import PlanarWrench as PlanarWrench, read_wrench as read_wrench
+from linkage_ros.messages.wrench import read_wrench as read_wrench

@@ -6,12 +6,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Read the planar part of serialized ``geometry_msgs/msg/WrenchStamped`` messages."""
+"""Read the numbers of serialized ``geometry_msgs/msg/WrenchStamped`` messages."""
 
 from __future__ import annotations
 
 from struct import Struct
-from typing import NamedTuple
 
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.layout import (
@@ -27,25 +26,15 @@ _FIELDS = parse_declaration('Time stamp, string frame_id, Wrench wrench')
 _NUMBERS = {order: Struct(f'{order}6d') for order in '<>'}
 
 
-class PlanarWrench(NamedTuple):
-    """What of a wrench moves a planar linkage."""
-
-    # Components of the force, in [N].
-    fx: float
-    fy: float
-    moment: float  # Torque about the normal of the plane, counter-clockwise, in [N·m]
-
-
-def read_wrench(data: bytes) -> PlanarWrench | Rejection:
+def read_wrench(data: bytes) -> tuple[float, ...] | Rejection:
     """
-    Return force.x, force.y and torque.z of a message, or the reason for its rejection.
+    Return force.x, y, z and torque.x, y, z of a message, or the reason for its rejection.
 
-    The other numbers are ignored, as are the stamp and the frame: a wrench holds from its arrival,
-    in the frame that the scene names. The numbers may be any.
+    The stamp and the frame are ignored: a wrench holds from its arrival, in the frame that the
+    scene names. The numbers may be any.
     """
     try:
         first = parse_message(data, _FIELDS)['wrench'].first
     except MalformedError:
         return Rejection.MALFORMED
-    fx, fy, _, _, _, moment = _NUMBERS[byte_order(data)].unpack_from(data, first)
-    return PlanarWrench(fx, fy, moment)
+    return _NUMBERS[byte_order(data)].unpack_from(data, first)

@@ -55,9 +55,10 @@ class WrenchTopic:
 
         A rejected message changes nothing.
         """
-        wrench = read_wrench(message)
-        if isinstance(wrench, Rejection):
-            return wrench
+        numbers = read_wrench(message)
+        if isinstance(numbers, Rejection):
+            return numbers
+        wrench = tuple(numbers[index] for index in self.wrench.numbers)
         for number in wrench:
             if not -GREATEST_LOAD <= number <= GREATEST_LOAD:
                 if isfinite(number):

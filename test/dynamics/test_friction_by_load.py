@@ -28,7 +28,7 @@ from linkage_ros.dynamics import (
 )
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, cross_product, GROUND, Mass
-from linkage_ros.messages import EffortCommand, PlanarWrench
+from linkage_ros.messages import EffortCommand
 from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
@@ -270,6 +270,6 @@ def test_wrenches_press_too():
     mechanics = Mechanics(closure_of(PENDULUM), loads, Friction({'O': RUBBING}))
     held, reactions = mechanics.applied.wrenches['crank'], Reactions(mechanics)
     for count, force in enumerate((0.0, 30.0, -50.0)):
-        held.set_wrench(PlanarWrench(0.0, -force, 1.0), count)
+        held.set_wrench((0.0, -force, 1.0), count)
         resisted = reactions.friction_effort(0.4, 1e-200, 0.0, 0.0, 0.0)
         assert resisted == pytest.approx(RADIUS * abs(2.0 * 9.81 + force), rel=1e-12)

@@ -11,7 +11,16 @@ from dataclasses import replace
 from random import Random
 import struct
 
-from linkage_ros.dynamics import Loads, Mechanics, Spring
+from linkage_ros.dynamics import (
+    AppliedLoads,
+    JointLoad,
+    JointSpring,
+    Loads,
+    Mechanics,
+    PointLoad,
+    Spring,
+    WrenchLoad,
+)
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import SpaceClosure, SpatialMass, thin_rod
 from linkage_ros.kinematics.compiling import Compiled
@@ -20,7 +29,9 @@ import pytest
 
 from .loaded import slope
 from ..kinematics.space.test_linkages import closure_of, NAMES, states_of
+from ..support.messages import read_joint_state, wrench_stamped
 from ..support.multipliers import AbsoluteMotion
+from ..support.scenes import pipeline_of
 
 GRAVITY = (0.7, -1.1, -9.81)
 ONE_INPUT = ['rssr', 'spatial_slider_crank', 'bennett', 'hooke_joint', 'ankle_of_one_motor']
@@ -142,6 +153,157 @@ def test_efforts_are_traced_to_the_last_bit(name):
     for state in states_of(closure, 4):
         (fast,) = compiled.fast(*[number for part in state for number in part])
         assert _bits(fast) == _bits(mechanics.drive_efforts(*motion_of(closure, *state)))
+
+
+def everywhere(closure):
+    """Return loads on every joint, on a point of each link, and on each link that has a frame."""
+    linkage, random = closure.linkage, Random(closure.name)
+    joints = dict.fromkeys((*closure.input_names, *closure.joint_names))
+
+    def number():
+        return random.uniform(-3.0, 3.0)
+
+    frames = ['ground', 'link']
+    return AppliedLoads(
+        {name: JointSpring(abs(number()), number(), abs(number())) for name in joints},
+        {},
+        {
+            name: JointLoad(number(), ((0.0, number()), (2.0, number())),
+                            ((-9.0, number()), (9.0, number())), ((-50.0, number()), (50.0, 1.0)))
+            for name in joints
+        },
+        {
+            f'{link}.{points[0]}': PointLoad(
+                (number(), number(), number()),
+                'ground' if link in closure.idle else frames[count % 2],
+                number(),
+                ((0.0, number()), (2.0, number())),
+            )
+            for count, (link, points) in enumerate(linkage.links.items())
+            if link != 'ground' and points
+        },
+        {
+            link: WrenchLoad('', next(iter(linkage.links.get(link, ())), ''), frames[count % 2])
+            for count, link in enumerate(linkage.link_names)
+            if link != 'ground' and link not in closure.idle
+        },
+    )  # fmt: skip
+
+
+def table_at(table, value):
+    return np.interp(value, *zip(*table, strict=True)) if table else 0.0
+
+
+def applied_by_hand(motion, closure, position, applied, wrenches, seconds):
+    """Yield loads as `AbsoluteMotion.efforts` takes them."""
+    linkage = closure.linkage
+    values = dict(zip(closure.joint_names, position.joints, strict=True))
+    values |= dict(zip(closure.input_names, position.inputs, strict=True))
+    for name, value in values.items():
+        rate, spring, load = motion.joint_rate(name), *(
+            of[name] for of in (applied.joint_springs, applied.efforts)
+        )  # fmt: skip
+        effort = -spring.stiffness * (value - spring.free) - spring.damping * rate
+        effort += load.constant + table_at(load.over_time, seconds)
+        effort += table_at(load.over_position, value) + table_at(load.over_rate, rate)
+        yield from motion.joint_loads(name, effort)
+    for name, load in applied.forces.items():
+        link, _, point = name.rpartition('.')
+        way = np.array(load.direction) / np.linalg.norm(load.direction)
+        way = motion.turned(link, way) if load.frame == 'link' else way
+        force = (load.constant + table_at(load.over_time, seconds)) * way
+        yield link, motion.place(link, linkage.points[point]), force, np.zeros(3)
+    for link, numbers in wrenches.items():
+        load = applied.wrenches[link]
+        turn = motion.frames[link][2] if load.frame == 'link' else np.eye(3)
+        at = motion.frames[link][1]
+        place = motion.place(link, linkage.points[load.point]) if load.point else at
+        yield link, place, turn @ numbers[:3], turn @ numbers[3:]
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_loads_on_joints_points_and_links(name):
+    closure, random = weighed(name), Random(name)
+    applied = everywhere(closure)
+    mechanics = Mechanics(closure, Loads(GRAVITY, applied=applied))
+    wrenches = {link: [random.uniform(-2.0, 2.0) for _ in range(6)] for link in applied.wrenches}
+    for link, numbers in wrenches.items():
+        mechanics.applied.wrenches[link].set_wrench(tuple(numbers), 0)
+    for inputs, rates, changes in states_of(closure, 3, 0.2):
+        position, velocity, acceleration = motion_of(closure, inputs, rates, changes)
+        given = mechanics.applied.given_after(0.7)
+        found = mechanics.drive_efforts(position, velocity, acceleration, given)
+        motion = AbsoluteMotion(closure, inputs, rates, changes)
+        loads = applied_by_hand(motion, closure, position, applied, wrenches, 0.7)
+        expected = motion.efforts(GRAVITY, loads)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'bennett'])
+def test_loads_by_laws_are_traced_to_the_last_bit(name):
+    closure = weighed(name)
+    mechanics = Mechanics(closure, Loads(GRAVITY, applied=everywhere(closure)))
+    for (q,), _, _ in states_of(closure, 4, 0.2):
+        fast, slow = mechanics.motion_equation(q), mechanics.motion_terms(closure.position(q))
+        assert slow.laws
+        for one, other in zip(fast.laws, slow.laws, strict=True):
+            assert _bits(one) == _bits([number + 0.0 for number in other])
+        assert _bits(fast[:5]) == _bits(slow[:5])
+
+
+def test_rods_that_may_spin_bear_no_load_that_turns_with_them():
+    force = AppliedLoads(forces={'rod.B': PointLoad((1.0, 0.0, 0.0), 'link', 1.0)})
+    assert refusal('rssr', Loads(applied=force)).startswith('loads.forces.rod.B.frame: the rod')
+    wrench = AppliedLoads(wrenches={'rod': WrenchLoad()})
+    assert refusal('rssr', Loads(applied=wrench)).startswith('loads.wrenches.rod: the rod may')
+    flat = AppliedLoads(forces={'rod.B': PointLoad((1.0, 0.0), 'ground', 1.0)})
+    line = refusal('rssr', Loads(applied=flat))
+    assert line.startswith('loads.forces.rod.B.direction: [1, 0], and the linkage is spatial')
+
+
+ANKLE = b"""
+points:
+  b1: [0.035, 0.0165, 0.146]
+  b2: [0.040, -0.0165, 0.211]
+  c1: [0.022, 0.015, -0.010]
+  c2: [0.022, -0.015, -0.010]
+links: {bar1: [b1], bar2: [b2], rod1: [b1, c1], rod2: [b2, c2], foot: [c1, c2]}
+hinges:
+  m1: {parent: ground, child: bar1, at: [0.035, 0, 0.150], axis: [1, 0, 0], limits: [-0.6, 0.6]}
+  m2: {parent: ground, child: bar2, at: [0.040, 0, 0.215], axis: [1, 0, 0], limits: [-0.6, 0.6]}
+  pitch: {parent: ground, child: cross, at: [0, 0, 0], axis: [0, 1, 0]}
+  roll: {parent: cross, child: foot, at: [0, 0, -0.018], axis: [1, 0, 0]}
+input: [m1, m2]
+masses:
+  bar1: {mass: 0.1, center: [0.035, 0.010, 0.148], inertia: [8.0e-6, 0, 0, 2.0e-6, 0, 8.0e-6]}
+  bar2: {mass: 0.1, center: [0.040, -0.010, 0.213], inertia: [8.0e-6, 0, 0, 2.0e-6, 0, 8.0e-6]}
+  rod1: {mass: 0.06}
+  rod2: {mass: 0.07}
+  cross: {mass: 0}
+  foot: {mass: 0.8, center: [0.03, 0, -0.05], inertia: [5.0e-4, 0, 2.0e-5, 2.7e-3, 0, 3.1e-3]}
+"""
+SWINGING = b"""
+drive: {sine: {amplitude: 0.2, frequency: 2, inputs: {m2: {amplitude: 0.1, frequency: 3}}}}
+loads: {gravity: [0, 0, -9.81], wrenches: {foot: {point: c1, max_age: 10}}}
+effects: {velocity: {}, acceleration: {}, effort: {}}
+"""
+
+
+def test_a_scene_publishes_the_efforts_of_its_motors():
+    pipeline = pipeline_of(SWINGING, ANKLE)
+    closure, begin = pipeline.linkages[0].closure, 1_700_000_000_000_000_000
+    pipeline.tick(begin)
+    message = wrench_stamped(3.0, -2.0, 0.4, (5.0, 0.2, -0.1))
+    assert pipeline.wrenches[0].offer_wrench(message, begin) is None
+    for count in range(1, 200, 7):
+        tick = pipeline.tick(begin + count * 1_000_000)
+        state, crank = read_joint_state(tick.message), tick.states[0].crank
+        assert state.name == ['m1', 'm2', 'pitch', 'roll']
+        motion = AbsoluteMotion(closure, crank.angles, crank.rates, crank.accelerations)
+        place = motion.place('foot', closure.linkage.points['c1'])
+        load = 'foot', place, np.array([3.0, -2.0, 5.0]), np.array([0.2, -0.1, 0.4])
+        expected = motion.efforts((0.0, 0.0, -9.81), [load])
+        assert state.effort == pytest.approx([*expected, 0.0, 0.0], rel=1e-9, abs=1e-12)
 
 
 def _bits(numbers):

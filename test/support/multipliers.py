@@ -91,9 +91,9 @@ class AbsoluteMotion:
         velocity, spin = np.zeros((3, self.size)), np.zeros((3, self.size))
         if link != 'ground':
             first = 6 * self.moving.index(link)
-            velocity[:, first : first + 3] = np.eye(3)
-            velocity[:, first + 3 : first + 6] = -cross_matrix(place - self.frames[link][1])
-            spin[:, first + 3 : first + 6] = np.eye(3)
+            middle, last = first + 3, first + 6
+            velocity[:, first:middle] = spin[:, middle:last] = np.eye(3)
+            velocity[:, middle:last] = -cross_matrix(place - self.frames[link][1])
         return velocity, spin
 
     def motion(self, link, place):
@@ -208,4 +208,28 @@ class AbsoluteMotion:
         multipliers, *_ = np.linalg.lstsq(self.equations.T, needed, rcond=1e-11)
         off = np.abs(self.equations.T @ multipliers - needed).max()
         assert off < 1e-7 * (1.0 + np.abs(needed).max()), 'the joints do not hold the links'
-        return multipliers[-len(self.linkage.driven) :]
+        first = len(multipliers) - len(self.linkage.driven)
+        return multipliers[first:]
+
+    def joint_loads(self, name, effort):
+        """Yield the loads of an effort on a joint: on its child and, reversed, on its parent."""
+        none = np.zeros(3)
+        if name in self.linkage.struts:
+            ends = []
+            for point in self.linkage.struts[name]:
+                carriers = self.linkage.links.items()
+                link = next(link for link, points in carriers if point in points)
+                ends.append((link, self.place(link, self.linkage.points[point])))
+            (one, start), (other, end) = ends
+            along = effort * (end - start) / np.linalg.norm(end - start)
+            yield one, start, -along, none
+            yield other, end, along, none
+            return
+        parent, child, place, axis = self._ends(name)
+        force, moment = (none, axis) if name in self.linkage.hinges else (axis, none)
+        yield child, place, effort * force, effort * moment
+        yield parent, place, -effort * force, -effort * moment
+
+    def joint_rate(self, name):
+        """Return the rate of a joint."""
+        return self._rate(name)[0] @ self.rates

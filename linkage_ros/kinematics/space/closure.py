@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -272,6 +272,16 @@ class SpaceClosure(StepwiseClosure):
         )
 
         return SpatialTracker(self._plan, points, links)
+
+    def carried_vector(self, link: str, vector: Vector) -> Callable[[Position], Vector]:
+        """Return a function that gives a vector of the pose as a link with a frame turns it."""
+        pin, own = self._plan.frames[link], self._plan.pose_frames[link].resolve(vector)
+        return lambda position: position.state.pins[pin].turn(own)
+
+    def spin_of(self, link: str) -> Callable[[Velocity], Vector]:
+        """Return a function that gives the spin of a link with a frame, in [rad/s]."""
+        pin = self._plan.frames[link]
+        return lambda velocity: velocity.state.pins[pin].spin
 
     def rod_axis(self, link: str) -> RodAxis:
         """Return the axis of a rod that may spin, in the pose, in [m]."""

@@ -47,7 +47,6 @@ from linkage_ros.stages.drives.drive import (
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import HeldWrench, Mechanics, Motor, Winding
-    from linkage_ros.messages import PlanarWrench
 
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
@@ -508,7 +507,7 @@ class TorqueCrank(Crank):
         """Return the state of the mechanism at the last boundary of a step."""
         return self._motion
 
-    def load(self, held: HeldWrench, wrench: PlanarWrench, now: int) -> None:
+    def load(self, held: HeldWrench, wrench: tuple[float, ...], now: int) -> None:
         """Let a wrench act on its link from a time on, in [ns]."""
         if self._time >= 0:
             self._advance(now)

@@ -78,6 +78,7 @@ class ComplianceEffect(MechanismEffect):
 
     needs = ('pin_forces',)
     needs_forces = True
+    is_planar = True
     is_compiled = True
     sample = '{links: {coupler: 1.0e+7}}'
 
@@ -134,6 +135,7 @@ class ClearanceEffect(MechanismEffect):
 
     needs = ('pin_forces',)
     needs_forces = True
+    is_planar = True
     is_compiled = True
     sample = '{pins: {B: 1.0e-4}}'
 

@@ -89,6 +89,7 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
 
     needs = ('acceleration',)
     needs_forces = True
+    is_planar = True
     is_compiled = True
     topic = '~/pin_forces'
     message = 'sensor_msgs/msg/MultiDOFJointState'

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from math import hypot
 
 from linkage_ros.description import Scene
 from linkage_ros.messages import MessageContent, MessageValues, read_wrench, Rejection, WRENCHES
@@ -289,14 +290,20 @@ def _millisecond_column(durations: Times) -> Numbers:
     return (durations * 1e-6).astype(np.float64)[:, None]
 
 
+_TORQUE = 3
+"""Index of the first number of the torque in a wrench."""
+
+
 class LinkWrenches:
     """
     Collects the wrenches on links, of a window, each from its topic.
 
+    ``numbers`` has for each topic the indices of those numbers of a message that move the linkage.
     Messages that are ``left_out`` are counted by reason.
     """
 
-    def __init__(self, topics: Sequence[str], window: Window) -> None:
+    def __init__(self, numbers: Mapping[str, Sequence[int]], window: Window) -> None:
+        topics, self._numbers = [*numbers], numbers
         self._kept = {}
         for topic in topics:
             name = shorten_text(topic.rpartition('/')[2])
@@ -316,7 +323,11 @@ class LinkWrenches:
             if isinstance(wrench, Rejection):
                 self.left_out[wrench.value] += 1
             else:
-                numbers[row] = np.hypot(wrench.fx, wrench.fy), wrench.moment
+                counted = self._numbers[topic]
+                force = [wrench[index] for index in counted if index < _TORQUE]
+                moment = [wrench[index] for index in counted if index >= _TORQUE]
+                # In the plane a moment has a sign.
+                numbers[row] = hypot(*force), moment[0] if len(moment) == 1 else hypot(*moment)
         self._kept[topic].add(times, numbers)
 
     def build_curves(self) -> list[Curves]:

@@ -239,7 +239,8 @@ class SceneRun:
         self._forces = PinForces(', '.join(forces), window)
         for name in forces:
             self._topics.setdefault(name, 'forces')
-        self._loads = LinkWrenches(run.wrenches, window)
+        loads = zip(run.wrenches, pipeline.wrenches, strict=True)
+        self._loads = LinkWrenches({name: load.wrench.numbers for name, load in loads}, window)
         self._loaded = {name: f'wrenches {name}' for name in run.wrenches}
         self._topics = {**self._loaded, **self._topics}
         self._topics.pop('', None)
