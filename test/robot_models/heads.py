@@ -8,6 +8,7 @@
 
 """A head on six motors, as a desktop robot has it: on rods whose balls are three hinges each."""
 
+from itertools import pairwise
 from math import cos, pi, sin
 
 import numpy as np
@@ -53,8 +54,10 @@ def _ball(name, parent, child, at, rng):
     return [
         *(_link(link) for link in links[1:3]),
         *(
-            _joint(f'{name}_{letter}', *links[k : k + 2], at if not k else [0, 0, 0], axes[k])
-            for k, letter in enumerate('abc')
+            _joint(f'{name}_{letter}', *ends, [0, 0, 0] if number else at, axis)
+            for number, (letter, ends, axis) in enumerate(
+                zip('abc', pairwise(links), axes, strict=True)
+            )
         ),
     ]
 

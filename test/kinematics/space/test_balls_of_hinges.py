@@ -9,6 +9,7 @@
 """Rods whose balls are three hinges through one point, as robots' files have them."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from linkage_ros import load
@@ -36,8 +37,9 @@ def written_as_hinges(linkage, rod, point, rng):
     on = next(link for link in linkage.links if point in linkage.links[link] and link != rod)
     ends = [on, f'{point}_1', f'{point}_2', rod]
     hinges = dict(linkage.hinges)
-    for number, axis in enumerate(axes_across(rng)):
-        one, other = ends[number : number + 2][:: rng.choice((1, -1))]
+    pairs = zip(pairwise(ends), axes_across(rng), strict=True)
+    for number, (joined, axis) in enumerate(pairs):
+        one, other = joined[:: rng.choice((1, -1))]
         # Any point of the axis, with the noise of CAD.
         at = linkage.points[point] + axis * rng.uniform(-1, 1) + rng.normal(size=3) * 1e-12
         hinges[f'{point}_hinge{number}'] = SpatialJoint(one, other, tuple(axis), tuple(at))
