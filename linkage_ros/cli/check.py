@@ -318,7 +318,7 @@ def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> G
         given = closure.linkage.driven_joints[group.index]
         place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
         ratio = closure.linkage.ratios.get(given.joint)
-        follows = f' follows {ratio.of} by {ratio.ratio:g}' if ratio else ''
+        follows = f' follows {ratio.text}' if ratio else ''
         kind = 'ratio' if ratio else 'input'
         method = f'{given.joint}{follows}, {place} on {group.joint.to}'
         return GroupDescription(kind, [group.joint.link], method, '')
@@ -337,7 +337,7 @@ def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> G
         return GroupDescription(f'{group.kind} dyad', links, 'closed form', assembly)
     if isinstance(group, GearedLinks):
         ratios = ((name, closure.linkage.ratios[name]) for name in group.ratios)
-        followed = [f'{name} follows {ratio.of} by {ratio.ratio:g}' for name, ratio in ratios]
+        followed = [f'{name} follows {ratio.text}' for name, ratio in ratios]
         return GroupDescription('ratio', list(group.links), list_names(followed), '')
     (equations,) = (step.equation_count for step in steps if step.iterates)
     method = f"iterated: Newton's method, {equations} equations"

@@ -254,7 +254,7 @@ def _parse_linkage(
     units |= {driven.joint: driven.unit for driven in inputs}
     parts['slide'] = [name for name, unit in units.items() if unit == 'm']
     ratios = {
-        name: ratio_in_si(one, units.get(name), units.get(one.of), content.units)
+        name: ratio_in_si(one, name, units, content.units)
         for name, one in (read('ratios') or {}).items()
     }
     x, y = read('axes')

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, MISSING, replace
 from functools import partial
 from itertools import chain, repeat
@@ -462,12 +462,19 @@ LINKAGE = Keys(
 )
 
 
-def ratio_in_si(ratio: Ratio, unit: str | None, driving: str | None, units: Units) -> Ratio:
-    """Return a ratio of the file's units of length: metres for a radian, radians for a metre."""
-    found = units.to_si(ratio.ratio, 'm' if unit == 'm' else '')
-    if driving == 'm':
-        found /= units.to_si(1.0, 'm')
-    return replace(ratio, ratio=found)
+def ratio_in_si(ratio: Ratio, name: str, unit_of: Mapping[str, str | None], units: Units) -> Ratio:
+    """
+    Return the ratio of a joint in SI units: metres for a radian, radians for a metre.
+
+    ``unit_of`` has the unit of each joint.
+    """
+
+    def factor_in_si(factor: float, of: str) -> float:
+        found = units.to_si(factor, 'm' if unit_of.get(name) == 'm' else '')
+        return found / units.to_si(1.0, 'm') if unit_of.get(of) == 'm' else found
+
+    also = {of: factor_in_si(factor, of) for of, factor in ratio.also.items()}
+    return replace(ratio, ratio=factor_in_si(ratio.ratio, ratio.of), also=also)
 
 
 def planar_schema() -> Schema:

@@ -220,7 +220,8 @@ def _joint_content(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
 
 def _ratio_content(given: Ratio) -> dict[str, Content]:
     offset: dict[str, Content] = {'offset': given.offset} if given.offset else {}
-    return {'of': given.of, 'ratio': given.ratio, **offset}
+    also: dict[str, Content] = {'also': {**given.also}} if given.also else {}
+    return {'of': given.of, 'ratio': given.ratio, **also, **offset}
 
 
 def _limits_content(limits: Limits) -> dict[str, Content]:

@@ -203,7 +203,7 @@ class _Robot:
                 name += '_'
             taken.add(name)
             self._loops.append(loop._replace(name=name))
-        self._driven = tuple(driven) or urdf.inputs
+        self._driven = tuple(driven) or urdf.inputs or tuple(self._find_actuated())
         self._ratios = dict(self._find_ratios())
         groups = self._find_groups()
         groups = [group for group in groups if group[1]] or groups
@@ -220,7 +220,9 @@ class _Robot:
         self._closed = [loop for loop in self._loops if loop.kind != 'rod']
         self._directed = [loop for loop in self._loops if _is_directed(loop)]
         looped = {name for loop in self._loops for name in self._names_of(loop)}
-        self._needless = [name for name, of in self._ratios.items() if {name, of.of} <= looped]
+        self._needless = [
+            name for name, ratio in self._ratios.items() if {name, *ratio.terms} <= looped
+        ]
         """Joints that follow others in loops, which may move them as well."""
         kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
@@ -238,12 +240,21 @@ class _Robot:
         """Return the joints that loops and ratios tie together, with the loops."""
         groups: list[tuple[set[str], list[UrdfLoop]]] = []
         found = [(self._names_of(loop), [loop]) for loop in self._loops]
-        for names, loops in (*found, *(({k, of.of}, []) for k, of in self._ratios.items())):
+        found += [({name, *ratio.terms}, []) for name, ratio in self._ratios.items()]
+        for names, loops in found:
             tied = [group for group in groups if group[0] & names]
             groups = [group for group in groups if group not in tied]
             tied_names = names.union(*(group[0] for group in tied))
             groups.append((tied_names, [*(one for _, of in tied for one in of), *loops]))
         return groups
+
+    def _find_actuated(self) -> list[str]:
+        """Return the joints in loops and couplings that the file says motors move."""
+        ends = [tuple(end.link for end in loop.ends) for loop in self._loops]
+        ends += [(predecessor, successor) for _, predecessor, successor, _ in self._urdf.couplings]
+        tied = {joint.name for pair in ends for joint in chain(*self._ways(*pair))}
+        tied |= {joint.mimics for joint in self._urdf.joints.values()}
+        return [name for name in self._urdf.actuated if name in tied]
 
     def _names_of(self, loop: UrdfLoop) -> set[str]:
         ways = self._ways(*(end.link for end in loop.ends))
@@ -274,9 +285,9 @@ class _Robot:
                     remedy += ': input: JOINT in a scene, --input JOINT'
                 raise DefinitionError('input', reason, remedy)
             if name in self._ratios and name not in self._needless:
-                leader = self._ratios[name].of
-                reason = f'{quote(name)} follows {quote(leader)}'
-                raise DefinitionError('input', reason, f'drive {quote(leader)}')
+                leaders = list_names(map(quote, self._ratios[name].terms))
+                reason = f'{quote(name)} follows {leaders}'
+                raise DefinitionError('input', reason, f'drive {leaders}')
         if len(kept) > _MOST_JOINTS or len(self._loops) > _MOST_LOOPS:
             reason = f'has {len(kept)} joints in {len(self._loops)} loops that move together'
             raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
@@ -315,9 +326,9 @@ class _Robot:
 
     def _is_geared(self, name: str) -> bool:
         """Return whether a joint turns against a link that the joint that it follows does."""
-        joints = (self._urdf.joints[name], self._urdf.joints[self._ratios[name].of])
-        one, other = ({self._body(of.parent), of.child} for of in joints)
-        return not one.isdisjoint(other)
+        joints = (self._urdf.joints[each] for each in (name, *self._ratios[name].terms))
+        one, *others = ({self._body(of.parent), of.child} for of in joints)
+        return not any(map(one.isdisjoint, others))
 
     def _body(self, link: str) -> str:
         """Return the link that moves a link, or the root."""
@@ -395,16 +406,20 @@ class _Robot:
                 yield joint.name, Ratio(joint.mimics, joint.multiplier, joint.offset)
         for name, predecessor, successor, ratio in self._urdf.couplings:
             ways = self._ways(predecessor, successor)
-            chains = [[one.name for one in way if one.kind in MOVING] for way in ways]
-            if [*map(len, chains)] != [1, 1] or not ratio:
-                reason = f'couples {len(chains[0])} and {len(chains[1])} joints by {ratio:g}'
-                remedy = 'couple one joint with one, by a ratio other than 0'
+            leaders, followers = ([one.name for one in way if one.kind in MOVING] for way in ways)
+            if not leaders or not followers or not ratio:
+                reason = f'couples {len(leaders)} and {len(followers)} joints by {ratio:g}'
+                remedy = 'name links that joints move, and a ratio other than 0'
                 raise self._error(name, reason, remedy)
-            (leader,), (follower,) = chains
-            if follower in self._driven:
-                yield leader, Ratio(follower, 1.0 / ratio)
-            else:
-                yield follower, Ratio(leader, ratio)
+            # The sum of the followers is the ratio times the sum of the leaders.
+            terms = {**dict.fromkeys(followers, -1.0), **dict.fromkeys(leaders, ratio)}
+            moved = next((each for each in terms if each not in self._driven), None)
+            if moved is None:
+                reason = f'couples the inputs {list_names(terms)}'
+                raise self._error(name, reason, 'leave one of them out of the inputs')
+            by = -terms.pop(moved)
+            (of, first), *others = ((each, factor / by) for each, factor in terms.items())
+            yield moved, Ratio(of, first, also=dict(others))
 
     # The pose
 
@@ -431,8 +446,8 @@ class _Robot:
         """Return values after some moves; joints follow others."""
         values = values | {name: values[name] + move for name, move in moves.items()}
         return values | {
-            name: of.ratio * values[of.of] + of.offset
-            for name, of in ratios.items()
+            name: ratio.value_at(values)
+            for name, ratio in ratios.items()
             if name not in self._told
         }
 
@@ -498,16 +513,18 @@ class _Robot:
                 # A line is carried along to the place that slides on it.
                 place = _end_frame(loop.ends[1] if slides else end, frames).origin
                 for joint in way:
-                    of = ratios.get(joint.name, Ratio(joint.name, 1.0))
-                    if of.of in rates and joint.kind in MOVING:
+                    ratio = ratios.get(joint.name, Ratio(joint.name, 1.0))
+                    moved = [each for each in ratio.terms if each in rates]
+                    if moved and joint.kind in MOVING:
                         frame = frames[joint.child]
                         rate = frame.turn(direction_of(joint.axis))
                         if turns:
                             rate = scale(0.0 if joint.kind == 'prismatic' else self._size, rate)
                         elif joint.kind != 'prismatic':
                             rate = cross(rate, minus(place, frame.origin))
-                        before = rates[of.of][number]
-                        rates[of.of][number] = plus(before, scale(sign * of.ratio, rate))
+                        for of in moved:
+                            part = scale(sign * ratio.terms[of], rate)
+                            rates[of][number] = plus(rates[of][number], part)
             if slides or (turns and loop.kind == 'hinge'):
                 first, _ = loop.ends
                 axis = _end_frame(first, frames).turn(direction_of(first.axis))

@@ -112,7 +112,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         driven=driven,
         published=(*driven, *published) if publish_inputs else published,
         ratios={
-            name: ratio_in_si(ratio, units.get(name), units.get(ratio.of), content.units)
+            name: ratio_in_si(ratio, name, units, content.units)
             for name, ratio in values.get('ratios', {}).items()
         },
         traced=values.get('traced', ()),
@@ -141,7 +141,7 @@ def _mass_of(
 def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:
     """Refuse a link that one joint alone names, almost as another is: a typo, but of gears."""
     ratios = values.get('ratios', {})
-    geared = {*ratios, *(ratio.of for ratio in ratios.values())}
+    geared = {*ratios, *(of for ratio in ratios.values() for of in ratio.terms)}
     ends = [
         (kind, joint, end, given[end])
         for kind in ('hinges', 'slides', 'balls')

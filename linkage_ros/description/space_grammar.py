@@ -30,6 +30,7 @@ from linkage_ros.description.parameters import (
     declare,
     Keys,
     Kind,
+    Number,
     number,
     NumberList,
     ParameterGroup,
@@ -40,6 +41,7 @@ from linkage_ros.description.parameters import (
     TextOf,
 )
 from linkage_ros.description.section import Section
+from linkage_ros.kinematics import Ratio
 
 _MOMENTS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
@@ -175,6 +177,21 @@ _MASS = Keys(
     },
     WHOLE_BODY,
 )
+_RATIO = Keys(
+    RATIO.meaning,
+    Ratio,
+    {
+        **RATIO.entries,
+        'also': declare(
+            Named(
+                'further joints that add to it, each with its ratio',
+                Number('a ratio', '', -FARTHEST, FARTHEST),
+                MOST_LINKS,
+            ),
+            None,
+        ),
+    },
+)
 SPACE = Keys(
     'A spatial linkage: points in one pose, and what joins the links there.',
     dict,
@@ -210,7 +227,7 @@ SPACE = Keys(
             ),
             None,
         ),
-        'ratios': _by_name(RATIO.meaning, _group(RATIO)),
+        'ratios': _by_name(_RATIO.meaning, _group(_RATIO)),
         'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
         'masses': _by_name('Masses of the links, by link name.', _group(_MASS)),
     },

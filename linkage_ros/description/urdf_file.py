@@ -64,7 +64,7 @@ LOOP_KINDS = {
 
 _USUAL_TAGS = (
     'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
-    *_LOOP_TAGS,
+    'coupling', *_LOOP_TAGS,
 )  # fmt: skip
 
 _NUMBER = r'[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?'
@@ -133,6 +133,7 @@ class UrdfFile(NamedTuple):
     joints: Mapping[str, UrdfJoint]  # Joints by name, parents first
     order: tuple[str, ...]  # Names of the joints in the order of the file
     inputs: tuple[str, ...]  # Names of driven joints, if ``linkage urdf`` wrote the file
+    actuated: tuple[str, ...]  # Names of joints that the file says motors move
     # Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
     start: Mapping[str, float]
     loops: tuple[UrdfLoop, ...]  # What closes loops, as tags say; of two at one place the first
@@ -229,6 +230,7 @@ class _Reader:
             {joint.name: joint for joint in ordered},
             tuple(joints),
             tuple(each.get('name', '') for each in said if each.tag == 'input'),
+            tuple(_actuated_joints(root, joints)),
             {
                 each.get('name', ''): self._read_value(each, 'value', 'linkage_start')
                 for each in said
@@ -512,3 +514,27 @@ def _joints_below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJo
             if joint.parent == link:
                 yield joint
                 reached.append(joint.child)
+
+
+def _actuated_joints(root: ET.Element, joints: Mapping[str, UrdfJoint]) -> list[str]:
+    """Return the joints that ros2_control commands, else transmissions, else URDF+ says."""
+    commanded = [
+        joint.get('name', '')
+        for joint in root.iterfind('ros2_control/joint')
+        if joint.find('command_interface') is not None
+    ]
+    transmitted = [joint.get('name', '') for joint in root.iterfind('transmission/joint')]
+    independent = [
+        joint.get('name', '')
+        for joint in root.findall('joint')
+        if joint.get('independent') == 'true'
+    ]
+    for names in (commanded, transmitted, independent):
+        moving = [
+            name
+            for name in dict.fromkeys(names)
+            if name in joints and joints[name].kind in MOVING and not joints[name].mimics
+        ]
+        if moving:
+            return moving
+    return []

@@ -46,7 +46,7 @@ hinges:
 slides: {way: {parent: ground, child: cart, axis: [0, 1, 0], value: 0, limits: [-9, 9],
                velocity: 9, effort: 9}}
 struts: {leg: [S, U]}
-ratios: {gear: {of: crank_joint, ratio: 2, offset: 0}}
+ratios: {gear: {of: crank_joint, ratio: 2, offset: 0, also: {}}}
 input: [crank_joint, leg]
 joints: [rocker_joint, gear]
 traced: [A]

@@ -23,10 +23,10 @@ from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
     Input,
     Linkage,
-    Ratio,
     RevoluteJoint,
     SlideJoint,
     Slider,
+    turn_ratios,
 )
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class _Exchange:
             joints=self._joints,
             assembly={},
             pose=None,
-            ratios=_turn_ratios(linkage.ratios, names),
+            ratios=turn_ratios(linkage.ratios, names),
             nominal=None,
         )
         self._hold_without_pins()
@@ -225,24 +225,3 @@ def _turn_within(value: float, given: Input) -> float:
     if not given.slider:
         value -= tau * round((value - 0.5 * (low + high)) / tau)
     return min(max(value, low), high)
-
-
-def _turn_ratios(ratios: Mapping[str, Ratio], names: Sequence[str]) -> dict[str, Ratio]:
-    """Return the ratios with these joints as inputs: what they followed follows them."""
-    turned = dict(ratios)
-    for name in names:
-        follower = name
-        chain = []
-        while follower in turned:
-            ratio = turned.pop(follower)
-            if ratio.of in names:
-                raise DefinitionError(
-                    name, f'and {ratio.of} are one freedom: the first follows the other',
-                    'name a joint of another freedom',
-                )  # fmt: skip
-            chain.append(
-                (ratio.of, Ratio(follower, 1.0 / ratio.ratio, -ratio.offset / ratio.ratio))
-            )
-            follower = ratio.of
-        turned |= chain
-    return turned

@@ -15,10 +15,12 @@ is a pin of these links.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any, ClassVar, Literal
+
+from linkage_ros.errors import DefinitionError, list_names
 
 Point = tuple[float, float]
 
@@ -173,13 +175,63 @@ class Ratio:
     ratio
         In [rad] or [m] of the joint for a [rad] or [m] of the other.
     offset
-        Value of the joint where the other is at 0, in [rad] or [m].
+        Value of the joint where the others are at 0, in [rad] or [m].
+    also
+        In space, further joints that add to it, each with its ratio, as of a belt over a joint or
+        of a differential. In the plane a joint between the outer links is the sum.
 
     """
 
     of: str
     ratio: float
     offset: float = 0.0
+    also: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """Return the ratio of each joint that is followed."""
+        return {self.of: self.ratio, **self.also}
+
+    def value_at(self, values: Mapping[str, float]) -> float:
+        """Return the value of the joint at those of the joints that it follows."""
+        total = self.ratio * values[self.of]
+        for name, ratio in self.also.items():
+            total += ratio * values[name]
+        return total + self.offset
+
+    @property
+    def text(self) -> str:
+        """Return what is followed, in words."""
+        return ' and '.join(f'{name} by {ratio:g}' for name, ratio in self.terms.items())
+
+
+def turn_ratios(ratios: Mapping[str, Ratio], names: Sequence[str]) -> dict[str, Ratio]:
+    """
+    Return the ratios with these joints as inputs: what they followed follows them.
+
+    Raises
+    ------
+    DefinitionError
+        If a joint follows other inputs only.
+
+    """
+    turned = dict(ratios)
+    for name in names:
+        follower = name
+        chain = []
+        while follower in turned:
+            ratio = turned.pop(follower)
+            of = next((each for each in ratio.terms if each not in names), '')
+            if not of:
+                others = list_names(ratio.terms)
+                reason = f'and {others} are one freedom: the first follows the other'
+                raise DefinitionError(name, reason, 'name a joint of another freedom')
+            factor = ratio.terms[of]
+            also = {each: -by / factor for each, by in ratio.terms.items() if each != of}
+            chain.append((of, Ratio(follower, 1.0 / factor, -ratio.offset / factor, also)))
+            follower = of
+        turned |= chain
+    return turned
 
 
 @dataclass(frozen=True, slots=True)

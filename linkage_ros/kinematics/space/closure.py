@@ -20,7 +20,7 @@ from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
-from linkage_ros.kinematics.plane.linkage import SlideJoint
+from linkage_ros.kinematics.plane.linkage import SlideJoint, turn_ratios
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.space.carried_points import CarriedPoints
 from linkage_ros.kinematics.space.free_platforms import carry_platforms, free_platforms
@@ -199,7 +199,9 @@ class SpaceClosure(StepwiseClosure):
         linkage = self.measuring(*joints).linkage
         names = dict.fromkeys((*linkage.driven, *linkage.published))
         published = tuple(name for name in names if name not in joints)
-        return SpaceClosure(replace(linkage, driven=joints, published=published), self.name)
+        ratios = turn_ratios(linkage.ratios, joints)
+        exchanged = replace(linkage, driven=joints, published=published, ratios=ratios)
+        return SpaceClosure(exchanged, self.name)
 
     def measuring(self, *names: str) -> SpaceClosure:
         """
@@ -367,10 +369,11 @@ class SpaceClosure(StepwiseClosure):
             if start in known and end in known:
                 yield length(minus(known[start], known[end])) - values[name]
         for name, ratio in linkage.ratios.items():
-            own, of = (
-                1.0 if joint in linkage.hinges else self.scale for joint in (name, ratio.of)
+            own, *of = (
+                values[joint] * (1.0 if joint in linkage.hinges else self.scale)
+                for joint in (name, *ratio.terms)
             )
-            off = values[name] * own - ratio.ratio * values[ratio.of] * of - ratio.offset
+            off = own - ratio.value_at(dict(zip(ratio.terms, of, strict=True)))
             yield remainder(off, tau) if name in linkage.hinges else off / self.scale
 
     def _slide_errors(self, state: LinkState, joint: SpatialJoint) -> Iterator[float]:

@@ -59,7 +59,9 @@ class _MotionEquations:
             rows += self._joint_rows(joint, name in linkage.hinges)
         self.needed = 6 + 5 * len(linkage.pair_joints)
         ratios = [
-            _without_unit(self.rate(name) - ratio.ratio * self.rate(ratio.of))[None]
+            _without_unit(
+                self.rate(name) - sum(factor * self.rate(of) for of, factor in ratio.terms.items())
+            )[None]
             for name, ratio in linkage.ratios.items()
         ]
         self.needed += len(ratios)

@@ -299,22 +299,32 @@ def _check_driven(linkage: SpaceLinkage) -> None:
         key = f'ratios.{name}'
         _check_name(key, name, 'hinge or slide', linkage.pair_joints)
         _check_name(f'{key}.of', ratio.of, 'joint', names)
+        for other in ratio.also:
+            _check_name(f'{key}.also', other, 'joint', names)
         if name in linkage.driven:
             reason = f'{quote(name)} is an input, which follows no joint'
             raise DefinitionError(key, reason, 'leave one of the two out')
-        chain = [name]
-        while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
-            chain.append(linkage.ratios[chain[-1]].of)
-        if chain[-1] in chain[:-1]:
-            reason, remedy = ' follows '.join(chain), 'let one of them follow an input'
+        if circle := _find_circle(linkage, [name]):
+            reason, remedy = ' follows '.join(circle), 'let one of them follow an input'
             raise DefinitionError(f'{key}.of', reason, remedy)
-        expected = ratio.ratio * linkage.pose_value(ratio.of) + ratio.offset
+        expected = ratio.value_at({each: linkage.pose_value(each) for each in ratio.terms})
         found = linkage.pose_value(name)
-        if not ratio.ratio or abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
+        if not all(ratio.terms.values()) or abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
             raise DefinitionError(
                 key, f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
                 'write a ratio other than 0 and the offset that fits the pose',
             )  # fmt: skip
+
+
+def _find_circle(linkage: SpaceLinkage, chain: list[str]) -> list[str]:
+    """Return joints that follow each other in a circle, from a chain of followers on; or none."""
+    ratio = linkage.ratios.get(chain[-1])
+    for name in ratio.terms if ratio else ():
+        if name in chain:
+            return [*chain, name]
+        if circle := _find_circle(linkage, [*chain, name]):
+            return circle
+    return []
 
 
 def _check_name(key: str, name: str, what: str, names: object) -> None:

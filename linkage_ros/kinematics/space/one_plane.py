@@ -86,7 +86,8 @@ def linkage_in_plane(linkage: SpaceLinkage) -> Linkage | None:
     x, y, z = GROUND_FRAME[:3]
     for normal, axes in zip((x, scale(-1.0, y), z), _PLANES, strict=True):
         model = model_in_plane(linkage, carried, normal)
-        if model is not None and linkage.ratios.keys() <= {*linkage.published}:
+        sums = any(ratio.also for ratio in linkage.ratios.values())
+        if model is not None and not sums and linkage.ratios.keys() <= {*linkage.published}:
             return _in_plane(linkage, model.with_joints(linkage.published, linkage.links), axes)
     return None
 

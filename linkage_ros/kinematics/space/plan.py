@@ -31,7 +31,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
-from math import atan2, dist, hypot, lcm, tau
+from math import atan2, dist, fsum, hypot, lcm, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
@@ -77,7 +77,7 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
     ZERO,
 )
-from linkage_ros.kinematics.step import FollowerJoint, LinkState
+from linkage_ros.kinematics.step import FollowerJoint, GearedAngle, LinkState
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.knot import Knot
@@ -361,17 +361,26 @@ class SpacePlan:
     def _follow(self, name: str) -> bool:
         """Give a joint that follows a known one its value."""
         ratio = self.linkage.ratios[name]
-        if name in self.coordinates or ratio.of not in self.coordinates:
+        if name in self.coordinates or not ratio.terms.keys() <= self.coordinates.keys():
             return False
-        own, other = (self.scale if self._slides(one) else 1.0 for one in (name, ratio.of))
-        of = self.coordinates[ratio.of]
+        own = self.scale if self._slides(name) else 1.0
+        offset = ratio.offset / own
+        factors = {
+            self.coordinates[of]: factor * (self.scale if self._slides(of) else 1.0) / own
+            for of, factor in ratio.terms.items()
+        }
         self.coordinates[name] = len(self.state.coordinates)
-        factor, offset = ratio.ratio * other / own, ratio.offset / own
-        if of in self.turns_with:
-            turns = tuple(factor * each for each in self.turns_with[of])
-            self.turns_with[self.coordinates[name]] = turns
-        self.add_step(FollowerJoint(name, of, 0, 0.0, factor, offset))
-        self.end_group('ratio', (), f'{name} follows {ratio.of} by {ratio.ratio:g}')
+        if factors.keys() <= self.turns_with.keys():
+            turns = [
+                [factor * each for each in self.turns_with[of]] for of, factor in factors.items()
+            ]
+            self.turns_with[self.coordinates[name]] = tuple(map(fsum, zip(*turns, strict=True)))
+        if ratio.also:
+            self.add_step(GearedAngle(tuple(factors.items()), offset))
+        else:
+            ((of, factor),) = factors.items()
+            self.add_step(FollowerJoint(name, of, 0, 0.0, factor, offset))
+        self.end_group('ratio', (), f'{name} follows {ratio.text}')
         return True
 
     def _aim(self, name: str) -> bool:
@@ -592,7 +601,8 @@ class SpacePlan:
     def _measure_published(self) -> None:
         """Measure published joints that no step found."""
         linkage = self.linkage
-        wanted = [*linkage.published, *(ratio.of for ratio in linkage.ratios.values())]
+        followed = (of for ratio in linkage.ratios.values() for of in ratio.terms)
+        wanted = [*linkage.published, *followed]
         self.lost: list[str] = []
         """Published joints that no step can find."""
         for name in dict.fromkeys(wanted):
@@ -643,13 +653,20 @@ class SpacePlan:
         """Return the turns of a single input after which the joints that follow it repeat."""
         turns = 1
         for name in self.linkage.ratios:
-            total, of = 1.0, name
-            while of in self.linkage.ratios:
-                total *= self.linkage.ratios[of].ratio
-                of = self.linkage.ratios[of].of
-            if of in self.linkage.driven and not (self._slides(of) or self._slides(name)):
-                turns = lcm(turns, count_turns(total))
+            totals = self._factors_of_inputs(name)
+            if len(totals) == 1 and not self._slides(name):
+                turns = lcm(turns, *map(count_turns, totals.values()))
         return turns
+
+    def _factors_of_inputs(self, name: str) -> dict[str, float]:
+        """Return by how much a joint turns with each turn of an input that turns, by ratios."""
+        if name not in self.linkage.ratios:
+            return {name: 1.0} if name in self.linkage.driven and not self._slides(name) else {}
+        totals: dict[str, float] = {}
+        for of, ratio in self.linkage.ratios[name].terms.items():
+            for given, factor in self._factors_of_inputs(of).items():
+                totals[given] = totals.get(given, 0.0) + ratio * factor
+        return totals
 
 
 def _dual_basis(axes: list[Vector]) -> list[Vector]:

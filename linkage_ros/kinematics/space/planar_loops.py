@@ -274,7 +274,9 @@ class PlanarModel:
         self._ratios = {
             name: ratio
             for name, ratio in linkage.ratios.items()
-            if name in self._joints and ratio.of in (*self._joints, *self._inputs)
+            if name in self._joints
+            and not ratio.also
+            and ratio.of in (*self._joints, *self._inputs)
         }
         self._near = MERGED * size_of(linkage)
         self._pins = self._find_pins()

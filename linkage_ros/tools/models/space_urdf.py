@@ -116,11 +116,14 @@ class SpaceTree:
         ET.SubElement(element, 'child', link=own_name(child))
         ET.SubElement(element, 'axis', xyz=format_numbers(*on.resolve(axis)))
         mimic = linkage.ratios.get(name)
-        while mimic and (before := linkage.ratios.get(mimic.of)):
+        while mimic and not mimic.also and (before := linkage.ratios.get(mimic.of)):
             # A joint mimics one that mimics none.
+            if before.also:
+                break
             offset = mimic.offset + mimic.ratio * before.offset
             mimic = Ratio(before.of, mimic.ratio * before.ratio, offset)
-        mimic = mimic and replace(mimic, of=own_name(mimic.of))
+        # URDF has no sums.
+        mimic = replace(mimic, of=own_name(mimic.of)) if mimic and not mimic.also else None
         computed = write_limits(element, joint.limits, -FARTHEST, FARTHEST, mimic)
         told = 'input' if name in linkage.driven else 'joint'
         value = format_number(joint.value)
