@@ -21,14 +21,13 @@ from linkage_ros.description.linkage_grammar import (
     is_rod,
     LINKAGE,
     ratio_in_si,
+    read_units,
     SHORTHANDS,
-    UNITS,
     WRITTEN_OUT,
 )
 from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_file import is_spatial, read_space_closure
-from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import read_yaml
 from linkage_ros.errors import DefinitionError, FileError, list_names
 from linkage_ros.kinematics import (
@@ -197,7 +196,7 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
     if not is_planar_file(content):
         key = 'urdf' if 'urdf' in content else 'points'
         raise content.error(key, 'make it a spatial linkage', PLANAR_ONLY)
-    content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))
+    read_units(content)
     for shorthand, keys in SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)

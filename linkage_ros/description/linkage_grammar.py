@@ -284,8 +284,16 @@ _MASS = Keys(
 _PLACE = Point('where the point lies in the frame of its link: [x, y]', 'm', FARTHEST)
 
 
-def _by_name(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
-    return declare(Named(meaning, ParameterGroup(of.meaning, of), **rules), default)
+def by_name(meaning: str, of: Keys, default: Any = None, **rules: Any) -> Any:
+    """Declare mappings by name."""
+    return declare(Named(meaning, ParameterGroup(of.meaning, of), MOST_LINKS, **rules), default)
+
+
+IN_BOTH = {
+    'ratios': by_name('Joints that follow others: gears, belts, racks, mimic.', RATIO),
+    'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
+}
+"""Keys of planar and of spatial linkages."""
 
 
 WRITTEN_OUT = {
@@ -305,23 +313,13 @@ WRITTEN_OUT = {
         ),
         None,
     ),
-    'sliders': _by_name(
-        'Points that stay on lines of other links, by name.', _SLIDER, most=MOST_LINKS
+    'sliders': by_name('Points that stay on lines of other links, by name.', _SLIDER),
+    'joints': by_name(
+        'Published joints, in this order, by name.', _JOINT, MISSING, least=1, check=_refuse_input
     ),
-    'joints': _by_name(
-        'Published joints, in this order, by name.',
-        _JOINT,
-        MISSING,
-        least=1,
-        most=MOST_LINKS,
-        check=_refuse_input,
-    ),
-    'ratios': _by_name(
-        'Joints that follow others: gears, belts, racks, mimic.', RATIO, most=MOST_LINKS
-    ),
-    'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
+    **IN_BOTH,
     'pose': optional_keys(_POSE),
-    'masses': _by_name('Masses of the links, by link name.', _MASS, check=_refuse_mass),
+    'masses': by_name('Masses of the links, by link name.', _MASS, check=_refuse_mass),
 }
 
 
@@ -475,6 +473,11 @@ def ratio_in_si(ratio: Ratio, name: str, unit_of: Mapping[str, str | None], unit
 
     also = {of: factor_in_si(factor, of) for of, factor in ratio.also.items()}
     return replace(ratio, ratio=factor_in_si(ratio.ratio, ratio.of), also=also)
+
+
+def read_units(content: Section) -> None:
+    """Read the units of a linkage file, planar or spatial."""
+    content.units = Units(*(LINKAGE.read_key(content, key, {}) for key in UNITS))
 
 
 def planar_schema() -> Schema:

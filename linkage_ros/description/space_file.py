@@ -14,11 +14,10 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from linkage_ros.description.linkage_grammar import is_rod, ratio_in_si, UNITS
+from linkage_ros.description.linkage_grammar import is_rod, ratio_in_si, read_units
 from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import SPACE
-from linkage_ros.description.units import Units
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     check_inertia,
@@ -69,7 +68,7 @@ def _own_key(content: Section, where: str) -> str:
 
 
 def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
-    content.units = Units(*(SPACE.read_key(content, key, {}) for key in UNITS))
+    read_units(content)
     sliding = [*_names(content, 'slides'), *_names(content, 'struts')]
     values = read_parameters(content, SPACE, {'slide': sliding})
     points, massless = values['points'], []

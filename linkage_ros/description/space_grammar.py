@@ -14,8 +14,10 @@ from typing import Any
 
 from linkage_ros.description.grammar import DIALECT, InsteadOf, ListOf, Named
 from linkage_ros.description.linkage_grammar import (
+    by_name,
     FARTHEST,
     HEAVIEST,
+    IN_BOTH,
     LIMITS,
     MASS_OF_ROD,
     MOST_LINKS,
@@ -29,11 +31,9 @@ from linkage_ros.description.linkage_grammar import (
 from linkage_ros.description.parameters import (
     declare,
     Keys,
-    Kind,
     Number,
     number,
     NumberList,
-    ParameterGroup,
     parameters_schema,
     Parts,
     Schema,
@@ -106,14 +106,6 @@ class NameOrNames(ListOf):
 def _joint(**values: Any) -> dict[str, Any]:
     limits = split_limits(values)
     return {**values, 'limits': limits}
-
-
-def _by_name(meaning: str, of: Kind) -> Any:
-    return declare(Named(meaning, of, MOST_LINKS), None)
-
-
-def _group(of: Keys) -> ParameterGroup:
-    return ParameterGroup(of.meaning, of)
 
 
 _ENDS = {
@@ -210,12 +202,16 @@ SPACE = Keys(
             ),
             None,
         ),
-        'hinges': _by_name('Hinges between links, by name.', _group(_HINGE)),
-        'balls': _by_name('Ball joints between links that are published, by name.', _group(_BALL)),
-        'slides': _by_name('Slides between links, by name.', _group(_SLIDE)),
-        'struts': _by_name(
-            'Pairs of points whose distance is a joint, such as a cylinder, by name.',
-            _TwoPoints('its two points', TextOf('a point')),
+        'hinges': by_name('Hinges between links, by name.', _HINGE),
+        'balls': by_name('Ball joints between links that are published, by name.', _BALL),
+        'slides': by_name('Slides between links, by name.', _SLIDE),
+        'struts': declare(
+            Named(
+                'Pairs of points whose distance is a joint, such as a cylinder, by name.',
+                _TwoPoints('its two points', TextOf('a point')),
+                MOST_LINKS,
+            ),
+            None,
         ),
         'input': declare(
             NameOrNames('The driven hinge, slide or strut; several in a list.', TextOf('a joint'))
@@ -227,9 +223,9 @@ SPACE = Keys(
             ),
             None,
         ),
-        'ratios': _by_name(_RATIO.meaning, _group(_RATIO)),
-        'traced': declare(ListOf('Points whose paths are drawn.', TextOf('a point')), None),
-        'masses': _by_name('Masses of the links, by link name.', _group(_MASS)),
+        **IN_BOTH,
+        'ratios': by_name('Joints that follow others: gears, belts, racks, mimic.', _RATIO),
+        'masses': by_name('Masses of the links, by link name.', _MASS),
     },
 )  # fmt: skip
 
