@@ -60,8 +60,9 @@ _MOST_SIDES = 5
 
 
 def looks_like_linkage(content: Section) -> bool:
-    """Return whether a file of unknown kind has the keys of a linkage, or of a robot."""
-    return any(key in content for key in ('links', 'points', 'urdf', *SHORTHANDS))
+    """Return whether a file of unknown kind has the keys of a linkage, or is a robot's."""
+    is_urdf = Path(content.file).suffix.lower() == '.urdf'
+    return is_urdf or any(key in content for key in ('links', 'points', *SHORTHANDS))
 
 
 def load(
@@ -99,7 +100,11 @@ def read_content(file: Path, robot: Mapping[str, Any] | None = None) -> tuple[Se
         return content, content.named_data
     if robot:
         raise FileError(file, '', 'is no URDF', f'leave out {list_names(robot)}')
-    return read_yaml(file)
+    content, data = read_yaml(file)
+    if 'urdf' in content:
+        remedy = 'name the URDF itself, or write linkage: {urdf: FILE} for a scene'
+        raise content.error('urdf', 'is no key of a linkage', remedy)
+    return content, data
 
 
 def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:

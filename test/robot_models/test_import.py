@@ -491,3 +491,13 @@ def test_the_plane_of_a_robot_stands_in_its_file(tmp_path):
         tmp_path, ROBOTS / 'palletizer.urdf', input=['shoulder', 'counterweight']
     )
     assert closure.linkage.axes == ('x', 'z')
+
+
+@pytest.mark.parametrize('command', ['check', 'view', 'mjcf', 'scene'])
+def test_a_file_that_holds_the_keys_of_a_robot_is_no_linkage(tmp_path, capsys, command):
+    file = tmp_path / 'robot.yaml'
+    file.write_text(f'urdf: {ROBOTS / "ankle.urdf"}\ninput: [pitch, roll]\n')
+    assert main([command, str(file)]) == 2
+    err = capsys.readouterr().err
+    line = 'urdf: is no key of a linkage; name the URDF itself, or write linkage: {urdf: FILE} for'
+    assert line in err or 'is neither a scene nor a linkage; write linkage: FILE for a' in err
