@@ -56,6 +56,11 @@ class Sphere:
                 bends.append((both if i != k else 0.5 * both,))
         return [(slope,) for slope in slopes], bends
 
+    def forms_along(self, inputs, unknowns, direction):
+        (z,) = unknowns
+        slope = -sum(x * d for x, d in zip(self.away(inputs), direction, strict=True)) / z
+        return (slope,), (-0.5 * (sum(d * d for d in direction) + slope * slope) / z,)
+
 
 def sphere_grid(rng, count):
     """Return a function that makes grids of a random sphere, and inputs up to beyond its rim."""

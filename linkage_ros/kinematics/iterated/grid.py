@@ -23,6 +23,7 @@ covers lies next to a singularity, or beyond it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import chain, islice, product
 from math import copysign, inf, isfinite, isinf, ldexp, prod, tau
 from typing import Any, NamedTuple, Protocol
@@ -105,6 +106,17 @@ def grid_inputs(
     return tuple(found)
 
 
+LineForms = tuple[Sequence[float], Sequence[float]]
+"""Slopes and bends of the unknowns on a straight line."""
+
+
+class GridPlace(NamedTuple):
+    """A solution at certain inputs."""
+
+    inputs: Sequence[float]
+    unknowns: Sequence[float]
+
+
 class GridCell(NamedTuple):
     """A solution at certain inputs, and the quadratic form of the unknowns about it."""
 
@@ -144,6 +156,11 @@ class GridFunctions(Protocol):
         self, inputs: Sequence[float], unknowns: Sequence[float]
     ) -> tuple[list[Sequence[float]], list[Sequence[float]]] | None:
         """Return slopes and bends at a solution, as a cell has them."""
+
+    def forms_along(
+        self, inputs: Sequence[float], unknowns: Sequence[float], direction: Sequence[float]
+    ) -> LineForms | None:
+        """Return slopes and bends at a solution while the inputs go in a direction."""
 
 
 class Grid:
@@ -276,8 +293,8 @@ class Grid:
         found: list[tuple[float, ...] | None] = []
         for k, given in enumerate(self._inputs):
             later = tuple(x + tau * (i == k) for i, x in enumerate(self.home))
-            cell, left = self.reach(later) if given.turns else (self._start, 1.0)
-            moved = [b - a for a, b in zip(self._start.unknowns, cell.unknowns, strict=True)]
+            end, left = self.reach(later) if given.turns else (self._start, 1.0)
+            moved = [b - a for a, b in zip(self._start.unknowns, end.unknowns, strict=True)]
             gained = tuple(tau * round(each / tau) for each in moved)
             returns = all(abs(a - b) < _RETURNED for a, b in zip(moved, gained, strict=True))
             found.append(gained if returns and not left else None)
@@ -358,25 +375,30 @@ class Grid:
                     yield at, self.predict(cell, at)
                 return
 
-    def reach(self, inputs: Sequence[float]) -> tuple[GridCell, float]:
+    def reach(self, inputs: Sequence[float]) -> tuple[GridPlace, float]:
         """
         Follow the straight line from the last cell to inputs, in proven steps.
 
         Return the solution where it ends, and how far from the inputs that is: 0 if it leads to
         them.
         """
-        key = self._key_of(_LEVELS - 1, inputs)
+        key, along = self._key_of(_LEVELS - 1, inputs), self._group.forms_along
         with BUILD_LOCK:
-            begin = cell = self._follow(key).last
-            done, step = 0.0, 1.0
-            while done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
+            last = self._follow(key).last
+            place, done, step = GridPlace(last.inputs, last.unknowns), 0.0, 1.0
+            way = [b - a for a, b in zip(last.inputs, inputs, strict=True)]
+            forms = along(*place, way)
+            while forms and done < 1.0 and step > max(_SHORTEST, _HOPELESS * (1.0 - done)):
                 part = min(1.0, done + step)
-                found = self._step_to(cell, _part_of_way(begin.inputs, inputs, part))
+                end = _part_of_way(last.inputs, inputs, part)
+                predict = partial(_predict_along, place.unknowns, forms, part - done)
+                found = self._prove_step(place.inputs, end, predict)
                 if found is None:
                     step *= 0.5
                 else:
-                    cell, done, step = found, part, 2.0 * step
-        return cell, max(abs(a - b) for a, b in zip(cell.inputs, inputs, strict=True))
+                    place, done, step = GridPlace(end, found), part, 2.0 * step
+                    forms = along(*place, way)
+        return place, max(abs(a - b) for a, b in zip(place.inputs, inputs, strict=True))
 
     def _follow(self, key: Key) -> _Found:
         """Return a cell, made from its neighbour on the straight line to the pose."""
@@ -457,18 +479,45 @@ class Grid:
         return cell
 
     def _step_to(self, known: GridCell, inputs: Sequence[float]) -> GridCell | None:
-        """Return the solution that a known one is proven to lead to."""
-        group = self._group
-        for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
-            at = _part_of_way(known.inputs, inputs, part)
-            if not group.proof(at, self.predict(known, at)) <= _PROVEN:
-                return None
-        unknowns = group.solve_from(inputs, self.predict(known, inputs))
-        forms = None if unknowns is None else group.forms_at(inputs, unknowns)
+        """Return the solution that a known one is proven to lead to, with its forms."""
+
+        def predict(part: float) -> Sequence[float]:
+            return self.predict(known, _part_of_way(known.inputs, inputs, part))
+
+        unknowns = self._prove_step(known.inputs, inputs, predict)
+        forms = None if unknowns is None else self._group.forms_at(inputs, unknowns)
         if unknowns is None or forms is None:
             return None
         slopes, bends = (tuple(map(tuple, each)) for each in forms)
         return GridCell(tuple(inputs), tuple(unknowns), slopes, bends)
+
+    def _prove_step(
+        self,
+        begin: Sequence[float],
+        end: Sequence[float],
+        predict: Callable[[float], Sequence[float]],
+    ) -> Sequence[float] | None:
+        """
+        Return the solution to which the unknowns predicted on a way are proven to lead.
+
+        ``predict`` gives them at a part of the way.
+        """
+        for part in (1.0, 0.5, 0.25, 0.75):  # Where it fails first
+            at = _part_of_way(begin, end, part)
+            if not self._group.proof(at, predict(part)) <= _PROVEN:
+                return None
+        return self._group.solve_from(end, predict(1.0))
+
+
+def _predict_along(
+    unknowns: Sequence[float], forms: LineForms, length: float, part: float
+) -> Sequence[float]:
+    """Return the unknowns at a part of a length on a straight line."""
+    off = part * length
+    return [
+        value + off * (slope + off * bend)
+        for value, slope, bend in zip(unknowns, *forms, strict=True)
+    ]
 
 
 def _predict(numbers: Any, inputs: Sequence[Any], count: int) -> list[Any]:

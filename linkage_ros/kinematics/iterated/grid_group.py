@@ -23,7 +23,7 @@ from typing import Any
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError, where
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.iterated.elimination import add, multiply, subtract
-from linkage_ros.kinematics.iterated.grid import Grid, GridInput
+from linkage_ros.kinematics.iterated.grid import Grid, GridInput, LineForms
 from linkage_ros.kinematics.iterated.group import (
     Equations,
     GroupPose,
@@ -76,22 +76,27 @@ class GridGroup(IteratedGroup):
         self._proof_line = self._compile_later(self._list_proof)
         self._step_line = self._compile_later(self._list_step)
         self._forms_line = self._compile_later(self._list_forms)
+        self._line_forms_line = self._compile_later(self._list_line_forms, self.inputs)
 
-    def _compile_later(self, function: Callable[..., list[Any]]) -> StraightLine:
+    def _compile_later(
+        self, function: Callable[..., list[Any]], moving: Sequence[int] = ()
+    ) -> StraightLine:
         """
-        Return a function of all inputs and the unknowns as a straight line.
+        Return a function of all inputs, the unknowns and the rates of inputs as a straight line.
 
-        It takes the inputs of the group; those on which nothing depends are as in the pose.
+        It takes the inputs of the group, and rates of those that are ``moving``; those on which
+        nothing depends are as in the pose.
         """
 
-        def compute(inputs: Sequence[Any], unknowns: Sequence[Any]) -> list[Any]:
+        def compute(inputs: Sequence[Any], unknowns: Sequence[Any], *rates: Any) -> list[Any]:
             given: list[Any] = [*self._before.inputs]
             for k, value in zip(self.inputs, inputs, strict=True):
                 given[k] = value
-            return function(LinkState(given, []), LinkState([*unknowns], []))
+            return function(LinkState(given, []), LinkState([*unknowns], []), *rates)
 
         home = [self._before.inputs[k] for k in self.inputs]
-        return StraightLine(compute, lambda: (home, [*self._start]))
+        rates = [[1.0] * len(moving)] if moving else []
+        return StraightLine(compute, lambda: (home, [*self._start], *rates))
 
     @BuiltProperty
     def grid(self) -> Grid:
@@ -194,6 +199,13 @@ class GridGroup(IteratedGroup):
         count = len(inputs)
         return rows[:count], rows[count:]
 
+    def forms_along(
+        self, inputs: Sequence[float], unknowns: Sequence[float], direction: Sequence[float]
+    ) -> LineForms | None:
+        """Return slopes and bends at a solution while the inputs go in a direction."""
+        found = self._line_forms_line(inputs, unknowns, direction)
+        return None if found is None else (found[: len(unknowns)], found[len(unknowns) :])
+
     # The functions of the straight lines
 
     def _list_step(self, given: LinkState, pose: LinkState) -> list[Any]:
@@ -231,29 +243,45 @@ class GridGroup(IteratedGroup):
         fitted = _greatest([a / b for a, b in zip(ratios_within(units), units, strict=True)])
         return [where(fitted < even, fitted, even)]
 
+    def _list_line_forms(
+        self, given: LinkState, pose: LinkState, direction: Sequence[Any]
+    ) -> list[Any]:
+        rates = LinkState([0.0] * len(given.coordinates), [])
+        for k, rate in zip(self.inputs, direction, strict=True):
+            rates.coordinates[k] = rate
+        slopes = self._list_rates(given, pose, rates)
+        still = LinkState([0.0] * len(given.coordinates), [])
+        bends = self._list_accelerations(given, pose, rates, LinkState(slopes, []), still)
+        return [*slopes, *(0.5 * bend for bend in bends)]
+
     def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""
         slopes: list[Any] = []
         squares: dict[tuple[int, int], list[Any]] = {}
+        alone: dict[int, list[Any]] = {}
         still = LinkState([0.0] * len(given.coordinates), [])
+
+        def rates_along(*inputs: int) -> LinkState:
+            return LinkState([float(k in inputs) for k in range(len(given.coordinates))], [])
+
+        for one in self.inputs:
+            alone[one] = self._list_rates(given, pose, rates_along(one))
+            slopes += alone[one]
         for one, other in combinations_with_replacement(self.inputs, 2):
-            rates = LinkState(
-                [float(k in (one, other)) for k in range(len(still.coordinates))], []
-            )
-            found = self._list_rates(given, pose, rates)
+            along, found = rates_along(one, other), alone[one]
+            if one != other:
+                found = [a + b for a, b in zip(found, alone[other], strict=True)]
             squares[one, other] = self._list_accelerations(
-                given, pose, rates, LinkState(found, []), still
+                given, pose, along, LinkState(found, []), still
             )
-            if one == other:
-                slopes += found
         bends = []
         for (one, other), both in squares.items():
             if one == other:
                 bends += [0.5 * value for value in both]
             else:
                 # Along both inputs at once: twice what is mixed, and what each has alone.
-                alone = zip(squares[one, one], squares[other, other], strict=True)
-                bends += [0.5 * (value - a - b) for value, (a, b) in zip(both, alone, strict=True)]
+                each = zip(both, squares[one, one], squares[other, other], strict=True)
+                bends += [0.5 * (value - a - b) for value, a, b in each]
         return [*slopes, *bends]
 
 
