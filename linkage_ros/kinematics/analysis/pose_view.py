@@ -84,7 +84,7 @@ def prepare_view(
 
 def _find_range(input_sweep: InputSweep, about: InputRange) -> InputRange:
     """Return a range with the turns with which it is among the ranges."""
-    if about in input_sweep.ranges:
+    if not about.turning or about in input_sweep.ranges:
         return about
     for interval in input_sweep.ranges:
         period = tau * interval.turns

@@ -16,9 +16,10 @@ sampled, and each limit is narrowed down to neighbouring floats.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from math import acos, asin, ceil, cos, floor, inf, lcm, pi, remainder, sqrt, tau
 from typing import Any, TYPE_CHECKING
 
@@ -300,6 +301,22 @@ def find_intervals(
         before = value
     if begin is not None:
         yield begin, high
+
+
+def interval_about(
+    closes: Callable[[float], bool], values: Sequence[float], place: float
+) -> tuple[float, float] | None:
+    """Return the part about a place that `find_intervals` yields, without the others; or None."""
+    number, ends = bisect_left(values, place), []
+    below, above = values[:number][::-1], values[number:]
+    for way, back in ((below, above), (above, below)):
+        inside = [*takewhile(closes, way)] or [*takewhile(closes, back[:1])]
+        if not inside:
+            return None
+        outside = way[len(inside) :] if inside[0] in way else way
+        ends.append(last_inside(closes, inside[-1], outside[0]) if outside else inside[-1])
+    low, high = ends
+    return (low, high) if low <= place <= high else None
 
 
 def _turning_points(

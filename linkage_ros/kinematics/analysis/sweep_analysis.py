@@ -21,6 +21,7 @@ from linkage_ros.kinematics.analysis.ranges import (
     even_samples,
     find_intervals,
     golden_section,
+    interval_about,
     is_iterated,
     joints_repeat,
     sample_inputs,
@@ -173,6 +174,11 @@ class InputSweep:
 
     def range_about(self, value: float) -> InputRange | None:
         """Return the range in which a value lies, or None."""
+        if self.closure.grids and self.closure.zero_length is None:
+            # States beyond the reach of such links take long: the other ranges are not asked for.
+            part = interval_about(self.is_closed, self._samples, value)
+            if part and (self._is_cut or not {*part} & {self._samples[0], self._samples[-1]}):
+                return self._usual_range(self._name_ends(*part))
         for interval in self.ranges:
             if interval.is_whole or interval.lowest <= value <= interval.highest:
                 return interval
@@ -219,21 +225,28 @@ class InputSweep:
             return interval.shift_by(shift)
         return interval
 
-    def _search_intervals(self) -> list[tuple[float, float]]:
-        """Return the intervals in which every loop closes, for several inputs."""
+    @property
+    def _is_cut(self) -> bool:
+        """Return whether the range of the input ends where its samples do."""
+        return not self.turning or self.input.limits.is_bounded
+
+    @BuiltProperty
+    def _samples(self) -> list[float]:
+        """Return the values at which several inputs are tried; none if limits exclude all."""
         far = pi if self.turning else self.closure.slide_bound
         limits = self.input.limits
-        if limits.is_bounded:
-            low, high = max(limits.low, -far), min(limits.high, far)
-            if self.turning:
-                # Angles count with their turns.
-                low = limits.low if limits.low > -inf else limits.high - tau
-                high = limits.high if limits.high < inf else limits.low + tau
-            return (
-                list(find_intervals(self.is_closed, even_samples(low, high))) if low < high else []
-            )
-        found = list(find_intervals(self.is_closed, even_samples(-far, far)))
-        return through_the_end(found, -far, far) if self.turning else found
+        low, high = max(limits.low, -far), min(limits.high, far)
+        if self.turning and limits.is_bounded:
+            # Angles count with their turns.
+            low = limits.low if limits.low > -inf else limits.high - tau
+            high = limits.high if limits.high < inf else limits.low + tau
+        return even_samples(low, high) if low < high else []
+
+    def _search_intervals(self) -> list[tuple[float, float]]:
+        """Return the intervals in which every loop closes, for several inputs."""
+        samples = self._samples
+        found = list(find_intervals(self.is_closed, samples)) if samples else []
+        return found if self._is_cut else through_the_end(found, samples[0], samples[-1])
 
     def _name_ends(self, low: float, high: float) -> InputRange:
         """Return a range with the joints whose limits end it; the other inputs are held."""

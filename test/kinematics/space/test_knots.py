@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 
 from linkage_ros.description import load
-from linkage_ros.kinematics import Grid, Status
+from linkage_ros.kinematics import Grid, InputSweep, Status
 from linkage_ros.kinematics.compiling import Compiled
 import numpy as np
 import pytest
@@ -130,6 +130,25 @@ def test_a_motion_finds_cells_of_many_inputs_made_ahead_of_it(monkeypatch, ahead
             closure.make_cells_ahead(inputs, rates)
     assert made
     assert (sum(counts) == 0) == ahead
+
+
+def test_the_range_about_a_state_is_found_without_the_states_far_beyond_it(monkeypatch):
+    closure, asked = closure_of('hexapod'), []
+    begin = closure.linkage.pose.inputs
+    sweep = InputSweep(closure, begin)
+    position_at = closure.position
+    monkeypatch.setattr(closure, 'position', lambda *x: asked.append(x[0]) or position_at(*x))
+    interval = sweep.range_about(begin[0])
+    assert interval.lowest < begin[0] < interval.highest
+    assert min(asked) < interval.lowest
+    assert max(asked) > interval.highest
+    # A sample is a 360th of the farthest that a leg may be long.
+    sample = closure.slide_bound / 360.0
+    assert min(asked) > interval.lowest - 1.01 * sample
+    assert max(asked) < interval.highest + 1.01 * sample
+    for end, way in ((interval.lowest, -1e-9), (interval.highest, 1e-9)):
+        assert position_at(end, *begin[1:]).status.has_pose
+        assert position_at(end + way, *begin[1:]).status is Status.OPEN
 
 
 def test_only_what_has_many_inputs_makes_cells_in_motion():
