@@ -405,6 +405,9 @@ class Grid:
         found = self._kept.get(key)
         if found is not None:
             return found
+        found = self._ways.get(key)
+        if found is not None and found.cell is None:
+            return found
         level, *places = key
         count = max(map(abs, places), default=0)
         found = _Found(self._start, self._start, None)
@@ -423,7 +426,9 @@ class Grid:
             if found.cell is None:
                 break
             found = self._pass_cell(before, found.cell)
-        return found if found.cell is None else self._keep_cell(key, found.cell)
+        if found.cell is None:
+            return self._remember_way(key, found)
+        return self._keep_cell(key, found.cell)
 
     def _pass_cell(self, key: Key, before: GridCell) -> _Found:
         """
@@ -438,6 +443,9 @@ class Grid:
             found = _Found(wider, wider, None)
         elif found is None:
             found = self._keep_cell(key, before)
+        return self._remember_way(key, found)
+
+    def _remember_way(self, key: Key, found: _Found) -> _Found:
         if len(self._ways) >= _WAYS:
             self._ways.clear()
         self._ways[key] = found
