@@ -345,7 +345,8 @@ class StepwiseClosure:
         Solve many states at once, as `position`, `velocity` and `acceleration` solve one.
 
         The memory beyond the results does not grow with the number of states. Links that need
-        iteration are solved state by state, as slowly as `position` solves them.
+        iteration are iterated for many states together; next to a singularity, and where they do
+        not close, they are solved state by state, as slowly as `position` solves them.
 
         Parameters
         ----------

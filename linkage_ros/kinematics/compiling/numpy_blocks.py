@@ -40,7 +40,10 @@ _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '!=': operator.ne,
 }
 
-_TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
+_TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not', 'found'))
+
+_OF_TABLES: Final = frozenset(('call', 'item', 'found'))
+"""Operations of the tables in which iterations have their starts."""
 
 _CLEAR: Final = 1e-9
 """Numbers with this relative distance are different however they are rounded."""
@@ -409,6 +412,7 @@ class BlockFunction:
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
         namespace: dict[str, Any] = {'inf': inf, 'nan': nan}
         namespace |= {function.__name__: function for function in functions}
+        namespace |= writer.tables
         self._run = define_function(self.source, 'run', namespace)
 
     def __call__(
@@ -452,6 +456,7 @@ class _BlockWriter:
     def __init__(self, arrays: Sequence[str], roots: Sequence[Number], condition: Number) -> None:
         self.rows, self.masks = _NamePool('r'), _NamePool('m')
         self.lines: list[str] = []
+        self.tables: dict[str, Callable[..., Any]] = {}
         self._arrays = arrays
         self._names: dict[Operation, str] = {}
         self._of_states: set[Operation] = set()
@@ -484,8 +489,26 @@ class _BlockWriter:
         ):
             self._write_operation(operation)
 
+    def _write_table(self, operation: Operation) -> None:
+        """Write where a start of an iteration comes from: a row of a table for each state."""
+        name = f't{operation.number}'
+        first, *others = operation.arguments
+        if operation.name == 'call':
+            self.tables[name] = first.rows_at
+            texts = ', '.join(map(self._number_text, others))
+            self.lines.append(f'{name}_rows, {name}_found = {name}({texts})')
+            self._done_with(operation.operands())
+        else:
+            part = 'found' if operation.name == 'found' else f'rows[{others[0]}]'
+            name = f'{self._names[first]}_{part}'
+        self._names[operation] = name
+        self._of_states.add(operation)
+
     def _write_operation(self, operation: Operation) -> None:
         operands = operation.operands()
+        if operation.name in _OF_TABLES:
+            self._write_table(operation)
+            return
         if operation.is_input:
             self._names[operation] = operation.name
             if operation.name in self._arrays:

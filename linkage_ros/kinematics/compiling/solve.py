@@ -21,7 +21,6 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.analysis.ranges import is_iterated
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.built_once import keep_results
@@ -198,9 +197,7 @@ class SolverOutline:
         return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
     def _array_programs(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_SolveProgram]:
-        """Return the paths over arrays; none if links are iterated."""
-        if is_iterated(self._closure):
-            return []
+        """Return the paths over arrays."""
         return [
             _array_program(
                 lower_path(path, fallback_statuses(self._closure, path), by_squares=True), kinds

@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain, islice, product
 from math import copysign, inf, isfinite, isinf, ldexp, prod, tau
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.generated_code import define_function
 from linkage_ros.kinematics.arithmetic import call, has_result
@@ -34,6 +34,9 @@ from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.compiling import compile_line
 from linkage_ros.kinematics.plane.linkage import Input
 from linkage_ros.progress import tell_progress
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch import Array, Mask
 
 _WIDTH = 0.125
 """Width of the widest cells, in [rad] or lengths."""
@@ -208,6 +211,31 @@ class Grid:
             return self._look_up(*inputs)
         except OverflowError:
             return None  # So far away that no number says how many cells it is.
+
+    def rows_at(self, *inputs: Array) -> tuple[Array, Mask]:
+        """Return what a call returns at each of many inputs, one a column; and where there is."""
+        import numpy as np  # local import: a tick does without it
+
+        given, home = np.stack(np.broadcast_arrays(*inputs)), np.array(self.home)[:, None]
+        count = len(self._given.numbers)
+        rows, found = np.zeros((count, given.shape[1])), np.zeros(given.shape[1], bool)
+        left = np.arange(given.shape[1])
+        for level, width in enumerate(self.widths):
+            ways = np.clip((given[:, left] - home) / width, -_ALL, _ALL)
+            places, of_states = np.unique(np.rint(ways), axis=1, return_inverse=True)
+            with BUILD_LOCK:
+                cells = [
+                    self._follow((level, *map(int, place))).numbers for place in places.T.tolist()
+                ]
+            of_states = of_states.reshape(-1)
+            proven = np.array([cell is not None for cell in cells])[of_states]
+            table = np.array([cell or (0.0,) * count for cell in cells]).T
+            rows[:, left[proven]] = table[:, of_states[proven]]
+            found[left[proven]] = True
+            left = left[~proven]
+            if not left.size:
+                break
+        return rows, found
 
     def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:
         """Return a call as a function, written for these inputs: most lie in a widest cell."""

@@ -26,9 +26,10 @@ from math import frexp, ldexp
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import call, sqrt as root_of, where
+from linkage_ros.kinematics.built_once import BuiltProperty
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Array
+    from linkage_ros.kinematics.batch import Array, Mask
 
 _DIGITS = 24
 """Binary digits of the numbers of a row, relative to the largest change in it."""
@@ -76,6 +77,18 @@ class StartTable:
     def __call__(self, x: float) -> tuple[float, ...]:
         """Return the row of an input."""
         return self.rows[bisect_left(self.ends, x)]
+
+    def rows_at(self, x: Array) -> tuple[Array, Mask]:
+        """Return the rows of inputs, one a column, and that each has one."""
+        import numpy as np  # local import: sources of linkages need only the table
+
+        return self._columns[:, np.searchsorted(self.ends, x)], np.ones(len(x), bool)
+
+    @BuiltProperty
+    def _columns(self) -> Array:
+        import numpy as np  # local import: as above
+
+        return np.array(self.rows).T
 
     def find_start(self, x: Any) -> tuple[list[Any], Any]:
         """Return the unknowns at which Newton's method starts, and how far it may lead."""

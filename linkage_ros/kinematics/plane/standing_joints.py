@@ -26,7 +26,7 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.analysis.crank_branches import crank_branches, joint_output
 from linkage_ros.kinematics.analysis.singularity_margin import signed_distance
 from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid
-from linkage_ros.kinematics.batch import Array, CODES
+from linkage_ros.kinematics.batch import Array, Batch, CODES
 from linkage_ros.kinematics.compiling import Compiled
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
@@ -100,15 +100,18 @@ def _smallest_singular_values(closure: StepwiseClosure, inputs: Array) -> Array:
     Lengths are in units of the linkage's size. It is infinite where there are no rates, or a
     joint is beyond its limits.
     """
-    columns: list[Any] = []
-    for number, given in enumerate(closure.linkage.inputs):
-        rates = [0.0] * len(closure.input_names)
-        rates[number] = closure.scale if given.slider else 1.0
-        solved = closure.solve(*inputs.T, rates=rates, derivatives=1)
-        columns.append(solved.velocities)
-    units = np.array([1.0 if turns else closure.scale for turns in closure.turning])
-    jacobians = np.stack(columns, -1).transpose(1, 0, 2) / units[:, None]
-    values = np.full(len(inputs), np.inf)
+
+    def solve(at: Array, rates: Array) -> Batch:
+        return closure.solve(at, rates=np.tile(rates, (len(at), 1)), derivatives=1)
+
+    # A rate of each input in turn.
+    ways = np.diag([closure.scale if one.slider else 1.0 for one in closure.linkage.inputs])
+    solved = solve(inputs, ways[0])
     known = np.isin(solved.status, [CODES[Status.CLOSED], CODES[Status.CHANGE_POINT]])
-    values[known] = np.linalg.svd(jacobians[known], compute_uv=False)[:, -1]
+    others: list[Any] = [solve(inputs[known], rates).velocities for rates in ways[1:]]
+    columns = np.stack([np.asarray(solved.velocities)[:, known], *others], -1)
+    units = np.array([1.0 if turns else closure.scale for turns in closure.turning])
+    jacobians = columns.transpose(1, 0, 2) / units[:, None]
+    values = np.full(len(inputs), np.inf)
+    values[known] = np.linalg.svd(jacobians, compute_uv=False)[:, -1]
     return values
