@@ -461,8 +461,6 @@ def _refuse_in_space(
         if effect.is_planar:
             raise effects.error(name, reason, remedy)
     drives = section_with('drive')
-    if drive_class(drive).gives_torque:
-        raise drives.error(f'drive.{drive}', reason, 'drive it by topic or at a given motion')
     topic = drive_section(drives)
     if drive == 'topic' and 'joint' in topic.section('topic', required=False):
         raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')

@@ -149,7 +149,6 @@ from linkage_ros.kinematics.plane.linkage import (
     Side as Side,
     SlideJoint as SlideJoint,
     Slider as Slider,
-    without_limits as without_limits,
 )
 from linkage_ros.kinematics.plane.sides import (
     assembly_sides as assembly_sides,

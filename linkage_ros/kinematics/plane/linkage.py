@@ -353,6 +353,13 @@ class Linkage:
         """Return all links."""
         return tuple(self.links)
 
+    def without_limits(self, joints: Collection[str]) -> Linkage:
+        """Return the linkage without the limits of some joints' ranges."""
+        inputs = remove_limits({given.joint: given for given in self.inputs}, joints)
+        return replace(
+            self, inputs=tuple(inputs.values()), joints=remove_limits(self.joints, joints)
+        )
+
     @property
     def driven_joints(self) -> tuple[Input, ...]:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
@@ -369,19 +376,14 @@ class Linkage:
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
 
 
-def without_limits(linkage: Linkage, joints: Collection[str]) -> Linkage:
-    """Return a linkage in which the ranges of some joints have no limits."""
-
-    def remove_limits(name: str, part: Any) -> Any:
-        if name not in joints:
-            return part
-        return replace(part, limits=replace(part.limits, low=-inf, high=inf))
-
-    return replace(
-        linkage,
-        inputs=tuple(remove_limits(given.joint, given) for given in linkage.inputs),
-        joints={name: remove_limits(name, joint) for name, joint in linkage.joints.items()},
-    )
+def remove_limits(parts: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Return joints by name; the ranges of those among ``names`` have no limits."""
+    return {
+        name: replace(part, limits=replace(part.limits, low=-inf, high=inf))
+        if name in names
+        else part
+        for name, part in parts.items()
+    }
 
 
 def links_by_point(links: Mapping[str, Iterable[str]]) -> dict[str, list[str]]:

@@ -15,7 +15,7 @@ two points is a rod. In the pose every joint has its ``value``, which is 0 unles
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import dist, frexp, isfinite, ldexp
@@ -30,6 +30,7 @@ from linkage_ros.kinematics.plane.linkage import (
     NO_LIMITS,
     PoseCorrections,
     Ratio,
+    remove_limits,
     RevoluteJoint,
     SlideJoint,
 )
@@ -155,6 +156,11 @@ class SpaceLinkage:
     def masses_with(self, *links: str) -> Mapping[str, SpatialMass]:
         """Return the masses with those of links that are added: they have none."""
         return {**dict.fromkeys(links, MASSLESS), **self.masses} if self.masses else {}
+
+    def without_limits(self, joints: Collection[str]) -> SpaceLinkage:
+        """Return the linkage without the limits of some joints' ranges."""
+        hinges, slides = remove_limits(self.hinges, joints), remove_limits(self.slides, joints)
+        return replace(self, hinges=hinges, slides=slides)
 
     @cached_property
     def inputs(self) -> tuple[Input, ...]:

@@ -23,7 +23,7 @@ from functools import cached_property
 from random import Random
 from typing import Any, ClassVar, NamedTuple, Protocol, TYPE_CHECKING
 
-from linkage_ros.kinematics import Closure, without_limits
+from linkage_ros.kinematics import Closure
 from linkage_ros.stages.plugin import load_class
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ class Context:
         yielding = self.loads.applied.stops if self.loads else ()
         if not yielding:
             return self.closure
-        return Closure(without_limits(self.closure.linkage, yielding))
+        return type(self.closure)(self.closure.linkage.without_limits(yielding))
 
     @cached_property
     def mechanics(self) -> Mechanics:
