@@ -45,6 +45,7 @@ from linkage_ros.dynamics.motion import (
 )
 from linkage_ros.dynamics.motor import Motor as Motor
 from linkage_ros.dynamics.reactions import Reaction as Reaction, Reactions as Reactions
+from linkage_ros.dynamics.several_freedoms import SeveralDofMechanism as SeveralDofMechanism
 from linkage_ros.dynamics.two_masses import TwoMasses as TwoMasses
 from linkage_ros.dynamics.winding import Winding as Winding
 from linkage_ros.dynamics.wrenches import HeldWrench as HeldWrench

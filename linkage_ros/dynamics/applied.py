@@ -357,6 +357,40 @@ class AppliedForces:
             terms += (LawTerm(at.lever(velocity, position, moved), 0.0, 0.0),)
         return slope, viscous, terms
 
+    def several_inputs(
+        self, position: Position, velocity: Velocity, alone: Sequence[Velocity]
+    ) -> tuple[list[float], list[tuple[tuple[float, ...], float, float]]]:
+        """
+        Return what the loads add to the equation of motion of a linkage with several inputs.
+
+        ``alone`` are the velocities at a rate of 1 of each input. The result is what the loads
+        without laws need on each input, and for each law its levers, its value and its rate.
+        """
+        moved = [self._point_velocities(position, way) for way in alone]
+
+        def levers_of(at: Loaded) -> tuple[float, ...]:
+            ways = zip(alone, moved, strict=True)
+            return tuple(at.lever(way, position, points) for way, points in ways)
+
+        needed = [0.0] * len(alone)
+        for joint, spring in self._springs:
+            rate = joint.lever(velocity, position, ())
+            pull = spring.stiffness * _spring_stretch(joint, spring, position)
+            pull += spring.damping * rate
+            needed = [
+                one + pull * lever for one, lever in zip(needed, levers_of(joint), strict=True)
+            ]
+        for at, force in self._constant:
+            needed = [
+                one - force * lever for one, lever in zip(needed, levers_of(at), strict=True)
+            ]
+        laws = [
+            (levers_of(at), of.value(position), of.lever(velocity, position, ()))
+            for at, of, _ in self._lawful
+        ]
+        laws += [(levers_of(at), 0.0, 0.0) for at, _ in self._components]
+        return needed, laws
+
     def potential_energy(self, position: Position) -> float:
         """Return the energy of the springs at joints, in [J]."""
         energy = 0.0

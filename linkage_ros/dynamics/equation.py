@@ -35,7 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from itertools import chain
+from itertools import chain, islice
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
@@ -83,6 +83,33 @@ class Terms(NamedTuple):
     # λ·f(x, ẋ, t). Empty without laws.
     laws: tuple[LawTerm, ...] = ()
     breakaway: float = 0.0  # What friction holds at q̇ = 0 in addition to F
+
+
+class InputLawTerm(NamedTuple):
+    """A load by a law, at values and rates of several inputs."""
+
+    levers: tuple[float, ...]  # λ of the load for each input
+    value: float  # x of the law, in [rad] or [m]
+    rate: float  # ẋ
+
+
+class InputTerms(NamedTuple):
+    """The equation of motion M·q̈ + h = τ + Σ λ·f at values and rates of several inputs."""
+
+    matrix: tuple[float, ...]  # M, the rows of its lower triangle
+    mobility: tuple[tuple[float, ...], ...]  # The rows of its inverse
+    bias: tuple[float, ...]  # h: of inertia, weight, springs and dampers, and constant loads
+    laws: tuple[InputLawTerm, ...] = ()  # One for each law of an applied force
+
+    def inertia(self, row: int, column: int) -> float:
+        """Return an element of M."""
+        row, column = max(row, column), min(row, column)
+        return self.matrix[row * (row + 1) // 2 + column]
+
+    @property
+    def total_inertia(self) -> float:
+        """Return the sum of the diagonal of M."""
+        return sum(self.inertia(n, n) for n in range(len(self.bias)))
 
 
 class FrictionJoint(NamedTuple):
@@ -249,6 +276,113 @@ class Mechanics:
 
         return equation_with_laws
 
+    def input_terms(self, position: Position, rates: Sequence[float]) -> InputTerms | None:
+        """
+        Return the equation of motion of a linkage with several inputs, at their rates.
+
+        Return None as `motion_terms` does. Friction is no part of it but viscous friction.
+        """
+        if not position.status.has_rates:
+            return None
+        closure, points, vectors = self.closure, self._points, self._model.vectors
+        count = len(self._units)
+        places = points.places(position)
+        alone = [closure.velocity(position, *_unit_rates(count, i)) for i in range(count)]
+        moved = [points.velocities(position, way, places) for way in alone]
+        turned = [self._model.turn_rates(position, way) for way in alone]
+        velocity = closure.velocity(position, *rates)
+        still = closure.acceleration(position, velocity, *[0.0] * count)
+        velocities = points.velocities(position, velocity, places)
+        accelerations = points.accelerations(position, velocity, still, places)
+        turns = self._model.turn_rates(position, velocity)
+        changes = self._model.turn_changes(position, velocity, still)
+        forces = self._inertia_forces(accelerations, turns, changes)
+        v = velocity.state.coordinates
+        matrix: tuple[float, ...] = ()
+        bias: tuple[float, ...] = ()
+        for i, way in enumerate(alone):
+            for j in range(i + 1):
+                inertia = self.loads.drive_inertia if i == j else 0.0
+                for (mass, gyration, point), one, other in zip(
+                    self._bodies, turned[i], turned[j], strict=True
+                ):
+                    carried = vectors.scale(mass, moved[i][point])
+                    inertia += vectors.dot(carried, moved[j][point])
+                    inertia += vectors.turn_dot(vectors.momentum(gyration, one), other)
+                matrix += (inertia,)
+            needed = 0.0
+            for body, (force, moment), turn in zip(self._bodies, forces, turned[i], strict=True):
+                needed += vectors.dot(force, moved[i][body.point])
+                needed += vectors.turn_dot(moment, turn)
+            for spring, ends in self._springs:
+                pull = spring.tension(*spring_length(vectors, places, velocities, ends))
+                needed += pull * spring_length(vectors, places, moved[i], ends)[1]
+            w = way.state.coordinates
+            for rubbing in self.friction_joints:
+                needed += rubbing.friction.viscous * rubbing.slip_rate(v) * rubbing.slip_rate(w)
+            bias += (needed,)
+        elements = iter(matrix)
+        rows = [[*islice(elements, i + 1)] for i in range(count)]
+        columns = [solve_positive(rows, _unit_rates(count, i)) for i in range(count)]
+        mobility = tuple(tuple(column) for column in columns if column)
+        if len(mobility) < count or not all_finite((*chain(*mobility), *bias)):
+            return None
+        if self.applied is None:
+            return InputTerms(matrix, mobility, bias)
+        more, laws = self.applied.several_inputs(position, velocity, alone)
+        bias = tuple(one + other for one, other in zip(bias, more, strict=True))
+        return InputTerms(matrix, mobility, bias, tuple(InputLawTerm(*law) for law in laws))
+
+    @cached_property
+    def input_equation(
+        self,
+    ) -> Callable[[Sequence[float], Sequence[float]], InputTerms | None]:
+        """
+        Return the equation of motion of a linkage with several inputs, of values and rates.
+
+        Its results equal `input_terms` at the position to the last bit; it is straight-line code.
+        """
+        count = len(self._units)
+
+        def list_terms(motion: CompiledMotion, *rates: float) -> Sequence[Sequence[float]]:
+            terms = self.input_terms(motion.position, rates)
+            if terms is None:
+                return []
+            laws = [(*law.levers, law.value, law.rate) for law in terms.laws]
+            return [terms.matrix, *terms.mobility, terms.bias, [*chain.from_iterable(laws)]]
+
+        compiled = Compiled(self.closure, 0, list_terms, within_limits=False, given_count=count)
+        fast, close, terms_at = compiled.fast, self.closure.close_unlimited, self.input_terms
+
+        def equation(values: Sequence[float], rates: Sequence[float]) -> InputTerms | None:
+            found = fast(*values, *rates)
+            if found is None:
+                return terms_at(close(*values), rates)
+            matrix, *mobility, bias, numbers = found
+            left = iter(numbers)
+            laws = tuple(
+                InputLawTerm(tuple(islice(left, count)), next(left), next(left))
+                for _ in range(len(numbers) // (count + 2))
+            )
+            return InputTerms(matrix, tuple(mobility), bias, laws)
+
+        return equation
+
+    def _inertia_forces(
+        self, accelerations: list[Any], turns: list[Any], changes: list[Any]
+    ) -> list[tuple[Any, Any]]:
+        """Return the force and the moment that each body needs, against its weight too."""
+        vectors = self._model.vectors
+        return [
+            (
+                vectors.scale(mass, vectors.minus(accelerations[point], self._gravity)),
+                vectors.moment(gyration, turn, change),
+            )
+            for (mass, gyration, point), turn, change in zip(
+                self._bodies, turns, changes, strict=True
+            )
+        ]
+
     def _wanted_terms(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
         terms = self.motion_terms(motion.position)
         if terms is None:
@@ -326,20 +460,10 @@ class Mechanics:
             for spring, ends in self._springs
         ]
         drags = [joint_friction(rubbing, v) for rubbing in self.friction_joints]
-        forces = [
-            (
-                vectors.scale(mass, vectors.minus(accelerations[point], self._gravity)),
-                vectors.moment(gyration, turn, change),
-            )
-            for (mass, gyration, point), turn, change in zip(
-                self._bodies, turns, changes, strict=True
-            )
-        ]
+        forces = self._inertia_forces(accelerations, turns, changes)
         efforts: tuple[float, ...] = ()
         for i, unit in enumerate(self._units):
-            alone = [0.0] * count
-            alone[i] = 1.0
-            virtual = self.closure.velocity(position, *alone)
+            virtual = self.closure.velocity(position, *_unit_rates(count, i))
             w = virtual.state.coordinates
             moved = points.velocities(position, virtual, places)
             turned = self._model.turn_rates(position, virtual)
@@ -411,6 +535,42 @@ class Mechanics:
 
                 law = Stribeck(friction.breakaway_excess, friction.stribeck)
             yield FrictionJoint(index, friction, one, other, factor, law)
+
+
+def solve_positive(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float] | None:
+    """
+    Return x of M·x = right; None if M is not positive.
+
+    M is symmetric, given by the rows of its lower triangle, and is taken apart into L·D·Lᵀ
+    (Cholesky without roots: G. H. Golub, C. F. Van Loan, Matrix Computations, ch. 4).
+    """
+    lower: list[list[float]] = []
+    pivots: list[float] = []
+    x = [*right]
+    for i, row in enumerate(rows):
+        scaled = [*row]  # L·D of the row, then L
+        for j in range(i):
+            for k in range(j):
+                scaled[j] = scaled[j] - scaled[k] * lower[j][k]
+        pivot = row[i]
+        for j in range(i):
+            factor = scaled[j] / pivots[j]
+            pivot, x[i] = pivot - factor * scaled[j], x[i] - factor * x[j]
+            scaled[j] = factor
+        if not pivot > 0.0:
+            return None
+        lower.append(scaled)
+        pivots.append(pivot)
+    for i in range(len(x) - 1, -1, -1):
+        x[i] = x[i] / pivots[i]
+        for k in range(i + 1, len(x)):
+            x[i] = x[i] - lower[k][i] * x[k]
+    return x
+
+
+def _unit_rates(count: int, number: int) -> list[float]:
+    """Return the rates of inputs of which one has a rate of 1."""
+    return [float(i == number) for i in range(count)]
 
 
 def _bodies_of(closure: Any, loads: Loads) -> BodyModel:

@@ -45,6 +45,7 @@ class AbsoluteMotion:
     """
 
     def __init__(self, closure, inputs, rates, changes):
+        self.closure, self.inputs = closure, inputs
         self.linkage = linkage = closure.linkage
         self.moving = [link for link in linkage.link_names if link != 'ground']
         drawn = closure.frames(closure.close_unlimited(*linkage.pose.inputs))
