@@ -7,12 +7,16 @@
 # language governing permissions and limitations under the License.
 """A state beyond reach is searched for once, however long its command lasts."""
 
+from itertools import combinations
+from math import dist
 import random
 
 from linkage_ros.description import load
-from linkage_ros.kinematics import Closure, Status
+from linkage_ros.kinematics import Closure, Grid, Status
 from linkage_ros.kinematics.iterated.group import IteratedGroup
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from .defects import defect
 from .platforms import linkage_of, platform
@@ -77,3 +81,37 @@ def test_what_is_no_longer_remembered_is_found_again_to_the_same_bits(monkeypatc
     fresh, _ = case()
     assert [fresh.close_unlimited(*state).gap for state in reversed(states)] == gaps[::-1]
     assert [closure.close_unlimited(*state).gap for state in states] == gaps
+
+
+# What no pose of the links can reach is known without a search.
+
+BASE = [(193, -52), (193, 52), (-52, 193), (-141, 141), (-141, -141), (-52, -193)]
+TOP = [(85, -85), (85, 85), (31, 116), (-116, 31), (-116, -31), (31, -116)]
+
+
+def test_legs_that_are_too_short_for_any_pose_miss_by_what_a_ring_of_two_lacks(monkeypatch):
+    closure = load('hexapod')
+    legs = (0.002, 0.003, 0.002, 0.004, 0.002, 0.002)
+    gaps = []
+    for i, k in combinations(range(6), 2):
+        bars = sorted(
+            (1e-3 * dist(BASE[i], BASE[k]), 1e-3 * dist(TOP[i], TOP[k]), legs[i], legs[k])
+        )
+        gaps.append(bars[3] - sum(bars[:3]))
+    monkeypatch.setattr(Grid, '_follow', None)
+    position = closure.position(*legs)
+    assert position.status is Status.OPEN
+    assert position.gap == pytest.approx(max(gaps), rel=1e-12)
+
+
+def test_no_pose_of_a_platform_is_said_to_be_beyond_reach():
+    (grid,) = load('hexapod').grids
+    shortfall, scale = grid._group.shortfall, load('hexapod').scale
+    rng = np.random.default_rng(7)
+    base, top = (np.array([(*place, 0.0) for place in places]) * 1e-3 for places in (BASE, TOP))
+    for _ in range(2000):
+        turn = Rotation.random(random_state=rng).as_matrix()
+        # Also with the platform in the plane of the base, and legs of no length.
+        ends = top @ turn.T + rng.uniform(-0.3, 0.3, 3) * rng.integers(0, 2)
+        legs = np.linalg.norm(ends - base, axis=1) / scale
+        assert shortfall(legs.tolist()) == 0.0

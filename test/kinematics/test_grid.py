@@ -31,6 +31,9 @@ class Sphere:
     def away(self, inputs):
         return [x - c for x, c in zip(inputs, self.centre, strict=True)]
 
+    def shortfall(self, inputs):
+        return 0.0
+
     def proof(self, inputs, unknowns):
         (z,) = unknowns
         return abs(self.error(inputs, z) / z) * abs(1.0 / z) if z else inf

@@ -147,6 +147,9 @@ class _Found(NamedTuple):
 class GridFunctions(Protocol):
     """The equations of a group of links, at its inputs."""
 
+    def shortfall(self, inputs: Sequence[float]) -> float:
+        """Return by how much links are too short to close by any unknowns; 0 if none is known."""
+
     def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
         """Return η·ω of Kantorovich's theorem; infinite where there is none."""
 
@@ -257,6 +260,8 @@ class Grid:
         return look_up
 
     def _search(self, *inputs: float) -> tuple[float, ...] | None:
+        if self._group.shortfall(inputs):
+            return None
         for level in range(_LEVELS):
             key = self._key_of(level, inputs)
             found = self._kept.get(key)

@@ -45,6 +45,9 @@ _LAST_STEP = 2.0**-36
 _LEAST_STEP = 2.0**-20
 """The same of a solution next to a singularity, where the rounding is greater."""
 
+_SHORT = 2.0**-30
+"""Links that are too short by less may close, as lengths are rounded."""
+
 _SINGULAR = 1e-11
 """Least ratio of smallest to largest singular value at which rates exist."""
 
@@ -73,6 +76,7 @@ class GridGroup(IteratedGroup):
     ) -> None:
         super().__init__(equations, before, start, inputs)
         self._given_inputs, self._system = given_inputs, system
+        self._shortfalls_line = self._compile_later(self._list_shortfalls)
         self._proof_line = self._compile_later(self._list_proof)
         self._step_line = self._compile_later(self._list_step)
         self._forms_line = self._compile_later(self._list_forms)
@@ -145,6 +149,10 @@ class GridGroup(IteratedGroup):
     def _find_slowly(self, solved: LinkState) -> GroupPose:
         """Return the links where no straight line leads to them, as next to a singularity."""
         inputs = [solved.coordinates[1 + k] for k in self.inputs]
+        short = self.shortfall(inputs)
+        if short:
+            unknowns = self._equations.complete(self._start, solved)
+            return GroupPose(Status.OPEN, unknowns, (), short)
         start = self.grid.find_start(inputs)
         if start is not None and (found := self.solve_from(inputs, start)) is not None:
             return self._pose_at(solved, found)
@@ -164,6 +172,11 @@ class GridGroup(IteratedGroup):
         return GroupPose(Status.CLOSED, unknowns, [0.0] * len(unknowns))
 
     # What the grid asks for; inputs on which nothing depends are as in the pose
+
+    def shortfall(self, inputs: Sequence[float]) -> float:
+        """Return by how much links are too short to close by any unknowns; 0 if none is known."""
+        short = max(self._shortfalls_line(inputs, self._start) or (), default=0.0)
+        return short if short > _SHORT else 0.0
 
     def proof(self, inputs: Sequence[float], unknowns: Sequence[float]) -> float:
         """
@@ -207,6 +220,9 @@ class GridGroup(IteratedGroup):
         return None if found is None else (found[: len(unknowns)], found[len(unknowns) :])
 
     # The functions of the straight lines
+
+    def _list_shortfalls(self, given: LinkState, _pose: LinkState) -> list[Any]:
+        return self._equations.shortfalls(require_state(self._before.known_at(given.coordinates)))
 
     def _list_step(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return a step of Newton's method."""

@@ -71,6 +71,9 @@ class Equations(Protocol):
     ) -> list[Any]:
         """Return the accelerations of the unknowns."""
 
+    def shortfalls(self, known: LinkState) -> list[Any]:
+        """Return lengths by which parts of the links are too short to close, where positive."""
+
     # The same and those of pins, by all unknowns
 
     def evaluate(

@@ -92,6 +92,10 @@ class GroupEquations:
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
+    def shortfalls(self, _known: LinkState) -> list[Any]:
+        """Return nothing: which links are too short is known only by iteration."""
+        return []
+
     # The equations that close loops, as functions of the free unknowns; see `GridGroup`
 
     def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:

@@ -15,8 +15,8 @@ places on two links. All functions take numbers or symbols, and decide nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations_with_replacement
-from math import hypot, inf, prod
+from itertools import combinations, combinations_with_replacement
+from math import dist, hypot, inf, prod
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
@@ -28,6 +28,7 @@ from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import Rod
 from linkage_ros.kinematics.space.vectors import (
     dot,
+    length,
     minus,
     plus,
     SpaceFrame,
@@ -204,6 +205,37 @@ class KnotEquations:
         """Return the ends of all rods, in the frame of the ground."""
         state = self.place_links(known, unknowns)
         return [end.locate(state) for rod in self.rods for end in (rod.start, rod.end)]
+
+    @BuiltProperty
+    def _rings(self) -> list[tuple[KnotRod, KnotRod]]:
+        """Return the pairs of rods from known places to one link."""
+        rods = []
+        for rod in self.rods:
+            start, end = sorted((rod.start, rod.end), key=lambda each: each.mover)
+            rods.append(KnotRod(start, end, rod.rod))
+        return [
+            (one, other)
+            for one, other in combinations(rods, 2)
+            if one.start.mover == other.start.mover == -1 and one.end.mover == other.end.mover
+        ]
+
+    def shortfalls(self, known: LinkState) -> list[float]:
+        """
+        Return by how much rings of four bars are too short to close, in lengths; or less than 0.
+
+        Two rods and the two links that they join are such a ring. It closes if no bar is longer
+        than the others together.
+        """
+        found = []
+        for one, other in self._rings:
+            bars = [
+                length(minus(one.start.locate(known), other.start.locate(known))),
+                dist(one.end.place, other.end.place),
+                abs(one.rod.length(known)),
+                abs(other.rod.length(known)),
+            ]
+            found += [2.0 * bar - sum(bars[1:], bars[0]) for bar in bars]
+        return found
 
     def errors(self, known: LinkState, unknowns: Sequence[float]) -> list[float]:
         """Return the residuals."""
