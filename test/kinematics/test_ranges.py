@@ -16,6 +16,7 @@ from pathlib import Path
 import random
 
 from hypothesis import assume, given, strategies as st
+from linkage_ros.description import load
 from linkage_ros.kinematics import (
     AssemblyPose,
     Closure,
@@ -353,6 +354,42 @@ def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file):
     assert worst.residual < 1e-14 * closure.scale
     assert closure.residual(closure.position(*worst.inputs)) == worst.residual
     assert worst.positions > 400
+
+
+# A wheel loader: the boom's angle and a cylinder from the chassis to a bell crank on the boom.
+LOADER = """
+units: mm
+angles: degrees
+links:
+  ground: {A: [0, 0], G: [120, -350]}
+  boom: {A: [0, 0], H: [1400, 180]}
+  tube: {G: [0, 0]}
+  rod: {D: [0, 0]}
+  bell: {H: [0, 0], D: [0, 620]}
+sliders:
+  bore: {point: D, block: rod, along: tube, through: G, direction: [1, 0]}
+input:
+  - {joint: boom_joint, parent: ground, child: boom}
+  - {joint: tilt_cylinder, slider: bore}
+pose:
+  inputs: [-20, 1500]
+  points: {D: [1500, 400]}
+joints:
+  bell_joint: {parent: boom, child: bell}
+"""
+
+
+def test_the_worst_states_of_a_cylinder_among_several_inputs_are_those_of_the_positions(tmp_path):
+    file = tmp_path / 'loader.yaml'
+    file.write_text(LOADER)
+    closure = load(file)
+    worst = find_worst_states(closure)
+    positions = [(at, one) for at, one in grid_positions(closure) if one.status.has_pose]
+    assert worst.positions == len(positions)
+    assert worst.residual == max(closure.residual(one) for _, one in positions)
+    assert closure.residual(closure.position(*worst.inputs)) == worst.residual
+    least = min(closure.singularity_margin(one).conditioning for _, one in positions)
+    assert worst.margin.conditioning == pytest.approx(least, abs=1e-9)
 
 
 def test_the_nearest_singularity_of_several_inputs_is_where_the_forearms_are_straightest():

@@ -260,12 +260,14 @@ class Grid:
         return look_up
 
     def _search(self, *inputs: float) -> tuple[float, ...] | None:
-        if self._group.shortfall(inputs):
-            return None
+        may_close = False
         for level in range(_LEVELS):
             key = self._key_of(level, inputs)
             found = self._kept.get(key)
             if found is None:
+                may_close = may_close or not self._group.shortfall(inputs)
+                if not may_close:
+                    return None
                 with BUILD_LOCK:
                     found = self._follow(key)
             if found.numbers is not None:

@@ -10,13 +10,13 @@
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Sequence
 from math import tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
+from linkage_ros.kinematics.arithmetic import unit_vector
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.doubles import to_double
 from linkage_ros.kinematics.limits import without_mirrored, zero_length
@@ -320,7 +320,7 @@ class Closure(StepwiseClosure):
             else:
                 slider = self.linkage.sliders[joint.name]
                 between = points[joint.link, slider.point] - points[joint.to, slider.through]
-                line = complex(*slider.direction) * rect(1.0, angles[joint.to])
+                line = complex(*slider.direction) * unit_vector(angles[joint.to])
                 along = self.slide_values(position)[joint.name]
                 error = between - along * line / abs(line)
             errors.append(abs(error))
