@@ -216,8 +216,12 @@ def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
     look = Look(tmp_path, f'drive: {{{DRIVE_SCENES[drive]}}}')
     drives = sharing({drive}, DRIVE_MODULES)
     assert of_registry(DRIVE_MODULES, look.modules) == drives
-    # The lines of the topic drive stand in the tick that is written for the scene.
-    assert of_registry(DRIVE_MODULES, look.passed) == drives - {'topic'}
+    # The lines of the topic drive stand in the tick that is written for the scene; the crank of
+    # the torque drive stands in a file of its own.
+    assert of_registry(DRIVE_MODULES, look.passed) == drives - {'topic', 'torque'}
+    crank = 'linkage_ros.stages.drives.torque_crank'
+    assert (crank in look.passed) == (drive == 'torque')
+    assert 'linkage_ros.stages.drives.several_torques' not in look.modules
     assert ('dynamics' in packages(look.modules - bare.modules)) == (drive == 'torque')
     assert 'numpy' not in look.modules
 

@@ -7,7 +7,12 @@
 # language governing permissions and limitations under the License.
 
 from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
-from linkage_ros.dynamics.equation import Mechanics as Mechanics, Terms as Terms
+from linkage_ros.dynamics.equation import (
+    InputLawTerm as InputLawTerm,
+    InputTerms as InputTerms,
+    Mechanics as Mechanics,
+    Terms as Terms,
+)
 from linkage_ros.dynamics.integrators import (
     gauss_legendre as gauss_legendre,
     GAUSS_MATRIX as GAUSS_MATRIX,
@@ -43,9 +48,12 @@ from linkage_ros.dynamics.motion import (
     Motion as Motion,
     SingleDofMechanism as SingleDofMechanism,
 )
-from linkage_ros.dynamics.motor import Motor as Motor
+from linkage_ros.dynamics.motor import Motor as Motor, MotorLaw as MotorLaw
 from linkage_ros.dynamics.reactions import Reaction as Reaction, Reactions as Reactions
-from linkage_ros.dynamics.several_freedoms import SeveralDofMechanism as SeveralDofMechanism
+from linkage_ros.dynamics.several_freedoms import (
+    InputVector as InputVector,
+    SeveralDofMechanism as SeveralDofMechanism,
+)
 from linkage_ros.dynamics.two_masses import TwoMasses as TwoMasses
 from linkage_ros.dynamics.winding import Winding as Winding
 from linkage_ros.dynamics.wrenches import HeldWrench as HeldWrench

@@ -284,13 +284,7 @@ class AppliedForces:
         where there is none; ``between`` is the range of the input, in [rad] or [m]. The error has
         the key of the stiffest load; its remedy is the longest step that carries it.
         """
-        yielding: dict[str, JointSpring | SoftStop] = {
-            **{
-                f'joint_springs.{name}': spring
-                for name, spring in self._given.joint_springs.items()
-            },
-            **{f'stops.{name}': stop for name, stop in self._given.stops.items()},
-        }
+        yielding = self._yielding
         worst, blamed = 0.0, ''
         for inert, touched in self._sample_range(inertia, between):
             stiffness = sum(yielding[key].stiffness * lever**2 for key, lever in touched.items())
@@ -308,6 +302,59 @@ class AppliedForces:
             'write a smaller stiffness or damping',
             longest_step.EXACT,
         )
+
+    def check_step_at(
+        self,
+        values: Sequence[float],
+        mobility: Sequence[Sequence[float]],
+        method: str,
+        step: float,
+    ) -> None:
+        """
+        Refuse as `check_step` does, at one state of a linkage with several inputs.
+
+        ``mobility`` is the inverse of the matrix of inertia at these ``values`` of the inputs.
+        """
+        import numpy as np  # local import: only with several inputs
+
+        closure, count = self._closure, len(values)
+        position = closure.close_unlimited(*values)
+        alone = [
+            closure.velocity(position, *(float(i == j) for j in range(count)))
+            for i in range(count)
+        ]
+        moved_by = np.array(mobility)
+        stiffness, damping = np.zeros((count, count)), np.zeros((count, count))
+        worst, blamed = 0.0, ''
+        joints = [joint for joint, _ in self._springs] + [j for j, _ in self._stops.values()]
+        for (key, spring), joint in zip(self._yielding.items(), joints, strict=True):
+            levers = np.array([joint.lever(way, position, ()) for way in alone])
+            stiffness += spring.stiffness * np.outer(levers, levers)
+            damping += spring.damping * np.outer(levers, levers)
+            own = spring.stiffness * float(levers @ moved_by @ levers)
+            if own > worst:
+                worst, blamed = own, key
+        fastest = [
+            float(np.linalg.eigvals(moved_by @ of).real.max()) for of in (stiffness, damping)
+        ]
+        longest_step.check_step(
+            f'loads.{blamed}',
+            _fastest_eigenvalue(*fastest),
+            method,
+            step,
+            'it is too stiff',
+            'write a smaller stiffness or damping',
+            longest_step.EXACT,
+        )
+
+    @property
+    def _yielding(self) -> dict[str, JointSpring | SoftStop]:
+        """Return the springs and stops of joints by their keys."""
+        springs, stops = self._given.joint_springs, self._given.stops
+        return {
+            **{f'joint_springs.{name}': spring for name, spring in springs.items()},
+            **{f'stops.{name}': stop for name, stop in stops.items()},
+        }
 
     def _sample_range(
         self, inertia: Callable[[float], float], between: tuple[float, float]

@@ -137,7 +137,9 @@ class Motor:
         *_, law = getattr(mechanism, 'motor', mechanism).laws
         return law.resting, 0.0
 
-    def check_step(self, inertia: float, method: str, step: float) -> None:
+    def check_step(
+        self, inertia: float, method: str, step: float, key: str = 'drive.torque.motor'
+    ) -> None:
         """
         Refuse a motor whose rate follows the voltage faster than a step in [s] can follow.
 
@@ -147,7 +149,7 @@ class Motor:
         if self.command == 'voltage' or self._supply_limits():
             damping = -self._current_slope() * self.constant * self.ratio / self.backward
             check_step(
-                'drive.torque.motor',
+                key,
                 damping / inertia,
                 method,
                 step,

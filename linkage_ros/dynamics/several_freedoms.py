@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf, ulp
+from math import copysign, inf, ulp
 from operator import add, mul, sub
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -55,6 +55,9 @@ _CUTS = 20
 
 _SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
+
+_BEGINNING = 1e-200
+"""A rate that has a direction and no size."""
 
 _PROBE = 1e-3
 """Fraction of a step after which a motion that is held at a toggle is seen to leave it."""
@@ -190,20 +193,34 @@ class SeveralDofMechanism:
     ) -> _Piece:
         """Return what stays the same from a state on."""
         begin = motion._replace(ahead=0.0)
-        segments = tuple(
-            law.segment(at.value, at.rate, now)
-            for law, at in zip(self.laws, motion.terms.laws, strict=True)
-        )
+        segments = self._law_segments(motion, force, now) if cuts else ()
         held = [n for n in self._inputs_at_stops(motion) if motion.rate[n] == 0.0]
         # Those that would be pulled are free; the worst of them first.
         while held:
-            piece = _Piece(now, force, tuple(held), cuts, segments if cuts else ())
+            piece = _Piece(now, force, tuple(held), cuts, segments)
             pulls = {n: self._stop_pull(begin, n, piece) for n in held}
             worst = max(held, key=pulls.__getitem__)
             if pulls[worst] <= 0.0:
                 return piece
             held.remove(worst)
-        return _Piece(now, force, (), cuts, segments if cuts else ())
+        return _Piece(now, force, (), cuts, segments)
+
+    def _law_segments(
+        self, motion: SeveralMotion, force: InputVector, now: float
+    ) -> tuple[int, ...]:
+        """Return the segment of each law for a motion, or for the direction in which it begins."""
+        laws = motion.terms.laws
+        change: InputVector | None = None
+        if any(at.rate == 0.0 for at in laws):
+            change = self._accelerate(motion.terms, now, _Piece(now, force, (), False, ()))
+        segments: tuple[int, ...] = ()
+        for law, at in zip(self.laws, laws, strict=True):
+            rate = at.rate
+            if rate == 0.0 and change is not None:
+                began = sum(map(mul, at.levers, change))
+                rate = copysign(_BEGINNING, began) if began else 0.0
+            segments += (law.segment(at.value, rate, now),)
+        return segments
 
     def _inputs_at_stops(self, motion: SeveralMotion) -> list[int]:
         places = zip(motion.value, self.stops, strict=True)

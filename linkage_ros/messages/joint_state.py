@@ -270,6 +270,14 @@ class EffortCommand(NamedTuple):
     effort: float  # Effort in [N·m]; of a sliding joint in [N]
 
 
+class EffortsCommand(NamedTuple):
+    """Commands for several joints."""
+
+    stamp: int  # Stamp of the message, in [ns]; 0 without one
+    # Effort of each joint in [N·m], of a sliding one in [N]; None for a joint without a command.
+    efforts: tuple[float | None, ...]
+
+
 class JointEffortReader:
     """
     Reads the effort of a joint, at any place in a message, from serialized messages.
@@ -297,22 +305,73 @@ class JointEffortReader:
                 order, seconds, nanoseconds, names, rates, efforts, effort = unpack_from(data)
                 if (order, names, rates, efforts) == fixed:
                     return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
-        layout = _effort_pattern(data, self._joint, self._dependent)
+        layout = _effort_pattern(data, [self._joint], self._dependent)
         if isinstance(layout, Rejection):
             return layout
         self._known = layout.size, layout.unpack_from, layout.fixed
         return self.read(data)
 
 
+class JointEffortsReader:
+    """
+    Reads the efforts of several joints from serialized messages, as `JointEffortReader` of one.
+
+    A message names one of them or more: the others have no command in it.
+    """
+
+    __slots__ = ('_dependent', '_joints', '_known')
+
+    def __init__(self, joints: Sequence[str], dependent: Collection[str] = ()) -> None:
+        self._joints = [joint.encode() for joint in joints]
+        self._dependent = frozenset(name.encode() for name in dependent)
+        self._known: tuple[Pattern, list[int]] | None = None
+
+    def read(self, data: bytes) -> EffortsCommand | Rejection:
+        """Return the commands for the joints, or the reason for the rejection of the message."""
+        if self._known is not None:
+            pattern, numbers = self._known
+            if len(data) >= pattern.size:
+                values = pattern.unpack_from(data)
+                if pattern.pick_fixed(values) == pattern.fixed:
+                    efforts: list[float | None] = [None] * len(self._joints)
+                    (pick,) = pattern.picks
+                    for number, effort in zip(numbers, pick(values), strict=True):
+                        efforts[number] = effort
+                    stamp = values[1] * NANOSECONDS + values[2]
+                    return EffortsCommand(stamp, tuple(efforts))
+        arrays_or_reason = arrays_of(data)
+        if isinstance(arrays_or_reason, Rejection):
+            return arrays_or_reason
+        names = arrays_or_reason[1]
+        # First, whether it is for this reader at all: others may share the topic.
+        named = [joint for joint in self._joints if joint in names]
+        if names and not named:
+            return Rejection.MISSING
+        layout = _effort_pattern(data, named, self._dependent)
+        if isinstance(layout, Rejection):
+            return layout
+        self._known = layout, [self._joints.index(joint) for joint in named]
+        return self.read(data)
+
+
+def effort_reader(
+    joints: Sequence[str], dependent: Collection[str] = ()
+) -> Callable[[bytes], EffortCommand | EffortsCommand | Rejection]:
+    """Return a function that reads commands of efforts for one joint, or for several."""
+    if len(joints) == 1:
+        return JointEffortReader(joints[0], dependent).read
+    return JointEffortsReader(joints, dependent).read
+
+
 def _effort_pattern(
-    data: bytes, joint: bytes, dependent: Collection[bytes]
+    data: bytes, joints: Sequence[bytes], dependent: Collection[bytes]
 ) -> Pattern | Rejection:
     arrays_or_reason = arrays_of(data)
     if isinstance(arrays_or_reason, Rejection):
         return arrays_or_reason
     _, names, arrays = arrays_or_reason
     efforts = arrays[-1]
-    if names and joint not in names:
+    if names and not {*joints} <= {*names}:
         return Rejection.MISSING
     if not efforts.length:
         return Rejection.NO_EFFORT
@@ -321,7 +380,8 @@ def _effort_pattern(
         return Rejection.UNEQUAL
     if not names:
         return Rejection.MISSING
-    if names.count(joint) > 1:
+    if any(names.count(joint) > 1 for joint in joints):
         return Rejection.TWICE
     commanded = names if efforts.length == len(names) else able
-    return compile_pattern(data, arrays, [[efforts.first + 8 * commanded.index(joint)]])
+    places = [efforts.first + 8 * commanded.index(joint) for joint in joints]
+    return compile_pattern(data, arrays, [places])

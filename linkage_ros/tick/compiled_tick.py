@@ -236,9 +236,10 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         lines += _fall_back_unless("{*getattr(crank, 'free_motors', ())} <= {None}", leave)
     if efforts and exerts:
         # As `linkage_ros.stages.effects.forces` for an input at rest.
-        effort = efforts[0]
         lines.append("bearing = getattr(crank, 'bearing', ())")
-        lines.append(f'if bearing: {effort} = min(max({effort}, bearing[0]), bearing[1])')
+        for k, effort in enumerate(efforts[: compiled.driven]):
+            ends = f'bearing[{2 * k}]), bearing[{2 * k + 1}]'
+            lines.append(f'if bearing: {effort} = min(max({effort}, {ends})')
     if linkage.running is not None:
         bound['running'] = linkage.running
         lines += _unwrap_lines(linkage.running.places, joints, leave)

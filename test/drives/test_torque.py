@@ -314,8 +314,8 @@ OUT_OF_REACH = (
 )
 UNBUILT = {
     'several inputs': (
-        two_inputs(), {},
-        'drive.torque: the linkage has 2 inputs, and the torque drive moves one; use a linkage ',
+        two_inputs(), {'on_timeout': 'brake', 'brake': 1.0},
+        "masses: link 'left' has no mass, and forces are asked for; ",
     ),
     'no masses': (MASSLESS, {}, "masses: link 'crank' has no mass, and forces are asked for; "),
     'a start out of reach': (DOUBLE_ROCKER, {'start': 1.5}, OUT_OF_REACH.format(1.5, 0.001)),
@@ -376,9 +376,8 @@ def test_a_scene_is_driven_by_commands():
 
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
-    assert (
-        TorqueDrive().reader(context)(serialized(['left/left_crank'], efforts=[2.0])).effort == 2.0
-    )
+    read = TorqueDrive().reader(context)
+    assert read(serialized(['left/left_crank'], efforts=[2.0])).efforts == (2.0, None)
 
 
 @pytest.mark.parametrize('start', [0.0, pi])

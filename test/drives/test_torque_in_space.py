@@ -11,7 +11,6 @@ from dataclasses import replace
 from math import inf
 
 from linkage_ros.dynamics import AppliedLoads, JointLoad, JointSpring, Loads, Mechanics, SoftStop
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Limits, SpaceClosure
 from linkage_ros.messages import EffortCommand
 from linkage_ros.stages.drives import Context, TorqueDrive
@@ -115,8 +114,3 @@ def test_it_is_pushed_back_by_a_stop_that_yields():
     assert state.rates[0] == pytest.approx(0.0, abs=1e-9)
     # At rest spring and weight bear the command.
     assert 500.0 * (state.angles[0] - 0.5) == pytest.approx(2.0 - slope, rel=1e-9)
-
-
-def test_several_inputs_are_refused():
-    with pytest.raises(DefinitionError, match=r'drive\.torque: the linkage has 3 inputs'):
-        drive(weighed('delta'), Loads(GRAVITY))

@@ -42,6 +42,6 @@ from linkage_ros.stages.drives.topic import (
 from linkage_ros.stages.drives.torque import (
     MotorParameters as MotorParameters,
     PlayParameters as PlayParameters,
-    TorqueCrank as TorqueCrank,
     TorqueDrive as TorqueDrive,
 )
+from linkage_ros.stages.drives.torque_crank import TorqueCrank as TorqueCrank

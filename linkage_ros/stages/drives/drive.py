@@ -81,9 +81,10 @@ class CrankBehindPlay(CrankState):
 
 
 class CrankAtRest(CrankState):
-    """State of an input that stands, with the efforts that its drive may exert on it."""
+    """State of inputs with the efforts that the drive may exert, as on one that stands."""
 
-    # The least and the greatest, in [N·m] or [N]: they differ where a brake or a gear holds.
+    # For each input the least and the greatest, in [N·m] or [N]: they differ where a brake or a
+    # gear holds.
     bearing: tuple[float, ...] = ()
 
 

@@ -9,10 +9,9 @@
 """
 Hardware in the loop: a controller commands the effort of the input, which moves the linkage.
 
-Time is divided into equal steps from the first tick on. A step is divided again where a command
-or a wrench arrives or expires, since the force changes there. So the motion depends only on the
-messages and their times, not on when the state is read: the state between two steps comes from a
-shorter step of the same method, which is then discarded.
+The crank that takes the commands and integrates the motion is
+`linkage_ros.stages.drives.torque_crank`; of several inputs
+`linkage_ros.stages.drives.several_torques`.
 
 With a motor (`linkage_ros.dynamics.motor`) a command is an effort, a current or a voltage, and the
 effort follows from it and the rate. A command that is delayed waits until its time.
@@ -20,56 +19,28 @@ effort follows from it and the rate. A command that is delayed waits until its t
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import copysign, inf, isfinite, pi
+from math import inf, pi
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.description import choice, number, optional_section, whole_number
-from linkage_ros.dynamics import LARGEST, METHODS, Motion, SingleDofMechanism
-from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.description import choice, each_part, number, optional_section, whole_number
+from linkage_ros.dynamics import LARGEST, METHODS, SingleDofMechanism
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import Closure, describe_ranges
-from linkage_ros.messages import (
-    EffortCommand,
-    JOINT_STATE_TYPE,
-    JointEffortReader,
-    NANOSECONDS,
-    Rejection,
-)
-from linkage_ros.stages.drives.drive import (
-    Context,
-    Crank,
-    CrankAtRest,
-    CrankState,
-    Drive,
-    Reader,
-)
+from linkage_ros.messages import effort_reader, JOINT_STATE_TYPE, NANOSECONDS
+from linkage_ros.stages.drives.drive import Context, Drive, Reader
+from linkage_ros.stages.drives.torque_crank import TorqueCrank
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import HeldWrench, Mechanics, Motor, Winding
-
-_MADE_UP = NANOSECONDS
-"""Time that one tick integrates at most, in [ns]; two periods if these are longer."""
-
-_HURRIED = NANOSECONDS // 50
-"""The same while motor and crank meet and part too often: each step then costs several."""
-
-_FEW_TRIALS = 50
-"""Fewer trials than this are left of `linkage_ros.dynamics.two_masses.SAVED` then."""
-
-_NEVER = 1 << 63
+    from linkage_ros.dynamics import Mechanics, Motor, Winding
+    from linkage_ros.stages.drives.several_torques import SeveralTorqueCrank
 
 _SAMPLES = 90
 """Intervals of the range over which the least inertia is looked for."""
 
 _LEAST_RESISTANCE = 1e-9
 """Smaller resistances count as none, in [Ω]."""
-
-_PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
-"""What passes through the play, by the side on which the motor touches the crank."""
-
-_Acting = tuple[Any, float, float]
-"""What acts by a command: the mechanism, the force on its input, and the brake."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +120,17 @@ class MotorEncoderParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class TorqueInput:
+    """Start and motor of one input."""
+
+    start: float = number('value at the first tick', 0.0, unit='rad or m', least=-1e6, most=1e6)
+    rate: float = number('its rate then', 0.0, unit='rad/s or m/s', least=-1e6, most=1e6)
+    motor: MotorParameters | None = optional_section(  # noqa: RUF009 (a field, as the others are)
+        'its own motor; without, the common one', MotorParameters
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class TorqueDrive(Drive):
     """Hardware in the loop: the effort commanded on crank_commands moves the linkage's masses."""
 
@@ -174,7 +156,8 @@ class TorqueDrive(Drive):
     )
     stop_margin: float = number(
         'distance of the stop from a toggle at an end of the range, as a fraction of the range: '
-        'at the toggle the inertia is unbounded; a limit is itself a stop',
+        'at the toggle the inertia is unbounded; a limit is itself a stop; of several inputs, '
+        'ratio of the inertias at the start and at the stop',
         1e-3,
         above=0.0,
         most=0.49,
@@ -188,6 +171,9 @@ class TorqueDrive(Drive):
     motor_encoder: MotorEncoderParameters | None = optional_section(  # noqa: RUF009 (as above)
         'publishes the motor, as its own encoder reads it, on ~/motor', MotorEncoderParameters
     )
+    inputs: Mapping[str, TorqueInput] = each_part(
+        'inputs with a start, a rate and a motor of their own', 'input', TorqueInput
+    )
 
     listens_to = 'crank_commands'
     gives_torque = True
@@ -198,40 +184,30 @@ class TorqueDrive(Drive):
         """
         Build the crank.
 
-        Raise `DefinitionError` if the linkage has several inputs or lacks masses, no motion can
-        start at the given start, or the brake is not specified.
+        Raise `DefinitionError` if the linkage lacks masses, no motion can start at the given
+        start, the brake is not specified, or something is for one input and there are several.
         """
-        _refuse_useless(self, context)
-        motion = _build_motion(self, context)
-        given = context.closure.linkage.inputs[0]
-        most = given.limits.effort
-        motor = None
-        if self.motor is not None:
-            motor = _build_motor(self.motor, most)
-            motion = motor.mount_on(motion)
-            if self.motor.command != 'effort':
-                most = LARGEST
-        start = motion.state_at(self.start, self.rate)
-        if start is None:
-            raise DefinitionError(
-                'drive.torque.start',
-                f'at {self.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
-                'start elsewhere',
-            )
-        mechanics = context.mechanics
-        low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
-        _check_step(self, mechanics, motor, (low, high))
-        period = round(NANOSECONDS / context.rate) if context.rate else 0
-        wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
-        # An effect of the user's may ask for it.
-        exerts = any(name == 'effort' or '.' in name for name in context.effects)
-        return TorqueCrank(
-            motion, start, self, period, min(most, LARGEST), motor, wrenches, exerts
-        )
+        _refuse_useless(self)
+        names = context.closure.input_names
+        if len(names) > 1:
+            return _build_several(self, context)
+        return _build_single(self.for_input(names[0]), context)
+
+    def for_input(self, name: str) -> TorqueDrive:
+        """Return the drive with the start and the motor of an input."""
+        own = self.inputs.get(name)
+        if own is None:
+            return self
+        return replace(self, start=own.start, rate=own.rate, motor=own.motor or self.motor)
+
+    def key_for(self, name: str, part: str) -> str:
+        """Return the key under which a part of an input is: its ``start`` or its ``motor``."""
+        own = name in self.inputs and getattr(self.inputs[name], part) is not None
+        return f'drive.torque.inputs.{name}.{part}' if own else f'drive.torque.{part}'
 
     def reader(self, context: Context) -> Reader:
         """Build the reader of the messages."""
-        return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
+        return effort_reader(context.inputs_in_messages, context.dependent)
 
     def writer(self, context: Context, drive: TorqueCrank) -> Any:
         """Build the writer of ~/motor; None if the motor is not published."""
@@ -245,15 +221,8 @@ class TorqueDrive(Drive):
         return MotorEncoder(name, self.motor_encoder.counts, lambda: drive.motor)
 
 
-def _refuse_useless(parameters: TorqueDrive, context: Context) -> None:
-    """Refuse a linkage that the drive cannot move, and a brake that does nothing."""
-    n_inputs = len(context.closure.linkage.inputs)
-    if n_inputs > 1:
-        raise DefinitionError(
-            'drive.torque',
-            f'the linkage has {n_inputs} inputs, and the torque drive moves one',
-            'use a linkage with one input, or another drive',
-        )
+def _refuse_useless(parameters: TorqueDrive) -> None:
+    """Refuse a brake that does nothing."""
     brakes = parameters.on_timeout == 'brake'
     if brakes and parameters.brake == 0.0:
         raise DefinitionError(
@@ -265,6 +234,37 @@ def _refuse_useless(parameters: TorqueDrive, context: Context) -> None:
         raise DefinitionError(
             'drive.torque.brake', 'the brake is never applied', 'add on_timeout: brake'
         )
+
+
+def _build_single(parameters: TorqueDrive, context: Context) -> TorqueCrank:
+    """Build the crank of a linkage with one input."""
+    motion = _build_motion(parameters, context)
+    given = context.closure.linkage.inputs[0]
+    most = given.limits.effort
+    motor = None
+    if parameters.motor is not None:
+        key = parameters.key_for(given.joint, 'motor')
+        motor = _build_motor(parameters.motor, most, key)
+        motion = motor.mount_on(motion)
+        if parameters.motor.command != 'effort':
+            most = LARGEST
+    start = motion.state_at(parameters.start, parameters.rate)
+    if start is None:
+        raise DefinitionError(
+            parameters.key_for(given.joint, 'start'),
+            f'at {parameters.start:g} {given.unit} nothing can be moved: a toggle, or no inertia',
+            'start elsewhere',
+        )
+    mechanics = context.mechanics
+    low, high = (min(max(end, start.value - pi), start.value + pi) for end in motion.stops)
+    _check_step(parameters, mechanics, motor, (low, high))
+    period = round(NANOSECONDS / context.rate) if context.rate else 0
+    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
+    # An effect of the user's may ask for it.
+    exerts = any(name == 'effort' or '.' in name for name in context.effects)
+    return TorqueCrank(
+        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
+    )
 
 
 def _build_motion(parameters: TorqueDrive, context: Context) -> Any:
@@ -314,14 +314,14 @@ def _check_step(
         )
 
 
-def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
+def _build_motor(given: MotorParameters, most: float, key: str) -> Motor | Winding:
     """Return the motor of an input that bears an effort of at most ``most``."""
     from linkage_ros.dynamics import Motor  # local import: only with a motor
 
     voltage = given.command == 'voltage' or given.voltage < LARGEST
     if voltage and given.resistance < _LEAST_RESISTANCE:
         raise DefinitionError(
-            'drive.torque.motor.resistance',
+            f'{key}.resistance',
             f'it is {given.resistance:g} Ω, and a voltage would give any current',
             "write the winding's, or command an effort or a current without a limit of voltage",
         )
@@ -343,7 +343,7 @@ def _build_motor(given: MotorParameters, most: float) -> Motor | Winding:
         return motor
     if not voltage:
         raise DefinitionError(
-            'drive.torque.motor.inductance',
+            f'{key}.inductance',
             'the current is commanded, and without a limit of voltage nothing holds it back',
             'write voltage, or leave it out',
         )
@@ -379,239 +379,92 @@ def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, f
     )
 
 
-def _without_winding(motion: Any) -> Any:
-    """Return the motion of motor and mechanism, without the current of a winding."""
-    return getattr(motion, 'moved', motion)
-
-
-class TorqueCrank(Crank):
-    """
-    A mechanism moved by commanded efforts.
-
-    A tick integrates a limited time, so that a late tick does not become later still: beyond the
-    limit whole steps are skipped, as if the mechanism had stood still.
-
-    The mechanism is a `SingleDofMechanism` or `linkage_ros.dynamics.two_masses.TwoMasses`.
-    ``period`` is the time from tick to tick, in [ns]; 0 if unknown. Commands are clipped to
-    ±``most``, in [N·m] or [N], or for a motor in [A] or [V].
-    """
-
-    __slots__ = (
-        '_acting',
-        '_begun',
-        '_boundary',
-        '_delay',
-        '_due',
-        '_idle',
-        '_least_made_up',
-        '_loaded_until',
-        '_made_up',
-        '_mechanism',
-        '_most',
-        '_most_made_up',
-        '_motion',
-        '_motor',
-        '_play',
-        '_quantum',
-        '_shown',
-        '_step',
-        '_time',
-        '_until',
-        '_waiting',
-        '_wrenches',
-        'exerts_effort',
-        'lost',
-        'max_age',
-        'saturated',
-        'stamp',
+def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCrank:
+    """Build the crank of a linkage with several inputs."""
+    from linkage_ros.dynamics import SeveralDofMechanism  # local import: only with several
+    from linkage_ros.stages.drives.several_torques import (
+        SeveralTorqueCrank,  # local import: only with several
     )
 
-    exerts_effort: bool
-    """Whether its crank state says what it exerts on an input at rest."""
-    stamp: int
-    """Arrival of the newest good command, in [ns]; 0 before the first."""
-    max_age: int
-    """Validity of a command, in [ns]."""
-    lost: int
-    """Skipped time, in [ns]."""
-    saturated: int
-    """Number of commands clipped to the effort limit."""
+    mechanics, inputs = context.mechanics, context.closure.linkage.inputs
+    _refuse_for_several(parameters, context)
+    own = [parameters.for_input(given.joint) for given in inputs]
+    keys = [parameters.key_for(given.joint, 'motor') for given in inputs]
+    motors: list[tuple[Motor, float] | None] = []
+    most: list[float] = []
+    for given, use, key in zip(inputs, own, keys, strict=True):
+        limit = given.limits.effort
+        motor: Any = _build_motor(use.motor, limit, key) if use.motor else None
+        motors.append((motor, use.motor.quantum) if use.motor else None)
+        commanded = use.motor is None or use.motor.command == 'effort'
+        most.append(min(limit, LARGEST) if commanded else LARGEST)
+    limits = context.hard_limited.linkage.inputs
+    mechanism = SeveralDofMechanism(
+        mechanics.input_equation,
+        METHODS[parameters.method].step,
+        tuple((given.limits.low, given.limits.high) for given in limits),
+        parameters.restitution,
+        mechanics.laws,
+    )
+    start = mechanism.state_at([use.start for use in own], [use.rate for use in own])
+    if start is None:
+        values = ', '.join(f'{use.start:g} {i.unit}' for use, i in zip(own, inputs, strict=True))
+        raise DefinitionError(
+            parameters.key_for(inputs[0].joint, 'start'),
+            f'at {values} nothing can be moved: beyond a stop, a toggle, or no inertia',
+            f'start elsewhere, as inputs: {{{inputs[0].joint}: {{start: 0.1}}}}',
+        )
+    inertia = start.terms.total_inertia
+    mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin)
+    for index, (given_motor, key) in enumerate(zip(motors, keys, strict=True)):
+        if given_motor is not None:
+            # What it moves if the other inputs are free.
+            alone = 1.0 / start.terms.mobility[index][index]
+            given_motor[0].check_step(alone, parameters.method, parameters.step, key)
+    if mechanics.applied:
+        mobility = start.terms.mobility
+        mechanics.applied.check_step_at(start.value, mobility, parameters.method, parameters.step)
+    wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
+    period = round(NANOSECONDS / context.rate) if context.rate else 0
+    exerts = any(name == 'effort' or '.' in name for name in context.effects)
+    return SeveralTorqueCrank(
+        mechanism, start, parameters, period, tuple(most), tuple(motors), wrenches, exerts
+    )
 
-    def __init__(
-        self,
-        mechanism: Any,
-        start: Any,
-        use: TorqueDrive,
-        period: int,
-        most: float = LARGEST,
-        motor: Motor | Winding | None = None,
-        wrenches: tuple[HeldWrench, ...] = (),
-        exerts_effort: bool = False,
-    ) -> None:
-        self.exerts_effort = exerts_effort
-        self._mechanism = mechanism
-        self._motion = self._shown = start
-        self._step = round(use.step * NANOSECONDS)
-        # A scene with slow ticks must not skip time between them.
-        self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
-        self._idle = self._acting = (mechanism, 0.0, use.brake)
-        self._time = self._boundary = self._begun = -1
-        self._until = self._due = self._loaded_until = _NEVER
-        self._wrenches = wrenches
-        self._motor = motor
-        self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
-        self._quantum = use.motor.quantum if use.motor else 0.0
-        self._waiting: deque[tuple[int, _Acting]] = deque()
-        self._play = use.play
-        self._least_made_up = max(_HURRIED, 2 * period)
-        self.max_age = round(use.timeout * NANOSECONDS)
-        self._most = most
-        self.stamp = self.lost = self.saturated = 0
 
-    def offer(self, command: EffortCommand, now: int) -> Rejection | None:
-        """Take a command at a time [ns], or return why it is rejected; then nothing changes."""
-        effort = command.effort
-        if not -LARGEST <= effort <= LARGEST:
-            if isfinite(effort):
-                return Rejection.EFFORT_TOO_LARGE
-            return Rejection.EFFORT_NOT_FINITE
-        self.saturated += not -self._most <= effort <= self._most
-        acting = self.actuation_for(effort)
-        self.stamp = now
-        if self._delay:
-            self._waiting.append((now + self._delay, acting))
-            self._due = self._waiting[0][0]
-            return None
-        if self._time >= 0:
-            self._advance(now)
-            if acting != self._acting and now > self._time:
-                self._go_to(now)
-        self._acting = acting
-        self._until = now + self.max_age
-        return None
-
-    def actuation_for(self, effort: float | None) -> tuple[Any, float, float]:
-        """Return mechanism, force on its input and brake under a command; None: without one."""
-        if effort is None:
-            return self._idle
-        if not -self._most <= effort <= self._most:
-            effort = copysign(self._most, effort)
-        if self._motor is None:
-            return self._mechanism, effort, 0.0
-        if self._quantum:
-            effort = round(effort / self._quantum) * self._quantum
-        return self._motor.drive_by(self._mechanism, effort)
-
-    @property
-    def motion(self) -> Any:
-        """Return the state of the mechanism at the last boundary of a step."""
-        return self._motion
-
-    def load(self, held: HeldWrench, wrench: tuple[float, ...], now: int) -> None:
-        """Let a wrench act on its link from a time on, in [ns]."""
-        if self._time >= 0:
-            self._advance(now)
-            if wrench != held.wrench and now > self._time:
-                self._go_to(now)
-        held.set_wrench(wrench, now)
-        self._loaded_until = min(each.until for each in self._wrenches)
-
-    def state(self, now: int) -> CrankState:
-        """
-        Return the crank state at a time, in [ns]; for an earlier time, the last state.
-
-        Raise `LinkageError` if motor and crank meet and part too often, and the scene ends the run
-        then.
-        """
-        if self._time < 0:
-            self._time = self._begun = now
-            self._boundary = now + self._step
-        self._advance(now)
-        motion, time = self._motion, (self._time - self._begun) * 1e-9
-        mechanism, force, brake = self._acting
-        if now > self._time:
-            seconds = (now - self._time) * 1e-9
-            motion = mechanism.advance(motion, seconds, force, brake, time)
-            time += seconds
-        acceleration = mechanism.acceleration(motion, force, brake, time)
-        self._shown = motion
-        if self._play:
-            self._watch_chatter(self._play)
-        if motion.rate or not self.exerts_effort:
-            return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
-        standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
-        standing.bearing = self._resting_efforts(motion, acceleration)
-        return standing
-
-    def _watch_chatter(self, play: PlayParameters) -> None:
-        """Let a late tick integrate less while motor and crank meet too often, or end the run."""
-        if self.chatter_count and play.on_chatter == 'end':
-            raise LinkageError(
-                'drive.torque.play',
-                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
-                f'at a rate of {self._motion.rate:.4g}',
-                'shorten the step, look at the controller, or write on_chatter: close',
+def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
+    """Refuse what is for one input only: dry friction in all its forms, and play."""
+    names = context.closure.input_names
+    reason = f'is for one input, and the linkage has {len(names)}'
+    if parameters.play is not None:
+        raise DefinitionError('drive.torque.play', reason, 'leave it out')
+    if parameters.brake:
+        raise DefinitionError('drive.torque.brake', reason, 'write on_timeout: zero')
+    if parameters.motor_encoder is not None:
+        raise DefinitionError('drive.torque.motor_encoder', reason, 'leave it out')
+    for name in names:
+        motor, key = parameters.for_input(name).motor, parameters.key_for(name, 'motor')
+        if motor is None:
+            continue
+        if motor.efficiency < 1.0 or motor.back_efficiency < 1.0:
+            raise DefinitionError(
+                key, f'the friction of its gear {reason}', 'leave efficiency out'
             )
-        hurries = _without_winding(self._motion).trials < _FEW_TRIALS
-        self._made_up = self._least_made_up if hurries else self._most_made_up
-
-    def _resting_efforts(self, motion: Any, acceleration: float) -> tuple[float, float]:
-        """Return the least and the greatest effort that acts on the input at rest."""
-        mechanism, force, holding = self._acting
-        if self._motor:
-            resting, within = self._motor.at_rest(mechanism, motion)
-            force, holding = force + resting, holding + within
-        least, most = force - holding, force + holding
-        behind_play = _without_winding(motion)
-        if not isinstance(behind_play, Motion):
-            # Through the play passes what is left after the motor's own inertia, as a push.
-            own = behind_play.motor.terms.inertia * acceleration
-            low, high = _PUSHES[behind_play.side]
-            least, most = (min(max(end - own, low), high) for end in (least, most))
-        return least, most
-
-    @property
-    def chatter_count(self) -> int:
-        """Return the number of steps in which motor and crank met and parted too often."""
-        coarse: int = getattr(_without_winding(self._motion), 'coarse', 0)
-        return coarse
-
-    @property
-    def motor(self) -> tuple[float, float, float | None]:
-        """Angle, rate and torque before the gear at the last state; None without `motor`."""
-        moved, mechanism = getattr(self._shown, 'motor', self._shown), self._acting[0]
-        if self._motor is None:
-            return moved.value, moved.rate, None
-        ratio, torque = self._motor.ratio, self._motor.torque(mechanism, self._shown)
-        return ratio * moved.value, ratio * moved.rate, torque
-
-    def _advance(self, now: int) -> None:
-        """Integrate all steps that end by a time, in [ns]."""
-        late = now - self._time - self._made_up
-        if late > 0:
-            left_out = -(-late // self._step) * self._step
-            self._time += left_out
-            self._boundary += left_out
-            self.lost += left_out
-        while (end := min(self._boundary, self._until, self._due, self._loaded_until)) <= now:
-            self._go_to(end)
-            if end == self._loaded_until:
-                for held in self._wrenches:
-                    held.expire(end)
-                self._loaded_until = min(held.until for held in self._wrenches)
-            if end == self._until:
-                self._acting, self._until = self._idle, _NEVER
-            if end == self._boundary:
-                self._boundary += self._step
-            if end == self._due:
-                self._acting = self._waiting.popleft()[1]
-                self._until = end + self.max_age
-                self._due = self._waiting[0][0] if self._waiting else _NEVER
-
-    def _go_to(self, end: int) -> None:
-        """Integrate a step, or the rest of one."""
-        if end > self._time:
-            seconds, time = (end - self._time) * 1e-9, (self._time - self._begun) * 1e-9
-            mechanism, force, brake = self._acting
-            self._motion = mechanism.advance(self._motion, seconds, force, brake, time)
-            self._time = end
+        for part in ('inductance', 'delay'):
+            if getattr(motor, part):
+                raise DefinitionError(f'{key}.{part}', reason, 'leave it out')
+    for name, rubbing in context.mechanics.friction.joints.items():
+        if rubbing.coulomb or rubbing.breakaway_excess or rubbing.coefficient:
+            raise DefinitionError(
+                f'effects.friction.joints.{name}',
+                f'dry friction {reason}',
+                'write viscous alone',
+            )
+    hard = context.hard_limited.linkage.limits
+    for name in hard.keys() - {*names}:
+        if hard[name].is_bounded:
+            raise DefinitionError(
+                'drive.torque',
+                f'the hard stop of {quote(name)}, by its limits, {reason}: only inputs have one',
+                f'write loads.stops.{name}: {{stiffness: 1000}}, or remove its limits',
+            )

@@ -131,9 +131,9 @@ def _at_rest(effort: Stage) -> Stage:
         if not isinstance(crank, CrankAtRest) or not crank.bearing or not motion.acceleration:
             return required
         # A linkage that jams requires none.
-        least, most = crank.bearing
-        (alone,) = required.efforts or (0.0,)
-        return required._replace(efforts=(min(max(alone, least), most),))
+        ends = crank.bearing[::2], crank.bearing[1::2]
+        alone = required.efforts or (0.0,) * len(ends[0])
+        return required._replace(efforts=tuple(map(min, map(max, alone, ends[0]), ends[1])))
 
     return effort_at_rest
 

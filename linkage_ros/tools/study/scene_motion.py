@@ -85,6 +85,13 @@ def _linkage_motion(
     motion = LinkageMotion(scene_linkage, linkage.closure, context, None)
     _, drive = scene_linkage.drive
     if drive.gives_torque:
+        count = len(linkage.closure.input_names)
+        if count > 1:
+            raise scene_linkage.content.error(
+                'drive',
+                f'torque moves {count} inputs, and its accuracy is measured for one',
+                'name a scene that moves them otherwise, or one with one input',
+            )
         return _commanded_motion(motion, like, bag, horizon)
     if drive.reads_bag:
         opened = read_bag(drive.file, allow_truncated=drive.allow_truncated)

@@ -88,9 +88,6 @@ class _Sender:
         scene_linkage = line.scene_linkage
         drive, parameters = scene_linkage.drive
         self._fields = _INPUT_FIELDS[drive]
-        # A motor may be commanded by another quantity, which the message calls an effort too.
-        command = getattr(getattr(parameters, 'motor', None), 'command', 'effort')
-        quantities = {field: command if field == 'effort' else field for field in self._fields}
         self._count = len(scene_linkage.sampled_joints)
         self._write = JointStateWriter(scene_linkage.sampled_joints).write
         parts = (
@@ -98,17 +95,18 @@ class _Sender:
             if (dependent := scene_linkage.dependent_joint)
             else (scene_linkage.linkage.inputs)
         )
-        self.variables = [
-            Variable(
-                f'{line.topic}.{joint}.{quantity}',
-                _UNITS[quantity][given.unit == 'm'],
-                f'{quantity} of the input {joint}'
-                if quantity == field
-                else f'{quantity} that is commanded to the motor of {joint}',
-            )
-            for field, quantity in quantities.items()
-            for joint, given in zip(scene_linkage.sampled_joints, parts, strict=True)
-        ]
+        inputs = [given.joint for given in scene_linkage.linkage.inputs]
+        self.variables = []
+        for field in self._fields:
+            for own, joint, given in zip(inputs, scene_linkage.sampled_joints, parts, strict=True):
+                # A motor may be commanded by another quantity, which the message calls an effort.
+                motor = parameters.for_input(own).motor if drive == 'torque' else None
+                quantity = motor.command if motor else field
+                about = f'{quantity} of the input {joint}'
+                if quantity != field:
+                    about = f'{quantity} that is commanded to the motor of {joint}'
+                unit = _UNITS[quantity][given.unit == 'm']
+                self.variables.append(Variable(f'{line.topic}.{joint}.{quantity}', unit, about))
 
     def write_message(self, stamp: int, values: Sequence[float]) -> bytes:
         """Return the message of a time, in [ns], with values in the order of the variables."""

@@ -1,0 +1,299 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""
+The crank of the torque drive: it takes commands, and integrates the motion in steps.
+
+Time is divided into equal steps from the first tick on. A step is divided again where a command
+or a wrench arrives or expires, since the force changes there. So the motion depends only on the
+messages and their times, not on when the state is read: the state between two steps comes from a
+shorter step of the same method, which is then discarded.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import copysign, inf, isfinite
+from typing import Any, TYPE_CHECKING
+
+from linkage_ros.dynamics import LARGEST, Motion
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages import EffortCommand, NANOSECONDS, Rejection
+from linkage_ros.stages.drives.drive import Crank, CrankAtRest, CrankState
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics import HeldWrench, Motor, Winding
+
+_MADE_UP = NANOSECONDS
+"""Time that one tick integrates at most, in [ns]; two periods if these are longer."""
+
+_HURRIED = NANOSECONDS // 50
+"""The same while motor and crank meet and part too often: each step then costs several."""
+
+_FEW_TRIALS = 50
+"""Fewer trials than this are left of `linkage_ros.dynamics.two_masses.SAVED` then."""
+
+NEVER = 1 << 63
+"""A time after all others, in [ns]."""
+
+_PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
+"""What passes through the play, by the side on which the motor touches the crank."""
+
+_Acting = tuple[Any, Any, float]
+"""What acts by a command: the mechanism, the force on its input or inputs, and the brake."""
+
+
+def _without_winding(motion: Any) -> Any:
+    """Return the motion of motor and mechanism, without the current of a winding."""
+    return getattr(motion, 'moved', motion)
+
+
+class TorqueCrank(Crank):
+    """
+    A mechanism moved by commanded efforts.
+
+    A tick integrates a limited time, so that a late tick does not become later still: beyond the
+    limit whole steps are skipped, as if the mechanism had stood still.
+
+    The mechanism is a `SingleDofMechanism` or `linkage_ros.dynamics.two_masses.TwoMasses`.
+    ``use`` has the parameters of the drive, ``period`` is the time from tick to tick, in [ns]; 0
+    if unknown. Commands are clipped to ±``most``, in [N·m] or [N], or for a motor in [A] or [V].
+    """
+
+    __slots__ = (
+        '_acting',
+        '_begun',
+        '_boundary',
+        '_delay',
+        '_due',
+        '_idle',
+        '_least_made_up',
+        '_loaded_until',
+        '_made_up',
+        '_mechanism',
+        '_most',
+        '_most_made_up',
+        '_motion',
+        '_motor',
+        '_play',
+        '_quantum',
+        '_shown',
+        '_step',
+        '_time',
+        '_until',
+        '_waiting',
+        '_wrenches',
+        'exerts_effort',
+        'lost',
+        'max_age',
+        'saturated',
+        'stamp',
+    )
+
+    exerts_effort: bool
+    """Whether its crank state says what it exerts on an input at rest."""
+    stamp: int
+    """Arrival of the newest good command, in [ns]; 0 before the first."""
+    max_age: int
+    """Validity of a command, in [ns]."""
+    lost: int
+    """Skipped time, in [ns]."""
+    saturated: int
+    """Number of commands clipped to the effort limit."""
+
+    def __init__(
+        self,
+        mechanism: Any,
+        start: Any,
+        use: Any,
+        period: int,
+        most: float = LARGEST,
+        motor: Motor | Winding | None = None,
+        wrenches: tuple[HeldWrench, ...] = (),
+        exerts_effort: bool = False,
+    ) -> None:
+        self.exerts_effort = exerts_effort
+        self._mechanism = mechanism
+        self._motion = self._shown = start
+        self._step = round(use.step * NANOSECONDS)
+        # A scene with slow ticks must not skip time between them.
+        self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
+        self._idle: _Acting = (mechanism, 0.0, use.brake)
+        self._acting: _Acting = self._idle
+        self._time = self._boundary = self._begun = -1
+        self._until = self._due = self._loaded_until = NEVER
+        self._wrenches = wrenches
+        self._motor = motor
+        self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
+        self._quantum = use.motor.quantum if use.motor else 0.0
+        self._waiting: deque[tuple[int, _Acting]] = deque()
+        self._play = use.play
+        self._least_made_up = max(_HURRIED, 2 * period)
+        self.max_age = round(use.timeout * NANOSECONDS)
+        self._most = most
+        self.stamp = self.lost = self.saturated = 0
+
+    def offer(self, command: EffortCommand, now: int) -> Rejection | None:
+        """Take a command at a time [ns], or return why it is rejected; then nothing changes."""
+        effort = command.effort
+        if not -LARGEST <= effort <= LARGEST:
+            if isfinite(effort):
+                return Rejection.EFFORT_TOO_LARGE
+            return Rejection.EFFORT_NOT_FINITE
+        self.saturated += not -self._most <= effort <= self._most
+        acting = self.actuation_for(effort)
+        self.stamp = now
+        if self._delay:
+            self._waiting.append((now + self._delay, acting))
+            self._due = self._waiting[0][0]
+            return None
+        if self._time >= 0:
+            self._advance(now)
+            if acting != self._acting and now > self._time:
+                self._go_to(now)
+        self._acting = acting
+        self._until = now + self.max_age
+        return None
+
+    def actuation_for(self, effort: float | None) -> _Acting:
+        """Return mechanism, force on its input and brake under a command; None: without one."""
+        if effort is None:
+            return self._idle
+        if not -self._most <= effort <= self._most:
+            effort = copysign(self._most, effort)
+        if self._motor is None:
+            return self._mechanism, effort, 0.0
+        if self._quantum:
+            effort = round(effort / self._quantum) * self._quantum
+        return self._motor.drive_by(self._mechanism, effort)
+
+    @property
+    def motion(self) -> Any:
+        """Return the state of the mechanism at the last boundary of a step."""
+        return self._motion
+
+    def load(self, held: HeldWrench, wrench: tuple[float, ...], now: int) -> None:
+        """Let a wrench act on its link from a time on, in [ns]."""
+        if self._time >= 0:
+            self._advance(now)
+            if wrench != held.wrench and now > self._time:
+                self._go_to(now)
+        held.set_wrench(wrench, now)
+        self._loaded_until = min(each.until for each in self._wrenches)
+
+    def state(self, now: int) -> CrankState:
+        """
+        Return the crank state at a time, in [ns]; for an earlier time, the last state.
+
+        Raise `LinkageError` if motor and crank meet and part too often, and the scene ends the run
+        then.
+        """
+        if self._time < 0:
+            self._time = self._begun = now
+            self._boundary = now + self._step
+        self._advance(now)
+        motion, time = self._motion, (self._time - self._begun) * 1e-9
+        mechanism, force, brake = self._acting
+        if now > self._time:
+            seconds = (now - self._time) * 1e-9
+            motion = mechanism.advance(motion, seconds, force, brake, time)
+            time += seconds
+        acceleration = mechanism.acceleration(motion, force, brake, time)
+        self._shown = motion
+        if self._play:
+            self._watch_chatter(self._play)
+        return self._crank_state(motion, acceleration)
+
+    def _crank_state(self, motion: Any, acceleration: Any) -> CrankState:
+        """Return the crank state at a state of the mechanism."""
+        if motion.rate or not self.exerts_effort:
+            return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing = CrankAtRest((motion.value,), (motion.rate,), (acceleration,), 0)
+        standing.bearing = self._resting_efforts(motion, acceleration)
+        return standing
+
+    def _watch_chatter(self, play: Any) -> None:
+        """Let a late tick integrate less while motor and crank meet too often, or end the run."""
+        if self.chatter_count and play.on_chatter == 'end':
+            raise LinkageError(
+                'drive.torque.play',
+                f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
+                f'at a rate of {self._motion.rate:.4g}',
+                'shorten the step, look at the controller, or write on_chatter: close',
+            )
+        hurries = _without_winding(self._motion).trials < _FEW_TRIALS
+        self._made_up = self._least_made_up if hurries else self._most_made_up
+
+    def _resting_efforts(self, motion: Any, acceleration: float) -> tuple[float, float]:
+        """Return the least and the greatest effort that acts on the input at rest."""
+        mechanism, force, holding = self._acting
+        if self._motor:
+            resting, within = self._motor.at_rest(mechanism, motion)
+            force, holding = force + resting, holding + within
+        least, most = force - holding, force + holding
+        behind_play = _without_winding(motion)
+        if not isinstance(behind_play, Motion):
+            # Through the play passes what is left after the motor's own inertia, as a push.
+            own = behind_play.motor.terms.inertia * acceleration
+            low, high = _PUSHES[behind_play.side]
+            least, most = (min(max(end - own, low), high) for end in (least, most))
+        return least, most
+
+    @property
+    def chatter_count(self) -> int:
+        """Return the number of steps in which motor and crank met and parted too often."""
+        coarse: int = getattr(_without_winding(self._motion), 'coarse', 0)
+        return coarse
+
+    @property
+    def motor(self) -> tuple[float, float, float | None]:
+        """Angle, rate and torque before the gear at the last state; None without `motor`."""
+        moved, mechanism = getattr(self._shown, 'motor', self._shown), self._acting[0]
+        if self._motor is None:
+            return moved.value, moved.rate, None
+        ratio, torque = self._motor.ratio, self._motor.torque(mechanism, self._shown)
+        return ratio * moved.value, ratio * moved.rate, torque
+
+    def _advance(self, now: int) -> None:
+        """Integrate all steps that end by a time, in [ns]."""
+        late = now - self._time - self._made_up
+        if late > 0:
+            left_out = -(-late // self._step) * self._step
+            self._time += left_out
+            self._boundary += left_out
+            self.lost += left_out
+        while (end := min(self._boundary, self._until, self._due, self._loaded_until)) <= now:
+            self._go_to(end)
+            if end == self._loaded_until:
+                for held in self._wrenches:
+                    held.expire(end)
+                self._loaded_until = min(held.until for held in self._wrenches)
+            if end == self._until:
+                self._expire(end)
+            if end == self._boundary:
+                self._boundary += self._step
+            if end == self._due:
+                self._take_due(end)
+                self._due = self._waiting[0][0] if self._waiting else NEVER
+
+    def _expire(self, _end: int) -> None:
+        """End the command that is too old."""
+        self._acting, self._until = self._idle, NEVER
+
+    def _take_due(self, end: int) -> None:
+        """Let the first command that waits act from a time on, in [ns]."""
+        self._acting = self._waiting.popleft()[1]
+        self._until = end + self.max_age
+
+    def _go_to(self, end: int) -> None:
+        """Integrate a step, or the rest of one."""
+        if end > self._time:
+            seconds, time = (end - self._time) * 1e-9, (self._time - self._begun) * 1e-9
+            mechanism, force, brake = self._acting
+            self._motion = mechanism.advance(self._motion, seconds, force, brake, time)
+            self._time = end

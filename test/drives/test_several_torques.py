@@ -1,0 +1,230 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""The torque drive of several inputs: commands by name, motors, stops, efforts, and refusals."""
+
+from dataclasses import replace
+from math import inf, nan
+
+from linkage_ros.dynamics import (
+    AppliedLoads,
+    Friction,
+    JointFriction,
+    JointSpring,
+    Loads,
+    METHODS,
+    SeveralDofMechanism,
+)
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics import Limits
+from linkage_ros.messages import EffortsCommand, JointEffortsReader, Rejection
+from linkage_ros.stages.drives import Context, TorqueDrive
+from linkage_ros.stages.drives.torque import MotorParameters, PlayParameters, TorqueInput
+import pytest
+
+from ..dynamics.loaded import closed
+from ..dynamics.test_in_space import ANKLE, weighed
+from ..support.messages import joint_state as serialized, read_joint_state
+from ..support.scenes import LINKAGES, pipeline_of
+
+BEGIN = 1_700_000_000_000_000_000
+MS = 1_000_000
+START = {'left_crank_joint': TorqueInput(1.2), 'right_crank_joint': TorqueInput(1.9)}
+GRAVITY = Loads((0.0, -9.81), drive_inertia=0.01)
+
+
+def context_of(closure, loads=GRAVITY, friction=None, effects=()):
+    return Context(closure, 1000.0, True, 'seed', loads, friction, effects=frozenset(effects))
+
+
+def five_bar(effects=(), **parameters):
+    drive = TorqueDrive(**{'inputs': START, **parameters})
+    return drive.build(context_of(closed('five_bar'), effects=effects))
+
+
+def stepped(closure, loads, start, forces):
+    """Return values and rates after steps of 1 ms under forces, one pair for each step."""
+    mechanics = context_of(closure, loads).mechanics
+    stops = ((-inf, inf),) * len(start)
+    mechanism = SeveralDofMechanism(
+        mechanics.input_equation, METHODS['rk4'].step, stops, laws=mechanics.laws
+    )
+    state = mechanism.state_at(start, [0.0] * len(start))
+    for number, force in enumerate(forces):
+        state = mechanism.advance(state, 1e-3, force, time=number * 1e-3)
+    return tuple(state.value), tuple(state.rate)
+
+
+def test_each_command_holds_for_its_own_time_and_the_others_go_on():
+    crank = five_bar(timeout=0.03)
+    crank.state(BEGIN)
+    assert crank.offer(EffortsCommand(0, (0.4, None)), BEGIN) is None
+    assert crank.offer(EffortsCommand(0, (None, -0.2)), BEGIN + 10 * MS) is None
+    state = crank.state(BEGIN + 50 * MS)
+    # The first for 30 ms; the second from 10 ms on, for as long.
+    forces = [[0.4, 0.0]] * 10 + [[0.4, -0.2]] * 20 + [[0.0, -0.2]] * 10 + [[0.0, 0.0]] * 10
+    expected = stepped(closed('five_bar'), GRAVITY, [1.2, 1.9], forces)
+    assert (state.angles, state.rates) == expected
+
+
+def test_the_motion_does_not_depend_on_when_it_is_read():
+    often, once = five_bar(), five_bar()
+    for crank in (often, once):
+        crank.state(BEGIN)
+        crank.offer(EffortsCommand(0, (0.1, -0.1)), BEGIN + 333_333)
+    for time in range(1, 60_000_000, 770_000):
+        often.state(BEGIN + time)
+    assert often.state(BEGIN + 60 * MS) == once.state(BEGIN + 60 * MS)
+
+
+def test_a_command_that_is_no_number_changes_nothing():
+    crank, other = five_bar(), five_bar()
+    crank.state(BEGIN)
+    other.state(BEGIN)
+    bad = {nan: Rejection.EFFORT_NOT_FINITE, 1e11: Rejection.EFFORT_TOO_LARGE}
+    for effort, reason in bad.items():
+        assert crank.offer(EffortsCommand(0, (1.0, effort)), BEGIN) is reason
+    assert crank.state(BEGIN + 20 * MS) == other.state(BEGIN + 20 * MS)
+
+
+def test_motors_follow_their_voltages():
+    # Of a voltage U on the resistance R the torque is k·N·(U − k·N·q̇)/R.
+    motor = MotorParameters(0.05, resistance=2.0, ratio=20.0, command='voltage')
+    inputs = {name: replace(given, motor=motor) for name, given in START.items()}
+    crank = five_bar(('effort',), inputs=inputs)
+    crank.state(BEGIN)
+    crank.offer(EffortsCommand(0, (3.0, -1.0)), BEGIN)
+    state = crank.state(BEGIN + 40 * MS)
+    for number, voltage in enumerate((3.0, -1.0)):
+        torque = (voltage - 1.0 * state.rates[number]) / 2.0
+        assert abs(state.rates[number]) > 0.1
+        assert state.bearing[2 * number] == pytest.approx(torque, rel=1e-12)
+    # The same as dampers and constant torques.
+    damped = {name: JointSpring(0.0, 0.0, 0.5) for name in START}
+    loads = replace(GRAVITY, applied=AppliedLoads(damped))
+    expected = stepped(closed('five_bar'), loads, [1.2, 1.9], [[1.5, -0.5]] * 40)
+    assert state.angles == pytest.approx(expected[0], rel=1e-9)
+    assert state.rates == pytest.approx(expected[1], rel=1e-7)
+
+
+def test_commands_come_in_one_message_or_in_one_for_each_motor():
+    reader = JointEffortsReader(['a', 'b', 'c'], {'d'})
+    assert reader.read(serialized(['c', 'a'], efforts=[1.0, 2.0])).efforts == (2.0, None, 1.0)
+    assert reader.read(serialized(['b'], efforts=[3.0])).efforts == (None, 3.0, None)
+    assert reader.read(serialized(['b'], efforts=[4.0])).efforts == (None, 4.0, None)
+    assert reader.read(serialized(['d', 'b'], efforts=[5.0])).efforts == (None, 5.0, None)
+    assert reader.read(serialized(['x'], efforts=[1.0])) is Rejection.MISSING
+    assert reader.read(serialized(['a', 'a'], efforts=[1.0, 1.0])) is Rejection.TWICE
+    assert reader.read(serialized(['a'], [0.0])) is Rejection.NO_EFFORT
+    assert reader.read(serialized(['a', 'b'], efforts=[1.0])) is Rejection.UNEQUAL
+
+
+PUSHED = """
+drive: {torque: {inputs: %s}}
+loads: {gravity: %s, drive_inertia: 1.0e-3}
+effects: {velocity: {}, effort: {}}
+"""
+
+
+@pytest.mark.parametrize(
+    ('linkage', 'inputs', 'gravity'),
+    [
+        (ANKLE, '{m1: {start: 0.05}}', '[0, 0, -9.81]'),
+        (
+            (LINKAGES / 'five_bar.yaml').read_bytes() + b'masses: {left_crank: {mass: 0.2},'
+            b' right_crank: {mass: 0.25}, left_forearm: {mass: 0.1}, right_forearm: {mass: 0.1}}',
+            '{left_crank_joint: {start: 1.2}, right_crank_joint: {start: 1.9}}',
+            '[0, -9.81]',
+        ),
+    ],
+    ids=['ankle', 'five_bar'],
+)
+def test_a_scene_publishes_what_is_commanded_and_ticks_compiled_as_interpreted(
+    linkage, inputs, gravity
+):
+    pipelines = [pipeline_of(PUSHED % (inputs, gravity), linkage) for _ in range(2)]
+    names = [*pipelines[0].linkages[0].scene_linkage.input_names]
+    messages = [[], []]
+    for time in range(120):
+        now = BEGIN + time * MS
+        for pipeline, said in zip(pipelines, messages, strict=True):
+            if time % 50 == 10:
+                command = serialized(names, efforts=[0.02, -0.01])
+                assert pipeline.offer(command, now) is None
+            if pipeline is pipelines[0]:
+                said.append(pipeline.tick(now).message)
+                state = read_joint_state(said[-1])
+                if time > 10:
+                    assert tuple(state.effort[:2]) == (0.02, -0.01)
+            else:
+                said.append(pipeline.linkages[0].interpret(now).reading)
+    assert max(map(abs, state.velocity)) > 0.01, 'it moves'
+    last = messages[1][-1]
+    assert tuple(state.position) == last.joints
+    assert tuple(state.velocity) == last.rates
+
+
+def test_an_input_at_its_stop_shows_its_command():
+    pipeline = pipeline_of(PUSHED % ('{m1: {start: 0.55}}', '[0, 0, 0]'), ANKLE)
+    for time in range(400):
+        now = BEGIN + time * MS
+        if time % 50 == 0:
+            pipeline.offer(serialized(['m1'], efforts=[0.3]), now)
+        state = read_joint_state(pipeline.tick(now).message)
+    assert (state.position[0], state.velocity[0]) == (0.6, 0.0)
+    assert tuple(state.effort[:2]) == (0.3, 0.0)
+
+
+REFUSED = {
+    'play': ({'play': PlayParameters(0.1, 0.1)}, 'drive.torque.play: is for one input'),
+    'brake': ({'on_timeout': 'brake', 'brake': 1.0}, 'drive.torque.brake: is for one input'),
+    'gear': (
+        {'motor': MotorParameters(0.05, efficiency=0.8)},
+        'drive.torque.motor: the friction of its gear is for one input',
+    ),
+    'delay': (
+        {'motor': MotorParameters(0.05, delay=0.01)},
+        'drive.torque.motor.delay: is for one input',
+    ),
+    'stiff motor': (
+        {'motor': MotorParameters(50.0, resistance=1e-3, command='voltage')},
+        'drive.torque.motor: it follows its voltage too fast',
+    ),
+    'start': (
+        {'inputs': {'left_crank_joint': TorqueInput(3.1)}},
+        'drive.torque.inputs.left_crank_joint.start: at 3.1 rad, 0 rad nothing can be moved',
+    ),
+}
+
+
+@pytest.mark.parametrize('name', REFUSED)
+def test_what_is_for_one_input_is_refused(name):
+    parameters, line = REFUSED[name]
+    with pytest.raises(DefinitionError) as caught:
+        five_bar(**parameters)
+    assert str(caught.value).startswith(line)
+
+
+def test_dry_friction_is_refused_and_viscous_friction_is_not():
+    closure = closed('five_bar')
+    drive = TorqueDrive(inputs=START)
+    dry, viscous = (Friction({'P': JointFriction(0.1, coulomb)}) for coulomb in (0.2, 0.0))
+    with pytest.raises(DefinitionError, match=r'joints\.P: dry friction is for one input'):
+        drive.build(context_of(closure, friction=dry))
+    drive.build(context_of(closure, friction=viscous))
+
+
+def test_a_hard_stop_of_a_dependent_joint_is_refused_and_a_stiff_load():
+    closure = weighed('ankle_motors')
+    hinges = dict(closure.linkage.hinges)
+    hinges['pitch'] = replace(hinges['pitch'], limits=Limits(-0.5, 0.5))
+    limited = type(closure)(replace(closure.linkage, hinges=hinges), closure.name)
+    with pytest.raises(DefinitionError, match=r"drive\.torque: the hard stop of 'pitch'"):
+        TorqueDrive().build(context_of(limited, Loads()))
+    stiff = Loads(applied=AppliedLoads({'pitch': JointSpring(1e9)}))
+    with pytest.raises(DefinitionError, match=r'loads\.joint_springs\.pitch: it is too stiff'):
+        TorqueDrive().build(context_of(closure, stiff))
