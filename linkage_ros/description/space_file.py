@@ -20,7 +20,6 @@ from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import SPACE
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
-    check_inertia,
     check_limits,
     check_weighed,
     Closure,
@@ -131,10 +130,7 @@ def _mass_of(
     """Return the mass of a link, which may be written as that of a rod."""
     if is_rod(content, link, given, places):
         return thin_rod(given['mass'], places[0], places[1])
-    body = SpatialMass(**given)
-    if any(body.inertia):
-        check_inertia(f'masses.{link}.inertia', body.inertia)
-    return body
+    return SpatialMass(**given)
 
 
 def _refuse_single_ends(content: Section, values: Mapping[str, Any]) -> None:

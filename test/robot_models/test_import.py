@@ -14,7 +14,8 @@ from math import cos, hypot, pi, remainder, sin, tau
 
 from linkage_ros import load
 from linkage_ros.cli.main import main
-from linkage_ros.errors import FileError
+from linkage_ros.dynamics import Loads, Mechanics
+from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import (
     Closure,
     Limits,
@@ -501,3 +502,19 @@ def test_a_file_that_holds_the_keys_of_a_robot_is_no_linkage(tmp_path, capsys, c
     err = capsys.readouterr().err
     line = 'urdf: is no key of a linkage; name the URDF itself, or write linkage: {urdf: FILE} for'
     assert line in err or 'is neither a scene nor a linkage; write linkage: FILE for a' in err
+
+
+def test_moments_of_inertia_that_no_body_has_matter_to_forces_alone(tmp_path):
+    """Exporters write some for a link without a shape: what reads the robot reads its file."""
+    text, mesh = (ROBOTS / 'ankle.urdf').read_text(), '<link name="foot">'
+    assert mesh in text
+    (tmp_path / 'robot.urdf').write_text(
+        text.replace(
+            mesh,
+            f'{mesh}<inertial><mass value="1"/><inertia ixx="1" iyy="0.1" izz="0.1"/></inertial>',
+        )
+    )
+    robot, again = imported(tmp_path, tmp_path / 'robot.urdf', input=['pitch', 'roll'])
+    assert again.linkage.masses == robot.linkage.masses
+    with pytest.raises(DefinitionError, match='its principal moments are'):
+        Mechanics(again, Loads((0.0, 0.0, -9.81)))
