@@ -558,3 +558,33 @@ def test_places_are_welded_as_they_stand(tmp_path):
     closure = read(tmp_path, WELDED.replace('rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>%s', '/>'
                    '<axis xyz="0 0 1"/></joint>%s') % '', input='q1', close=close)  # fmt: skip
     assert closure.linkage.corrections.turned_by == 0.0
+
+
+COMMANDED = (
+    '<ros2_control name="c" type="system">'
+    '<joint name="m1"><command_interface name="position"/></joint>'
+    '<joint name="m2"><command_interface name="effort"/></joint>'
+    '<joint name="pitch"><state_interface name="position"/></joint></ros2_control>'
+)
+TRANSMITTED = (
+    '<transmission name="t1"><joint name="pitch"/><actuator name="a"/></transmission>'
+    '<transmission name="t2"><joint name="roll"/></transmission>'
+)
+
+
+@pytest.mark.parametrize(
+    ('added', 'inputs'),
+    [
+        (COMMANDED, ('m1', 'm2')),
+        (TRANSMITTED, ('pitch', 'roll')),
+        (TRANSMITTED + COMMANDED, ('m1', 'm2')),
+        (COMMANDED.replace('"m2"', '"m2" independent="true"'), ('m1', 'm2')),
+    ],
+    ids=['ros2_control', 'transmissions', 'both', 'an attribute more'],
+)
+def test_the_file_says_which_joints_motors_move(tmp_path, added, inputs):
+    ankle = (ROBOTS / 'ankle.urdf').read_text()
+    closure = read(tmp_path, ankle.replace('</robot>', f'{added}</robot>'))
+    assert closure.input_names == inputs
+    told = read(tmp_path, ankle.replace('</robot>', f'{added}</robot>'), input=['pitch', 'roll'])
+    assert told.input_names == ('pitch', 'roll'), 'who names inputs is heard'
