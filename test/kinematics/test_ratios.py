@@ -18,6 +18,7 @@ from random import Random
 from typing import Any
 
 from linkage_ros import Closure, load
+from linkage_ros.description import parse_yaml, read_closure
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     AssemblyPose,
@@ -30,6 +31,7 @@ from linkage_ros.kinematics import (
     RevoluteJoint,
     SlideJoint,
     Slider,
+    transmission_angles,
 )
 from mpmath import mp, mpf
 import numpy as np
@@ -621,3 +623,50 @@ def test_cranks_of_a_joint_are_those_of_a_scan_turn_after_turn(ratio: float, nam
         off = np.remainder(scanned - wanted + pi, tau) - pi
         crossed = (off[:-1] * off[1:] < 0.0) & (np.abs(off[:-1] - off[1:]) < 1.0)
         assert len(cranks) == np.count_nonzero(crossed)
+
+
+BEHIND_A_RATIO = """
+links:
+  ground: {O2: [0, 0], O4: [0.1, 0], P: [0.3, 0], Q: [0.4, 0], S: [1, 0.03]}
+  crank: {O2: [0, 0], A: [0.03, 0]}
+  coupler: {A: [0, 0], B: [0.11, 0]}
+  FIRST
+  wheel: {P: [0, 0], C: [0.03, 0]}
+  rod: {C: [0, 0], D: [0.1, 0]}
+  lever: {Q: [0, 0], D: [0.07, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {SIDE, D: left}
+joints:
+  followed: FOLLOWED
+  wheel_joint: {parent: ground, child: wheel}
+  lever_joint: {parent: ground, child: lever}
+ratios: {wheel_joint: {of: followed, ratio: RATIO}}
+"""
+FOLLOWED = {
+    'a rocker': (
+        'rocker: {O4: [0, 0], B: [0.08, 0]}', 'B: left', '{parent: ground, child: rocker}', '1.5',
+    ),
+    'a coupler': (
+        'rocker: {O4: [0, 0], B: [0.08, 0]}', 'B: left', '{parent: ground, child: coupler}', '0.7',
+    ),
+    'a slide': ('', 'way: ahead', '{slider: way}', '12'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', FOLLOWED)
+def test_the_least_transmission_angle_behind_a_ratio_is_that_of_all_states(name):
+    first, side, followed, ratio = FOLLOWED[name]
+    text = BEHIND_A_RATIO.replace('FIRST', first).replace('SIDE', side)
+    text = text.replace('FOLLOWED', followed).replace('RATIO', ratio)
+    if not first:
+        text += 'sliders: {way: {point: B, along: ground, through: S, direction: [1, 0]}}\n'
+    closure = read_closure(parse_yaml(text.encode(), name), name)
+    angles = []
+    for crank in np.linspace(0.0, tau, 3600, endpoint=False):
+        _, wheel, lever = closure.position(crank).joints
+        pin, end = 0.3 + rect(0.03, wheel), 0.4 + rect(0.07, lever)
+        angle = abs(phase((end - pin) / (end - 0.4)))
+        angles.append(min(angle, pi - angle))
+    found = transmission_angles(InputSweep(closure))
+    lowest = found[max(found)].lowest.value
+    assert lowest == pytest.approx(min(angles), abs=1e-4)

@@ -362,13 +362,25 @@ class Closure(StepwiseClosure):
                 needed.add(i)
                 group = groups[i]
                 if isinstance(group, Driven):
-                    starts = [group.joint.to]
+                    starts = [group.joint.to, *self._followed_links(group.index)]
                 elif isinstance(group, Dyad):
                     starts = [joint.to for joint in group.outer]
                 else:
                     return set(range(number + 1))
                 asked += [owner[link] for link in starts if link != GROUND]
         return needed
+
+    def _followed_links(self, number: int) -> list[str]:
+        """Return the links between which the joint is that a driven joint follows; or none."""
+        linkage = self.linkage
+        ratio = linkage.ratios.get(linkage.driven_joints[number].joint)
+        if ratio is None:
+            return []
+        joints = {**linkage.joints, **{given.joint: given.as_joint() for given in linkage.inputs}}
+        joint = joints[ratio.of]
+        if isinstance(joint, SlideJoint):
+            return [linkage.sliders[joint.slider].along, self.structure.blocks[joint.slider]]
+        return [joint.parent, joint.child]
 
     def links_of_group(self, number: int) -> list[str]:
         """Return the links of a group; a block has the name of its slider."""
