@@ -376,7 +376,7 @@ def _find_lowest(function: Callable[[float], float], sampled: Sequence[Sampled])
             found.append((result, values[i]))
             # A valley much higher than the deepest cannot reach it, even with a kink.
             deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
-            if deep and result <= min(beside) and result < max(beside):
+            if deep and result <= min(beside) and result < max(beside) - _NOISE:
                 lowest = golden_section(function, before, after)
                 # The place of a smooth valley has half the digits; the sample may be better.
                 if result - lowest[0] > _NOISE:

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from linkage_ros.kinematics.analysis.singularity_margin import step_margins
 from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, InputSweep
 from linkage_ros.kinematics.compiling import Compiled, motion_at, TracedMotion
 from linkage_ros.kinematics.results import LoopClosure, SingularityMargin
+from linkage_ros.progress import tell_progress
 
 
 class WorstStates(NamedTuple):
@@ -34,10 +35,11 @@ class WorstStates(NamedTuple):
 def find_worst_states(closure: LoopClosure) -> WorstStates | None:
     """Return the worst states over the range, or over a grid of several inputs; None if empty."""
     several = len(closure.linkage.inputs) > 1
-    tried: Iterable[tuple[float, ...]] = inputs_on_grid(closure)
-    if not several:
+    if several:
+        tried = [*inputs_on_grid(closure)]
+    else:
         ranges = InputSweep(closure).ranges
-        tried = ((value,) for interval in ranges for value in sample_inputs(interval))
+        tried = [(value,) for interval in ranges for value in sample_inputs(interval)]
 
     def measure(motion: TracedMotion) -> Sequence[Sequence[float]]:
         position = motion.position
@@ -51,7 +53,8 @@ def find_worst_states(closure: LoopClosure) -> WorstStates | None:
     if several and not is_iterated(closure):
         compiled = Compiled(closure, 0, measure, within_limits=False)
     found = []
-    for inputs in tried:
+    for done, inputs in enumerate(tried):
+        tell_progress('states examined', done, len(tried))
         errors, margins = (
             compiled(*inputs).values if compiled else measure(motion_at(closure, [inputs]))
         )
