@@ -171,7 +171,11 @@ def fallback_statuses(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
         made = tape.decisions
         held: tuple[bool, ...] = ()
         for decision in made:
-            of_steps.append(tree_below(tape, (*held, not decision.held), leaf))
+            # Where cells do not lead to the links, only an iteration that takes its time decides.
+            undecided = step.grid is not None
+            of_steps.append(
+                None if undecided else tree_below(tape, (*held, not decision.held), leaf)
+            )
             held = (*held, decision.held)
         # Each step starts from the ones before it, which are not run again.
         leaf(())
