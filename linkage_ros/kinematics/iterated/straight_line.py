@@ -18,6 +18,8 @@ from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.compiling import compile_line
 from linkage_ros.kinematics.step import LinkState
 
+_PARTS = (list, tuple)
+
 
 class StraightLine:
     """
@@ -72,7 +74,8 @@ def list_numbers(parts: Sequence[Any]) -> list[Any]:
     """Return all numbers in states, also those of vectors, frames and motions."""
     numbers: list[Any] = []
     for part in parts:
-        if isinstance(part, list | tuple):
+        # Most are numbers, and this is called for each start of an iteration.
+        if type(part) is not float and isinstance(part, _PARTS):
             numbers += list_numbers(part)
         else:
             numbers.append(part)
