@@ -14,8 +14,7 @@ and what hangs on them stands still in its own loops: the topmost link of each l
 unless an input carries it. Coordinates are in the frame of that link, or of the root if there are
 several. Joints keep their names, signs and zeroes.
 
-The pose has the values of joints that are told, or else 0. If the loops miss it by rounding, the
-joints that are not driven are moved until they close (Newton's method, damped): no length changes.
+The pose has the values of joints that are told, or else 0, corrected until the loops close.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, combinations, islice
-from math import atan2, hypot, inf, remainder, tau
+from math import inf, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.description.grammar import ListOf, Named
@@ -35,6 +34,14 @@ from linkage_ros.description.parameters import (
     read_parameters,
     text,
     TextOf,
+)
+from linkage_ros.description.robot_pose import (
+    compose_frames,
+    end_frame,
+    frame_of,
+    LINE,
+    RobotPose,
+    RobotTree,
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_grammar import NameOrNames
@@ -56,28 +63,17 @@ from linkage_ros.kinematics import (
     Closure,
     closure_as_drawn,
     combine_masses,
-    cross,
     direction_of,
-    dot,
-    Elimination,
-    extent_of,
     GROUND,
-    GROUND_FRAME,
     length,
     Limits,
-    minus,
-    ONE_PLACE,
-    PARALLEL,
-    plus,
     PoseCorrections,
     Ratio,
-    scale,
     SpaceClosure,
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
     SpatialMass,
-    turn_about,
     turned_tensor,
     unit_of,
     Vector,
@@ -87,29 +83,14 @@ from linkage_ros.kinematics import (
 _MET = 1e-3
 """Largest gap of a loop in the pose, relative to the size; of its directions in [rad]."""
 
-_ROUNDED, _CLOSED = 1e-14, 1e-9
-"""Gaps that are rounding, and those of a pose that is found, relative to the size."""
-
 _ROUNDED_VALUE = 1e-12
 """Rounding of a joint that loops move, in [rad] or relative to the size."""
-
-_DAMPING, _MOST_STEPS = 1e-10, 12
-"""Of Newton's method: damping relative to the size, and most steps."""
 
 _MOST_JOINTS, _MOST_LOOPS = 100, 20
 """Most joints in loops, and most loops: a pose is sought in seconds."""
 
-_LINE = 'line'
-"""What closes a loop by frames SLIDER_on_LINK on the x axis of SLIDER_line_on_LINK."""
-
-_SLIDING = ('slide', _LINE)
-"""What closes a loop but for a slide along the x axis."""
-
 _MOST_TRIED = 20
 """Most choices of mimics that are tried."""
-
-_NUDGES = (0.0, 0.5)
-"""How much joints are moved before a pose is sought, which a stretched one does not lead to."""
 
 ROBOT = Keys(
     'A robot whose URDF has loops; all joints in them that are no inputs are published.',
@@ -188,11 +169,7 @@ class _Robot:
 
     def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
         self._urdf, self._told = urdf, {**urdf.start, **told}
-        self._mount = urdf.root
-        self._above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
-        for joint in urdf.joints.values():
-            self._above[joint.child] = (joint, *self._above[joint.parent])
-        self._bases = {joint.name: _frame(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
+        self._tree = tree = RobotTree(urdf)
         self._loops: list[UrdfLoop] = []
         taken, said = {*urdf.joints, *urdf.links}, [*urdf.loops, *map(self._read_close, close)]
         there = {self._places_of(loop) for loop in said}
@@ -217,8 +194,6 @@ class _Robot:
         # The other leg of a robot, which another linkage may move, is left out.
         chosen = [group for group in groups if not self._driven or group[0] & {*self._driven}]
         self._loops = [loop for _, loops in chosen for loop in loops]
-        self._closed = [loop for loop in self._loops if loop.kind != 'rod']
-        self._directed = [loop for loop in self._loops if _is_directed(loop)]
         looped = {name for loop in self._loops for name in self._names_of(loop)}
         self._needless = [
             name for name, ratio in self._ratios.items() if {name, *ratio.terms} <= looped
@@ -228,13 +203,9 @@ class _Robot:
         self._moving = [name for name in moving if name in kept]
         self._check(moving, known, kept, told)
         children = {urdf.joints[name].child for name in self._moving}
-        mounts = {self._body(urdf.joints[name].parent) for name in self._moving} - children
-        self._mount = mounts.pop() if len(mounts) == 1 else urdf.root
-        frames = self._place_links({})
-        places = [frames[urdf.joints[name].child].origin for name in self._moving]
-        places += [_end_frame(end, frames).origin for loop in self._loops for end in loop.ends]
-        size = extent_of(places)
-        self._size = size if size > ONE_PLACE else 1.0
+        mounts = {tree.body(urdf.joints[name].parent) for name in self._moving} - children
+        tree.mount = mounts.pop() if len(mounts) == 1 else urdf.root
+        self._pose = RobotPose(tree, self._loops, self._told, self._moving)
 
     def _find_groups(self) -> list[tuple[set[str], list[UrdfLoop]]]:
         """Return the joints that loops and ratios tie together, with the loops."""
@@ -252,12 +223,12 @@ class _Robot:
         """Return the joints in loops and couplings that the file says motors move."""
         ends = [tuple(end.link for end in loop.ends) for loop in self._loops]
         ends += [(predecessor, successor) for _, predecessor, successor, _ in self._urdf.couplings]
-        tied = {joint.name for pair in ends for joint in chain(*self._ways(*pair))}
+        tied = {joint.name for pair in ends for joint in chain(*self._tree.ways(*pair))}
         tied |= {joint.mimics for joint in self._urdf.joints.values()}
         return [name for name in self._urdf.actuated if name in tied]
 
     def _names_of(self, loop: UrdfLoop) -> set[str]:
-        ways = self._ways(*(end.link for end in loop.ends))
+        ways = self._tree.ways(*(end.link for end in loop.ends))
         return {joint.name for joint in chain(*ways) if joint.kind != 'fixed'}
 
     def _check(
@@ -292,7 +263,7 @@ class _Robot:
             reason = f'has {len(kept)} joints in {len(self._loops)} loops that move together'
             raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
         for loop in self._loops:
-            if loop.kind not in (*LOOP_KINDS.values(), _LINE):
+            if loop.kind not in (*LOOP_KINDS.values(), LINE):
                 reason = f'{quote(loop.kind)} is no type of what closes a loop'
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
@@ -327,13 +298,8 @@ class _Robot:
     def _is_geared(self, name: str) -> bool:
         """Return whether a joint turns against a link that the joint that it follows does."""
         joints = (self._urdf.joints[each] for each in (name, *self._ratios[name].terms))
-        one, *others = ({self._body(of.parent), of.child} for of in joints)
+        one, *others = ({self._tree.body(of.parent), of.child} for of in joints)
         return not any(map(one.isdisjoint, others))
-
-    def _body(self, link: str) -> str:
-        """Return the link that moves a link, or the root."""
-        moving = (joint.child for joint in self._above[link] if joint.kind != 'fixed')
-        return next(moving, self._urdf.root)
 
     def _read_close(self, asked: str) -> UrdfLoop:
         """Read FRAME=FRAME[:KIND]; the axis of a hinge is the z axis of the first frame."""
@@ -352,7 +318,7 @@ class _Robot:
             ends.append(LoopEnd(link, (x, y, z), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), directed))
         if len(ends) != 2:
             raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
-        body, other = (self._body(end.link) for end in ends)
+        body, other = (self._tree.body(end.link) for end in ends)
         if body == other:
             reason = f'{quote(asked)} is within {quote(body)}, in which nothing moves'
             raise DefinitionError('close', reason, 'name frames of two links that move')
@@ -365,11 +331,11 @@ class _Robot:
             slider = pin.removesuffix('_line')
             if slider != pin and not others and len(pins.get(slider, ())) == 1:
                 ends = LoopEnd(first, ZERO), LoopEnd(pins[slider][0], ZERO)
-                yield UrdfLoop(slider, _LINE, ends)
+                yield UrdfLoop(slider, LINE, ends)
             for number, other in enumerate(others):
                 ends = LoopEnd(first, ZERO), LoopEnd(other, ZERO)
                 yield UrdfLoop(f'{pin}_{number}' if number else pin, 'ball', ends)
-        frames = self._place_links({}) if self._urdf.pinned else {}
+        frames = self._tree.place_links({}) if self._urdf.pinned else {}
         for end, parent in self._urdf.pinned:
             found = PLACE.fullmatch(end)
             assert found
@@ -384,20 +350,13 @@ class _Robot:
         found = set()
         for end in loop.ends:
             link, place = end.link, end.xyz
-            for joint in self._above[link]:
+            for joint in self._tree.above[link]:
                 if joint.kind != 'fixed':
                     break
-                link, place = joint.parent, self._bases[joint.name].place(place)
+                link, place = joint.parent, self._tree.bases[joint.name].place(place)
             x, y, z = (round(one, 9) for one in place)
             found.add((link, (x, y, z)))
         return frozenset(found)
-
-    def _ways(self, one: str, other: str) -> list[list[UrdfJoint]]:
-        """Return the joints from two links up to their common ancestor."""
-        shared = {*self._above[one]} & {*self._above[other]}
-        return [
-            [joint for joint in self._above[link] if joint not in shared] for link in (one, other)
-        ]
 
     def _find_ratios(self) -> Iterator[tuple[str, Ratio]]:
         """Yield the joints that follow others: mimics and couplings."""
@@ -405,7 +364,7 @@ class _Robot:
             if joint.mimics:
                 yield joint.name, Ratio(joint.mimics, joint.multiplier, joint.offset)
         for name, predecessor, successor, ratio in self._urdf.couplings:
-            ways = self._ways(predecessor, successor)
+            ways = self._tree.ways(predecessor, successor)
             leaders, followers = ([one.name for one in way if one.kind in MOVING] for way in ways)
             if not leaders or not followers or not ratio:
                 reason = f'couples {len(leaders)} and {len(followers)} joints by {ratio:g}'
@@ -421,155 +380,6 @@ class _Robot:
             (of, first), *others = ((each, factor / by) for each, factor in terms.items())
             yield moved, Ratio(of, first, also=dict(others))
 
-    # The pose
-
-    def _place_links(self, values: Mapping[str, float]) -> dict[str, SpaceFrame]:
-        """Return the frame of each link on the mount at values of the joints, in its frame."""
-        frames = {self._mount: GROUND_FRAME}
-        for joint in self._urdf.joints.values():
-            if joint.parent not in frames:
-                continue
-            base = _compose_frames(frames[joint.parent], self._bases[joint.name])
-            if value := values.get(joint.name, 0.0):
-                axis = base.turn(direction_of(joint.axis))
-                if joint.kind == 'prismatic':
-                    base = base._replace(origin=plus(base.origin, scale(value, axis)))
-                else:
-                    x, y, z = (turn_about(axis, value, way) for way in base[:3])
-                    base = SpaceFrame(x, y, z, base.origin)
-            frames[joint.child] = base
-        return frames
-
-    def _move(
-        self, values: dict[str, float], moves: Mapping[str, float], ratios: Mapping[str, Ratio]
-    ) -> dict[str, float]:
-        """Return values after some moves; joints follow others."""
-        values = values | {name: values[name] + move for name, move in moves.items()}
-        return values | {
-            name: ratio.value_at(values)
-            for name, ratio in ratios.items()
-            if name not in self._told
-        }
-
-    def _gaps(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
-        """Return by how much each loop is open, in [m]; a rod has its length in the pose."""
-        gaps = []
-        for loop in self._closed:
-            one, other = (_end_frame(end, frames) for end in loop.ends)
-            gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
-            along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
-            gap = minus(gap, scale(along, axis))
-            if normal := self._normal_of(loop, frames):
-                gap = minus(gap, scale(dot(gap, normal), normal))
-            gaps.append(gap)
-        return gaps
-
-    def _normal_of(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> Vector | None:
-        """Return the normal of a loop that moves in a plane: pins may end beside each other."""
-        ways = chain(*self._ways(*(end.link for end in loop.ends)))
-        moving = [joint for joint in ways if joint.kind in MOVING]
-        axes = [frames[joint.child].turn(direction_of(joint.axis)) for joint in moving]
-        slides = [joint.kind == 'prismatic' for joint in moving]
-        if all(slides):
-            return None
-        normal = axes[slides.index(False)]
-        tilts = (
-            abs(dot(axis, normal)) if slide else length(cross(axis, normal))
-            for axis, slide in zip(axes, slides, strict=True)
-        )
-        return normal if max(tilts) < PARALLEL else None
-
-    def _turns(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
-        """Return by how much the second frame of each directed loop is turned, in [rad]."""
-        turns = []
-        for loop in self._directed:
-            one, other = (_end_frame(end, frames) for end in loop.ends)
-            if loop.kind == 'hinge':
-                axes = [
-                    frame.turn(direction_of(end.axis))
-                    for frame, end in zip((one, other), loop.ends, strict=True)
-                ]
-                turns.append(_turn_of_axis(*axes))
-            else:
-                turns.append(_turn_of_frame(one, other))
-        return turns
-
-    def _remaining_errors(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
-        """Return what is left of all equations; directions are lengths at the size."""
-        turns = (scale(self._size, turn) for turn in self._turns(frames))
-        return [*chain(*self._gaps(frames), *turns)]
-
-    def _slopes(
-        self, frames: Mapping[str, SpaceFrame], free: Sequence[str], ratios: Mapping[str, Ratio]
-    ) -> list[list[float]]:
-        """Return for each free joint the rates of what is left at a rate of 1."""
-        loops = [*self._closed, *self._directed]
-        rates = {name: [ZERO] * len(loops) for name in free}
-        for number, loop in enumerate(loops):
-            ways = self._ways(*(end.link for end in loop.ends))
-            turns = number >= len(self._closed)
-            slides = loop.kind in _SLIDING and not turns
-            for end, way, sign in zip(loop.ends, ways, (-1.0, 1.0), strict=True):
-                # A line is carried along to the place that slides on it.
-                place = _end_frame(loop.ends[1] if slides else end, frames).origin
-                for joint in way:
-                    ratio = ratios.get(joint.name, Ratio(joint.name, 1.0))
-                    moved = [each for each in ratio.terms if each in rates]
-                    if moved and joint.kind in MOVING:
-                        frame = frames[joint.child]
-                        rate = frame.turn(direction_of(joint.axis))
-                        if turns:
-                            rate = scale(0.0 if joint.kind == 'prismatic' else self._size, rate)
-                        elif joint.kind != 'prismatic':
-                            rate = cross(rate, minus(place, frame.origin))
-                        for of in moved:
-                            part = scale(sign * ratio.terms[of], rate)
-                            rates[of][number] = plus(rates[of][number], part)
-            if slides or (turns and loop.kind == 'hinge'):
-                first, _ = loop.ends
-                axis = _end_frame(first, frames).turn(direction_of(first.axis))
-                for row in rates.values():  # What moves along or about the axis is free.
-                    row[number] = minus(row[number], scale(dot(row[number], axis), axis))
-        return [[*chain(*row)] for row in rates.values()]
-
-    def _meet(
-        self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
-    ) -> tuple[dict[str, float], float]:
-        """Return values at which the loops close, as far as free joints do it, and the gap."""
-        for _ in range(_MOST_STEPS):
-            frames = self._place_links(values)
-            left = self._remaining_errors(frames)
-            if hypot(*left) <= _ROUNDED * self._size or not free:
-                break
-            columns = self._slopes(frames, free, ratios)
-            rows = [*zip(*columns, strict=True)]
-            # The shortest step: J·Jᵀ is smaller than Jᵀ·J.
-            matrix = [[_product(one, other) for other in rows] for one in rows]
-            for number, row in enumerate(matrix):
-                row[number] += _DAMPING * self._size**2
-            pulls = Elimination(matrix, ()).solve([-gap for gap in left])
-            steps = [_product(column, pulls) for column in columns]
-            values = self._move(values, dict(zip(free, steps, strict=True)), ratios)
-        return values, hypot(*left)
-
-    def _found_pose(
-        self, values: dict[str, float], free: list[str], ratios: Mapping[str, Ratio]
-    ) -> str:
-        """Return a pose near values of joints in which all loops close, as a remedy."""
-        untold = [name for name in free if name not in self._told]
-        # What is told is moved last.
-        for moved, nudge in (*((untold, nudge) for nudge in _NUDGES), (free, 0.0)):
-            start = self._move(values, dict.fromkeys(moved, nudge), ratios)
-            met, gap = self._meet(start, moved, ratios)
-            if gap < _CLOSED * self._size:
-                pose = []
-                for name in self._moving:
-                    turn = inf if self._urdf.joints[name].kind == 'prismatic' else tau
-                    if name not in ratios and abs(value := remainder(met[name], turn)) > _CLOSED:
-                        pose.append(f'{name}: {value:.6g}')
-                return f'near it all close: at: {{{", ".join(pose)}}}'
-        return 'give values of joints at which all loops close'
-
     # The linkage
 
     def linkage(self, publish_inputs: bool, without: Sequence[str]) -> SpaceLinkage:
@@ -577,27 +387,28 @@ class _Robot:
         ratios = {name: of for name, of in self._ratios.items() if name not in without}
         free = [name for name in self._moving if name not in (*self._driven, *ratios)]
         told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
-        values = self._move(told, {}, self._ratios)
-        frames = self._place_links(values)
+        pose = self._pose
+        values = pose.move(told, {}, self._ratios)
+        frames = self._tree.place_links(values)
         open_by, turned_by = (
             max(zip(map(length, found), (loop.name for loop in loops), strict=True),
                 default=(0.0, ''))
-            for found, loops in ((self._gaps(frames), self._closed),
-                                 (self._turns(frames), self._directed))
+            for found, loops in ((pose.gaps(frames), pose.closed),
+                                 (pose.turns(frames), pose.directed))
         )  # fmt: skip
         for (apart, worst), unit, most in (
-            (open_by, 'm', _MET * self._size), (turned_by, 'rad', _MET),
+            (open_by, 'm', _MET * pose.size), (turned_by, 'rad', _MET),
         ):  # fmt: skip
             if apart > most:
                 reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
-                raise DefinitionError('at', reason, self._found_pose(values, free, ratios))
+                raise DefinitionError('at', reason, pose.found_pose(values, free, ratios))
         as_told = values
-        values, _ = self._meet(values, free, ratios)
-        frames, joints = self._place_links(values), self._urdf.joints
+        values, _ = pose.meet(values, free, ratios)
+        frames, joints = self._tree.place_links(values), self._urdf.joints
         on = {self._urdf.root: GROUND}
         for joint in joints.values():
             own = f'{GROUND}_link' if joint.child == GROUND else joint.child
-            above = self._above[joint.child]
+            above = self._tree.above[joint.child]
             is_carried = any(one.name in self._carriers for one in above)
             still = on[joint.parent] if is_carried or joint.kind == 'fixed' else GROUND
             on[joint.child] = own if joint.name in self._moving else still
@@ -639,10 +450,10 @@ class _Robot:
         """Return the masses of links, with what hangs on them and does not move with a loop."""
         parts: dict[str, list[SpatialMass]] = {}
         for name, body in self._urdf.links.items():
-            way = (name, *(joint.parent for joint in self._above[name]))
+            way = (name, *(joint.parent for joint in self._tree.above[name]))
             carrier = next((on[each] for each in way if on[each] in links), None)
             if body is not None and carrier is not None:
-                at = _compose_frames(frames[name], _frame(body.xyz, body.rpy))
+                at = compose_frames(frames[name], frame_of(body.xyz, body.rpy))
                 part = SpatialMass(body.mass, at.origin, turned_tensor(at[:3], body.tensor))
                 parts.setdefault(carrier, []).append(part)
         return {link: combine_masses(of) for link, of in parts.items()}
@@ -668,7 +479,7 @@ class _Robot:
             limits = replace(limits, low=-inf, high=inf)
         if value != told and limits.low <= told <= limits.high:
             # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
-            room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._size
+            room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._pose.size
             low, high = min(limits.low, value - room), max(limits.high, value + room)
             limits = replace(limits, low=low, high=high)
         return limits
@@ -679,7 +490,7 @@ class _Robot:
         """Add what closes a loop to a linkage."""
         places, axes = zip(
             *((end.origin, end.turn(direction_of(its.axis)))
-              for its in loop.ends for end in [_end_frame(its, frames)]), strict=True,
+              for its in loop.ends for end in [end_frame(its, frames)]), strict=True,
         )  # fmt: skip
         name = loop.name
         if on[0] == on[1] or loop.kind == 'fixed':
@@ -687,8 +498,8 @@ class _Robot:
         if loop.kind in ('hinge', 'slide'):
             joints = made.hinges if loop.kind == 'hinge' else made.slides
             joints[name] = SpatialJoint(on[0], on[1], axes[0], places[0])
-        elif loop.kind == _LINE:
-            across = _end_frame(loop.ends[0], frames).z
+        elif loop.kind == LINE:
+            across = end_frame(loop.ends[0], frames).z
             made.slides[name] = SpatialJoint(on[0], name, axes[0], places[0])
             made.hinges[f'{name} turn'] = SpatialJoint(name, on[1], across, places[1])
         elif loop.kind == 'universal':
@@ -703,53 +514,3 @@ class _Robot:
             made.points[name] = places[0]
             for link in on:
                 made.links[link] = (*made.links.get(link, ()), name)
-
-
-def _product(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum(a * b for a, b in zip(one, other, strict=True))
-
-
-def _is_directed(loop: UrdfLoop) -> bool:
-    """Return whether what closes a loop says how the second frame lies in the first."""
-    one, other = loop.ends
-    if loop.kind == 'hinge':
-        return other.is_directed
-    return loop.kind in ('fixed', 'slide') and one.is_directed and other.is_directed
-
-
-def _turn_of_axis(one: Vector, other: Vector) -> Vector:
-    """Return the turn from one axis to another, in [rad]; of a hinge both ways are one."""
-    sine, cosine = cross(one, other), dot(one, other)
-    sine = sine if cosine >= 0.0 else scale(-1.0, sine)
-    size = length(sine)
-    return scale(atan2(size, abs(cosine)) / size, sine) if size else ZERO
-
-
-def _turn_of_frame(one: SpaceFrame, other: SpaceFrame) -> Vector:
-    """Return the turn from one frame to another, in [rad]."""
-    pairs = [*zip(one[:3], other[:3], strict=True)]
-    sine = scale(0.5, plus(plus(*(cross(*pair) for pair in pairs[:2])), cross(*pairs[2])))
-    angle = atan2(size := length(sine), 0.5 * (sum(dot(*pair) for pair in pairs) - 1.0))
-    if size > _ROUNDED:
-        return scale(angle / size, sine)
-    # A half turn: its axis is what both frames share.
-    shared = max((plus(*pair) for pair in pairs), key=length)
-    return scale(angle, direction_of(shared))
-
-
-def _end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
-    return _compose_frames(frames[end.link], _frame(end.xyz, end.rpy))
-
-
-def _compose_frames(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
-    """Return a frame that is given in another one."""
-    x, y, z = map(outer.turn, inner[:3])
-    return SpaceFrame(x, y, z, outer.place(inner.origin))
-
-
-def _frame(xyz: Vector, rpy: Vector) -> SpaceFrame:
-    """Return the frame of an origin of a URDF: roll, pitch and yaw about fixed axes."""
-    x, y, z = GROUND_FRAME[:3]
-    for axis, angle in zip((x, y, z), rpy, strict=True):
-        x, y, z = (turn_about(axis, angle, way) for way in (x, y, z))
-    return SpaceFrame(x, y, z, xyz)

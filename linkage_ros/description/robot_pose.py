@@ -1,0 +1,299 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+"""
+The pose of a robot: frames of its links at values of its joints, and what its loops miss there.
+
+If loops miss a pose by rounding, joints that are not driven are moved until they close (Newton's
+method, damped): no length changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from math import atan2, hypot, inf, remainder, tau
+
+from linkage_ros.description.urdf_file import LoopEnd, MOVING, UrdfFile, UrdfJoint, UrdfLoop
+from linkage_ros.kinematics import (
+    cross,
+    direction_of,
+    dot,
+    Elimination,
+    extent_of,
+    GROUND_FRAME,
+    length,
+    minus,
+    ONE_PLACE,
+    PARALLEL,
+    plus,
+    Ratio,
+    scale,
+    SpaceFrame,
+    turn_about,
+    Vector,
+    ZERO,
+)
+
+_ROUNDED, _CLOSED = 1e-14, 1e-9
+"""Gaps that are rounding, and those of a pose that is found, relative to the size."""
+
+_DAMPING, _MOST_STEPS = 1e-10, 12
+"""Of Newton's method: damping relative to the size, and most steps."""
+
+_NUDGES = (0.0, 0.5)
+"""How much joints are moved before a pose is sought, which a stretched one does not lead to."""
+
+LINE = 'line'
+"""What closes a loop by frames SLIDER_on_LINK on the x axis of SLIDER_line_on_LINK."""
+
+_SLIDING = ('slide', LINE)
+"""What closes a loop but for a slide along the x axis."""
+
+
+class RobotTree:
+    """The joints of a robot; ``mount`` is the link in whose frame all others are placed."""
+
+    def __init__(self, urdf: UrdfFile) -> None:
+        self._root = self.mount = urdf.root
+        self.joints = urdf.joints
+        self.above: dict[str, tuple[UrdfJoint, ...]] = {urdf.root: ()}
+        """For each link the joints from it to the root."""
+        for joint in urdf.joints.values():
+            self.above[joint.child] = (joint, *self.above[joint.parent])
+        self.bases = {joint.name: frame_of(joint.xyz, joint.rpy) for joint in urdf.joints.values()}
+        """For each joint the frame of its child at 0, in that of its parent."""
+
+    def ways(self, one: str, other: str) -> list[list[UrdfJoint]]:
+        """Return the joints from two links up to their common ancestor."""
+        shared = {*self.above[one]} & {*self.above[other]}
+        return [
+            [joint for joint in self.above[link] if joint not in shared] for link in (one, other)
+        ]
+
+    def body(self, link: str) -> str:
+        """Return the link that moves a link, or the root."""
+        moving = (joint.child for joint in self.above[link] if joint.kind != 'fixed')
+        return next(moving, self._root)
+
+    def place_links(self, values: Mapping[str, float]) -> dict[str, SpaceFrame]:
+        """Return the frame of each link on the mount at values of the joints, in its frame."""
+        frames = {self.mount: GROUND_FRAME}
+        for joint in self.joints.values():
+            if joint.parent not in frames:
+                continue
+            base = compose_frames(frames[joint.parent], self.bases[joint.name])
+            if value := values.get(joint.name, 0.0):
+                axis = base.turn(direction_of(joint.axis))
+                if joint.kind == 'prismatic':
+                    base = base._replace(origin=plus(base.origin, scale(value, axis)))
+                else:
+                    x, y, z = (turn_about(axis, value, way) for way in base[:3])
+                    base = SpaceFrame(x, y, z, base.origin)
+            frames[joint.child] = base
+        return frames
+
+
+class RobotPose:
+    """What closes loops of a robot, at values of its joints; what is told of these is kept."""
+
+    def __init__(
+        self,
+        tree: RobotTree,
+        loops: Sequence[UrdfLoop],
+        told: Mapping[str, float],
+        moving: Sequence[str],
+    ) -> None:
+        self._tree, self._told, self._moving = tree, told, moving
+        self.closed = [loop for loop in loops if loop.kind != 'rod']
+        self.directed = [loop for loop in loops if _is_directed(loop)]
+        frames = tree.place_links({})
+        places = [frames[tree.joints[name].child].origin for name in moving]
+        places += [end_frame(end, frames).origin for loop in loops for end in loop.ends]
+        size = extent_of(places)
+        self.size = size if size > ONE_PLACE else 1.0
+
+    def move(
+        self, values: dict[str, float], moves: Mapping[str, float], ratios: Mapping[str, Ratio]
+    ) -> dict[str, float]:
+        """Return values after some moves; joints follow others."""
+        values = values | {name: values[name] + move for name, move in moves.items()}
+        return values | {
+            name: ratio.value_at(values)
+            for name, ratio in ratios.items()
+            if name not in self._told
+        }
+
+    def gaps(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
+        """Return by how much each loop is open, in [m]; a rod has its length in the pose."""
+        gaps = []
+        for loop in self.closed:
+            one, other = (end_frame(end, frames) for end in loop.ends)
+            gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
+            along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
+            gap = minus(gap, scale(along, axis))
+            if normal := self._normal_of(loop, frames):
+                gap = minus(gap, scale(dot(gap, normal), normal))
+            gaps.append(gap)
+        return gaps
+
+    def _normal_of(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> Vector | None:
+        """Return the normal of a loop that moves in a plane: pins may end beside each other."""
+        ways = chain(*self._tree.ways(*(end.link for end in loop.ends)))
+        moving = [joint for joint in ways if joint.kind in MOVING]
+        axes = [frames[joint.child].turn(direction_of(joint.axis)) for joint in moving]
+        slides = [joint.kind == 'prismatic' for joint in moving]
+        if all(slides):
+            return None
+        normal = axes[slides.index(False)]
+        tilts = (
+            abs(dot(axis, normal)) if slide else length(cross(axis, normal))
+            for axis, slide in zip(axes, slides, strict=True)
+        )
+        return normal if max(tilts) < PARALLEL else None
+
+    def turns(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
+        """Return by how much the second frame of each directed loop is turned, in [rad]."""
+        turns = []
+        for loop in self.directed:
+            one, other = (end_frame(end, frames) for end in loop.ends)
+            if loop.kind == 'hinge':
+                axes = [
+                    frame.turn(direction_of(end.axis))
+                    for frame, end in zip((one, other), loop.ends, strict=True)
+                ]
+                turns.append(_turn_of_axis(*axes))
+            else:
+                turns.append(_turn_of_frame(one, other))
+        return turns
+
+    def _remaining_errors(self, frames: Mapping[str, SpaceFrame]) -> list[float]:
+        """Return what is left of all equations; directions are lengths at the size."""
+        turns = (scale(self.size, turn) for turn in self.turns(frames))
+        return [*chain(*self.gaps(frames), *turns)]
+
+    def _slopes(
+        self, frames: Mapping[str, SpaceFrame], free: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> list[list[float]]:
+        """Return for each free joint the rates of what is left at a rate of 1."""
+        loops = [*self.closed, *self.directed]
+        rates = {name: [ZERO] * len(loops) for name in free}
+        for number, loop in enumerate(loops):
+            ways = self._tree.ways(*(end.link for end in loop.ends))
+            turns = number >= len(self.closed)
+            slides = loop.kind in _SLIDING and not turns
+            for end, way, sign in zip(loop.ends, ways, (-1.0, 1.0), strict=True):
+                # A line is carried along to the place that slides on it.
+                place = end_frame(loop.ends[1] if slides else end, frames).origin
+                for joint in way:
+                    ratio = ratios.get(joint.name, Ratio(joint.name, 1.0))
+                    moved = [each for each in ratio.terms if each in rates]
+                    if moved and joint.kind in MOVING:
+                        frame = frames[joint.child]
+                        rate = frame.turn(direction_of(joint.axis))
+                        if turns:
+                            rate = scale(0.0 if joint.kind == 'prismatic' else self.size, rate)
+                        elif joint.kind != 'prismatic':
+                            rate = cross(rate, minus(place, frame.origin))
+                        for of in moved:
+                            part = scale(sign * ratio.terms[of], rate)
+                            rates[of][number] = plus(rates[of][number], part)
+            if slides or (turns and loop.kind == 'hinge'):
+                first, _ = loop.ends
+                axis = end_frame(first, frames).turn(direction_of(first.axis))
+                for row in rates.values():  # What moves along or about the axis is free.
+                    row[number] = minus(row[number], scale(dot(row[number], axis), axis))
+        return [[*chain(*row)] for row in rates.values()]
+
+    def meet(
+        self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> tuple[dict[str, float], float]:
+        """Return values at which the loops close, as far as free joints do it, and the gap."""
+        for _ in range(_MOST_STEPS):
+            frames = self._tree.place_links(values)
+            left = self._remaining_errors(frames)
+            if hypot(*left) <= _ROUNDED * self.size or not free:
+                break
+            columns = self._slopes(frames, free, ratios)
+            rows = [*zip(*columns, strict=True)]
+            # The shortest step: J·Jᵀ is smaller than Jᵀ·J.
+            matrix = [[_product(one, other) for other in rows] for one in rows]
+            for number, row in enumerate(matrix):
+                row[number] += _DAMPING * self.size**2
+            pulls = Elimination(matrix, ()).solve([-gap for gap in left])
+            steps = [_product(column, pulls) for column in columns]
+            values = self.move(values, dict(zip(free, steps, strict=True)), ratios)
+        return values, hypot(*left)
+
+    def found_pose(
+        self, values: dict[str, float], free: list[str], ratios: Mapping[str, Ratio]
+    ) -> str:
+        """Return a pose near values of joints in which all loops close, as a remedy."""
+        untold = [name for name in free if name not in self._told]
+        # What is told is moved last.
+        for moved, nudge in (*((untold, nudge) for nudge in _NUDGES), (free, 0.0)):
+            start = self.move(values, dict.fromkeys(moved, nudge), ratios)
+            met, gap = self.meet(start, moved, ratios)
+            if gap < _CLOSED * self.size:
+                pose = []
+                for name in self._moving:
+                    turn = inf if self._tree.joints[name].kind == 'prismatic' else tau
+                    if name not in ratios and abs(value := remainder(met[name], turn)) > _CLOSED:
+                        pose.append(f'{name}: {value:.6g}')
+                return f'near it all close: at: {{{", ".join(pose)}}}'
+        return 'give values of joints at which all loops close'
+
+
+def _product(one: Sequence[float], other: Sequence[float]) -> float:
+    return sum(a * b for a, b in zip(one, other, strict=True))
+
+
+def _is_directed(loop: UrdfLoop) -> bool:
+    """Return whether what closes a loop says how the second frame lies in the first."""
+    one, other = loop.ends
+    if loop.kind == 'hinge':
+        return other.is_directed
+    return loop.kind in ('fixed', 'slide') and one.is_directed and other.is_directed
+
+
+def _turn_of_axis(one: Vector, other: Vector) -> Vector:
+    """Return the turn from one axis to another, in [rad]; of a hinge both ways are one."""
+    sine, cosine = cross(one, other), dot(one, other)
+    sine = sine if cosine >= 0.0 else scale(-1.0, sine)
+    size = length(sine)
+    return scale(atan2(size, abs(cosine)) / size, sine) if size else ZERO
+
+
+def _turn_of_frame(one: SpaceFrame, other: SpaceFrame) -> Vector:
+    """Return the turn from one frame to another, in [rad]."""
+    pairs = [*zip(one[:3], other[:3], strict=True)]
+    sine = scale(0.5, plus(plus(*(cross(*pair) for pair in pairs[:2])), cross(*pairs[2])))
+    angle = atan2(size := length(sine), 0.5 * (sum(dot(*pair) for pair in pairs) - 1.0))
+    if size > _ROUNDED:
+        return scale(angle / size, sine)
+    # A half turn: its axis is what both frames share.
+    shared = max((plus(*pair) for pair in pairs), key=length)
+    return scale(angle, direction_of(shared))
+
+
+def end_frame(end: LoopEnd, frames: Mapping[str, SpaceFrame]) -> SpaceFrame:
+    """Return the frame of an end of what closes a loop."""
+    return compose_frames(frames[end.link], frame_of(end.xyz, end.rpy))
+
+
+def compose_frames(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
+    """Return a frame that is given in another one."""
+    x, y, z = map(outer.turn, inner[:3])
+    return SpaceFrame(x, y, z, outer.place(inner.origin))
+
+
+def frame_of(xyz: Vector, rpy: Vector) -> SpaceFrame:
+    """Return the frame of an origin of a URDF: roll, pitch and yaw about fixed axes."""
+    x, y, z = GROUND_FRAME[:3]
+    for axis, angle in zip((x, y, z), rpy, strict=True):
+        x, y, z = (turn_about(axis, angle, way) for way in (x, y, z))
+    return SpaceFrame(x, y, z, xyz)
