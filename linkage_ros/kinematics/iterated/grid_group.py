@@ -216,8 +216,8 @@ class GridGroup(IteratedGroup):
         self, inputs: Sequence[float], unknowns: Sequence[float], direction: Sequence[float]
     ) -> LineForms | None:
         """Return slopes and bends at a solution while the inputs go in a direction."""
-        found = self._line_forms_line(inputs, unknowns, direction)
-        return None if found is None else (found[: len(unknowns)], found[len(unknowns) :])
+        found, count = self._line_forms_line(inputs, unknowns, direction), len(unknowns)
+        return None if found is None else (found[:count], found[count:])
 
     # The functions of the straight lines
 

@@ -70,7 +70,9 @@ class SeveralTorqueCrank(TorqueCrank):
         self._untils = [NEVER] * len(motors)
         self._acting = self._idle = self._actuation()
 
-    def offer(self, command: EffortsCommand, now: int) -> Rejection | None:  # type: ignore[override]
+    def offer(  # type: ignore[override]
+        self, command: EffortsCommand, now: int
+    ) -> Rejection | None:
         """Take commands at a time [ns], or return why they are rejected; then nothing changes."""
         named = [(n, effort) for n, effort in enumerate(command.efforts) if effort is not None]
         for _, effort in named:
