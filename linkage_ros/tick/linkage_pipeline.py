@@ -84,6 +84,10 @@ class LinkagePipeline:
         except DefinitionError as error:
             of_linkage = error.where.startswith('masses')
             content = scene_linkage.linkage_content if of_linkage else scene_linkage.content
+            if error.where == 'masses' and 'urdf' in content:
+                remedy = 'add <inertial> to the links of the robot, or leave gravity out'
+                reason = 'no link of its loops has a mass, and forces are asked for'
+                raise content.error('urdf', reason, remedy) from None
             raise content.locate_error(error) from None
 
     def _build_stages(

@@ -8,9 +8,12 @@
 """Forces in space: against Lagrange multipliers in absolute coordinates, and the work done."""
 
 from dataclasses import replace
+from pathlib import Path
 from random import Random
+import re
 import struct
 
+from linkage_ros.description import load_scene
 from linkage_ros.dynamics import (
     AppliedLoads,
     JointLoad,
@@ -21,9 +24,10 @@ from linkage_ros.dynamics import (
     Spring,
     WrenchLoad,
 )
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import SpaceClosure, SpatialMass, thin_rod
 from linkage_ros.kinematics.compiling import Compiled
+from linkage_ros.tick import Pipeline
 import numpy as np
 import pytest
 
@@ -304,6 +308,50 @@ def test_a_scene_publishes_the_efforts_of_its_motors():
         load = 'foot', place, np.array([3.0, -2.0, 5.0]), np.array([0.2, -0.1, 0.4])
         expected = motion.efforts((0.0, 0.0, -9.81), [load])
         assert state.effort == pytest.approx([*expected, 0.0, 0.0], rel=1e-9, abs=1e-12)
+
+
+ROBOT = Path(__file__).parents[1] / 'robot_models' / 'robots' / 'ankle.urdf'
+OF_ROBOT = """
+linkage: {urdf: ankle.urdf, input: [pitch, roll]}
+drive: {sine: {amplitude: 0.1, frequency: 0.5}}
+loads: {gravity: [0, 0, -9.81]}
+effects: {effort: {}}
+"""
+
+
+def robot_scene(folder, robot):
+    (folder / 'ankle.urdf').write_text(robot, 'utf-8')
+    (folder / 'scene.yaml').write_text(OF_ROBOT, 'utf-8')
+    return load_scene(folder / 'scene.yaml')
+
+
+def test_a_robot_has_the_masses_of_its_urdf(tmp_path):
+    count = iter(range(1, 20))
+
+    def weigh(link):
+        number = next(count)
+        return (
+            f'<link name="{link[1]}"><inertial><mass value="{0.1 * number:g}"/>'
+            f'<origin xyz="0.0{number % 9} 0.01 -0.02" rpy="0.2 0.1 -0.3"/>'
+            '<inertia ixx="2e-4" ixy="1e-5" ixz="0" iyy="3e-4" iyz="-2e-5" izz="2.5e-4"/>'
+            '</inertial></link>'
+        )
+
+    robot = re.sub(r'<link name="(\w+)"/>', weigh, ROBOT.read_text('utf-8'))
+    pipeline = Pipeline(robot_scene(tmp_path, robot))
+    closure = pipeline.linkages[0].closure
+    assert sum(body.mass for body in closure.linkage.masses.values()) > 1.0
+    for count_ms in range(0, 2000, 300):
+        tick = pipeline.tick(1_700_000_000_000_000_000 + count_ms * 1_000_000)
+        crank = tick.states[0].crank
+        motion = AbsoluteMotion(closure, crank.angles, crank.rates, crank.accelerations)
+        expected = motion.efforts((0.0, 0.0, -9.81))
+        assert read_joint_state(tick.message).effort[:2] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_robot_without_masses_is_told_where_they_belong(tmp_path):
+    with pytest.raises(FileError, match=r'urdf: no link of its loops has a mass.*<inertial>'):
+        Pipeline(robot_scene(tmp_path, ROBOT.read_text('utf-8')))
 
 
 def _bits(numbers):
