@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -113,10 +113,14 @@ class SpaceClosure(StepwiseClosure):
 
         freedom = find_freedom(planned, CarriedPoints(planned, plan.scale))
         at_change_point = freedom.free and plan.finds_all
+        for gone, kept in one_with.items():
+            if kept in plan.frames:
+                plan.frames[gone], plan.pose_frames[gone] = (
+                    plan.frames[kept],
+                    plan.pose_frames[kept],
+                )
         if not at_change_point:
-            check_freedom(planned, plan, freedom)
-        plan.frames |= {gone: plan.frames[kept] for gone, kept in one_with.items()}
-        plan.pose_frames |= {gone: plan.pose_frames[kept] for gone, kept in one_with.items()}
+            check_freedom(linkage, plan, freedom)
         self.turns_with = plan.turns_with
         corrections = replace(linkage.corrections, tilted_by=plan.tilt)
         linkage = replace(linkage, corrections=corrections)
@@ -137,12 +141,12 @@ class SpaceClosure(StepwiseClosure):
             for name, joint in linkage.joints.items()
         )
         if at_change_point:
-            freedom = self._freedom_beside_pose() or freedom
-            check_freedom(planned, plan, freedom)
+            freedom = self._freedom_beside_pose(planned) or freedom
+            check_freedom(linkage, plan, freedom)
         self.freedom: Freedom = freedom
 
-    def _freedom_beside_pose(self) -> Freedom | None:
-        """Return the degrees of freedom beside a pose that is a change point."""
+    def _freedom_beside_pose(self, planned: SpaceLinkage) -> Freedom | None:
+        """Return the degrees of freedom of the planned linkage beside a change point."""
         from linkage_ros.kinematics.space.freedom import (
             find_freedom,  # local import: it loads numpy
         )
@@ -151,11 +155,11 @@ class SpaceClosure(StepwiseClosure):
         position = self.close_unlimited(*beside)
         if position.status is not Status.CLOSED:
             return None
-        moved = self._redraw(position)
+        moved = self._redraw(planned, position)
         return find_freedom(moved, CarriedPoints(moved, self.scale))
 
-    def _redraw(self, position: Position) -> SpaceLinkage:
-        """Return the linkage with the places and axes of a position as its pose."""
+    def _redraw(self, linkage: SpaceLinkage, position: Position) -> SpaceLinkage:
+        """Return the planned linkage with the places and axes of a position as its pose."""
         plan, state = self._plan, position.state
 
         def redraw(joint: SpatialJoint) -> SpatialJoint:
@@ -164,10 +168,9 @@ class SpaceClosure(StepwiseClosure):
             axis = frame.turn(drawn.resolve(joint.axis))
             return replace(joint, at=scale(self.scale, at), axis=axis)
 
-        linkage = plan.linkage
         return replace(
             linkage,
-            points=self.points(position),
+            points=self._find_places(position.state, linkage.points),
             hinges={name: redraw(joint) for name, joint in linkage.hinges.items()},
             slides={name: redraw(joint) for name, joint in linkage.slides.items()},
         )
@@ -228,17 +231,21 @@ class SpaceClosure(StepwiseClosure):
 
         """
         self._check_pose('points', position)
+        return self._find_places(position.state, self.linkage.points)
+
+    def _find_places(self, state: LinkState, names: Iterable[str]) -> dict[str, Vector]:
+        """Return the places of points that a link carries, in [m]."""
         places = {}
-        for name in self.linkage.points:
+        for name in names:
             point = self._plan.same[name]
             if point in self._plan.points:
-                place = position.state.pins[self._plan.points[point]]
+                place = state.pins[self._plan.points[point]]
             else:
                 carriers = self._plan.carriers[point]
                 known = [link for link in carriers if link in self._plan.frames]
                 if not known:
-                    continue  # No link carries it.
-                place = self._carried_place(position.state, known[0], point)
+                    continue
+                place = self._carried_place(state, known[0], point)
             places[name] = scale(self.scale, place)
         return places
 

@@ -169,12 +169,13 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
     count = len(linkage.driven)
     degrees = f'degree{"s" * (freedom.mobility != 1)} of freedom'
     given = f'{count} input{"s" * (count != 1)} for {freedom.mobility} {degrees}'
-    if freedom.free:
+    free = [link for link in freedom.free if link in linkage.link_names]
+    if free:
         # At a toggle equations are redundant that are needed elsewhere.
         away = 'draw a pose that is no toggle, ' if freedom.redundant else ''
-        stay = 'stay' if len(freedom.free) > 1 else 'stays'
+        stay = 'stay' if len(free) > 1 else 'stays'
         raise DefinitionError(
-            'input', f'{given}: {list_names(freedom.free)} {stay} free',
+            'input', f'{given}: {list_names(free)} {stay} free',
             f'{away}drive another joint, or hold what is free',
         )  # fmt: skip
     if freedom.dependent and not freedom.mobility:

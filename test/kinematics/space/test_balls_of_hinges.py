@@ -118,3 +118,33 @@ def test_a_ball_that_is_no_ball_leaves_its_rod_free():
     off = replace(hinge, at=tuple(np.array(hinge.at) + 1e-3 * away / np.linalg.norm(away)))
     with pytest.raises(DefinitionError, match='1 input for 2 degrees of freedom'):
         SpaceClosure(replace(linkage, hinges={**linkage.hinges, 'A_hinge2': off}))
+
+
+def test_a_plate_that_two_balls_hold_is_told_without_the_joints_of_its_plan():
+    points = {'A': (0.04, 0.0, 0.0), 'B': (0.1, 0.02, 0.12), 'P': (0.05, 0.1, 0.05)}
+    linkage = load('rssr').linkage
+    plate = replace(linkage, points=points, links={**linkage.links, 'rod': ('A', 'B', 'P')})
+    with pytest.raises(DefinitionError, match='2 degrees of freedom: rod stays free; '):
+        SpaceClosure(plate)
+
+
+def test_beside_a_parallelogram_that_is_drawn_flat_they_are_the_same():
+    """At a change point freedom is judged beside the pose."""
+    balls = load('rssr').linkage
+    linkage = written_as_hinges(balls, 'rod', 'A', np.random.default_rng(8))
+    ends = [('ground', 'near', 1.0), ('near', 'long', 1.1), ('long', 'far', 1.4)]
+    flat = {
+        f'flat{number}': SpatialJoint(*joined, (0.0, 0.0, 1.0), (x, 0.0, 0.0))
+        for number, (*joined, x) in enumerate([*ends, ('ground', 'far', 1.3)])
+    }
+    closure = SpaceClosure(
+        replace(
+            linkage,
+            hinges={**linkage.hinges, **flat},
+            driven=('crank_joint', 'flat0'),
+            published=('rocker_joint', 'flat3'),
+        )
+    )
+    for crank, near in RNG.uniform(-0.5, 0.5, (5, 2)):
+        (rocker,) = SpaceClosure(balls).position(crank).joints
+        assert closure.position(crank, near).joints == pytest.approx((rocker, near), abs=1e-9)
