@@ -176,6 +176,7 @@ def _corrections_json(linkage: Linkage | SpaceLinkage) -> dict[str, Any]:
         'robot_turned_by_rad': corrections.turned_by,
         'merged_by_m': corrections.merged_by,
         'tilted_by_rad': corrections.tilted_by,
+        'beside_by_m': corrections.beside_by,
         'left_out': list(linkage.left_out),
     }
 

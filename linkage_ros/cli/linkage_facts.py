@@ -92,6 +92,9 @@ def _correction_facts(
     if tilted_by := account['tilted_by_rad']:
         tilt = f'{units.convert(tilted_by):.2g} {units.angle}'
         yield 'parallel', f'axes that are up to {tilt} apart'
+    if account['beside_by_m']:
+        apart = units.format_length(account['beside_by_m'], '.2g')
+        yield 'beside', f'ends of a pin that are up to {apart} apart along its axis'
     if account['left_out']:
         yield 'left out', ', '.join(account['left_out'])
 

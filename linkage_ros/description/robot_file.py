@@ -439,7 +439,9 @@ class _Robot:
             ratios={name: of for name, of in ratios.items() if name in found},
             traced=traced,
             left_out=(*left_out, *(f'{tag} (not read)' for tag in self._urdf.unread)),
-            corrections=PoseCorrections(open_by[0], turned_by[0]),
+            corrections=PoseCorrections(
+                open_by[0], turned_by[0], beside_by=pose.beside_by(frames)
+            ),
         )
         links = linkage.link_names[1:]
         return linkage.with_masses(self._masses(on, frames, links), massless=links)

@@ -45,6 +45,9 @@ _ROUNDED, _CLOSED = 1e-14, 1e-9
 _DAMPING, _MOST_STEPS = 1e-10, 12
 """Of Newton's method: damping relative to the size, and most steps."""
 
+_BESIDE = 1e-6
+"""Least distance of the ends of a pin that is no rounding of CAD, relative to the size."""
+
 _NUDGES = (0.0, 0.5)
 """How much joints are moved before a pose is sought, which a stretched one does not lead to."""
 
@@ -130,16 +133,23 @@ class RobotPose:
 
     def gaps(self, frames: Mapping[str, SpaceFrame]) -> list[Vector]:
         """Return by how much each loop is open, in [m]; a rod has its length in the pose."""
-        gaps = []
-        for loop in self.closed:
-            one, other = (end_frame(end, frames) for end in loop.ends)
-            gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
-            along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
-            gap = minus(gap, scale(along, axis))
-            if normal := self._normal_of(loop, frames):
-                gap = minus(gap, scale(dot(gap, normal), normal))
-            gaps.append(gap)
-        return gaps
+        return [self._gap(loop, frames)[0] for loop in self.closed]
+
+    def beside_by(self, frames: Mapping[str, SpaceFrame]) -> float:
+        """Return the largest distance along the axis of the ends of a planar pin, in [m]."""
+        apart = max((self._gap(loop, frames)[1] for loop in self.closed), default=0.0)
+        return apart if apart > _BESIDE * self.size else 0.0
+
+    def _gap(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> tuple[Vector, float]:
+        """Return by how much a loop is open, and its ends lie beside each other."""
+        one, other = (end_frame(end, frames) for end in loop.ends)
+        gap, axis = minus(other.origin, one.origin), one.turn(direction_of(loop.ends[0].axis))
+        along = dot(gap, axis) if loop.kind in _SLIDING else 0.0
+        gap, beside = minus(gap, scale(along, axis)), 0.0
+        if normal := self._normal_of(loop, frames):
+            beside = dot(gap, normal)
+            gap = minus(gap, scale(beside, normal))
+        return gap, abs(beside)
 
     def _normal_of(self, loop: UrdfLoop, frames: Mapping[str, SpaceFrame]) -> Vector | None:
         """Return the normal of a loop that moves in a plane: pins may end beside each other."""

@@ -588,3 +588,17 @@ def test_the_file_says_which_joints_motors_move(tmp_path, added, inputs):
     assert closure.input_names == inputs
     told = read(tmp_path, ankle.replace('</robot>', f'{added}</robot>'), input=['pitch', 'roll'])
     assert told.input_names == ('pitch', 'roll'), 'who names inputs is heard'
+
+
+@pytest.mark.parametrize(('apart', 'told'), [(0.0, 0.0), (1e-9, 0.0), (0.012, 0.012)])
+def test_ends_of_a_planar_pin_that_lie_beside_each_other_are_told(tmp_path, apart, told):
+    """Links of a plane lie beside each other; a wrong place along the axis looks the same."""
+    text, end = (ROBOTS / 'four_bar.urdf').read_text(), '<origin xyz="0.08 0 0"/>'
+    assert end in text
+    one, other = (
+        read(tmp_path, text.replace(end, f'<origin xyz="0.08 0 {z}"/>'), **CHOICES['four_bar'][0])
+        for z in (0.0, apart)
+    )
+    assert other.linkage.corrections.beside_by == pytest.approx(told, abs=1e-12)
+    inputs = one.linkage.pose.inputs
+    assert other.position(*inputs).joints == pytest.approx(one.position(*inputs).joints, abs=1e-7)

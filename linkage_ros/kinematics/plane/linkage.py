@@ -288,6 +288,8 @@ class PoseCorrections:
         The largest distance between places that a closure takes for one, in [m].
     tilted_by
         The largest angle between axes that a closure takes for parallel, in [rad].
+    beside_by
+        The largest distance at which the ends of a pin of the robot lie beside each other, in [m].
 
     """
 
@@ -295,6 +297,7 @@ class PoseCorrections:
     turned_by: float = 0.0
     merged_by: float = 0.0
     tilted_by: float = 0.0
+    beside_by: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
