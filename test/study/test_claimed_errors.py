@@ -9,11 +9,13 @@
 """Claimed errors are those of an own run against the truth; a need is met when it is run."""
 
 from functools import partial
+from itertools import combinations
 from math import gcd, remainder, tau
 import os
 import random
 
 from linkage_ros.description import load_scene
+from linkage_ros.kinematics import SpaceLinkage
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.tools.study import (
     draw_ticks,
@@ -25,6 +27,7 @@ from linkage_ros.tools.study import (
 )
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from .own_runs import (
     BEGIN,
@@ -35,6 +38,7 @@ from .own_runs import (
     parabolas_with_play,
     run_scene,
 )
+from ..support.multipliers import AbsoluteMotion
 
 HORIZON = 4.0
 
@@ -141,6 +145,50 @@ def test_the_step_of_a_drive_is_as_far_off_as_a_run_is(
     assert rms / 1.5 <= claimed.rms <= 1.5 * rms
 
 
+RSSR = """
+points: {A: [0.04, 0, 0], B: [0.1, 0.02, 0.12]}
+links: {crank: [A], rod: [A, B], rocker: [B]}
+hinges:
+  crank_joint: {parent: ground, child: crank, at: [0, 0, 0], axis: [0, 0, 1]}
+  rocker_joint: {parent: ground, child: rocker, at: [0.15, 0.05, 0.03], axis: [0, 1, 0.3]}
+input: crank_joint
+masses:
+  crank: {mass: 0.3, center: [0.02, 0, 0], inertia: [1.0e-4, 0, 0, 2.0e-4, 0, 2.0e-4]}
+  rod: {mass: 0.1}
+  rocker: {mass: 0.2, center: [0.12, 0.03, 0.08], inertia: [3.0e-4, 0, 0, 2.0e-4, 0, 4.0e-4]}
+"""
+
+
+def test_the_step_of_a_drive_in_space_is_as_far_off_as_bodies_say(tmp_path):
+    """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
+    (tmp_path / 'rssr.yaml').write_text(RSSR)
+    (tmp_path / 'scene.yaml').write_text(
+        'linkage: rssr.yaml\nrate: 100\nloads: {gravity: [0, 0, -9.81]}\n'
+        'drive: {torque: {start: 0.5, method: semi_implicit_euler, step: 0.002}}\n'
+    )
+    scene, horizon = load_scene(tmp_path / 'scene.yaml'), 0.4
+    (motion,) = motions_of(scene, None, horizon)
+    closure = motion.closure
+
+    def slope(_, state):
+        q, w = state
+        none, one = (
+            AbsoluteMotion(closure, (q,), (w,), (a,)).efforts((0.0, 0.0, -9.81))[0]
+            for a in (0.0, 1.0)
+        )
+        return w, -none / (one - none)
+
+    ticks = np.arange(41) / 100.0
+    true = solve_ivp(slope, (0.0, horizon), (0.5, 0.0), 'DOP853', ticks, rtol=1e-9, atol=1e-11)
+    claimed = measure_drive_step(motion, 100.0, horizon, quick=True, seconds=0.0)[0]
+    worst = 0.0
+    for (_, joints, _), q in zip(run_scene(scene, 41), true.y[0], strict=True):
+        exact = zip(closure.joint_names, closure.position(q).joints, strict=True)
+        worst = max([worst, *(abs(remainder(joints[name] - value, tau)) for name, value in exact)])
+    assert worst > 1e-5
+    assert worst / 1.5 <= claimed.own_setting.error.worst <= 1.5 * worst
+
+
 def compared(scene, motion, horizon, name, truth):
     """Return the worst and the rms error of an own run, and what is claimed of it."""
     claimed = measure_drive_step(motion, scene.rate, horizon, quick=True, seconds=0.0)[0]
@@ -183,14 +231,14 @@ def test_random_scenes_are_as_far_off_as_claimed(tmp_path, seed):
     assert rms / 1.5 - 1e-7 <= claimed.rms <= 1.5 * rms + 1e-7
 
 
-def samples_of(motion, joint, rate, phase, horizon):
+def samples_of(motion, joints, rate, phase, horizon):
     """Return exact samples, the first a phase after the first tick."""
-    write = JointStateWriter([joint]).write
+    write = JointStateWriter(joints).write
     found = []
     for index in range(round(horizon * rate)):
         time = round((index + phase) * 1e9 / rate)
         values, rates = motion.path(time)
-        found.append((time, write(BEGIN + time, values, rates, (0.0,))))
+        found.append((time, write(BEGIN + time, values, rates, (0.0,) * len(joints))))
     return found
 
 
@@ -205,7 +253,7 @@ def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
     claimed = measure_age_of_command(motion, scene, HORIZON).own_setting.error
     apart = []
     for phase in np.random.default_rng(1).uniform(size=12):
-        samples = samples_of(motion, 'crank_joint', 100.0, phase, HORIZON)
+        samples = samples_of(motion, ['crank_joint'], 100.0, phase, HORIZON)
         for time, joints, _ in run_scene(scene, round(100 * HORIZON), samples):
             exact = four_bar_joints(motion.path(time)[0][0])
             apart.append(max(abs(remainder(joints[j] - exact[j], tau)) for j in joints))
@@ -215,8 +263,12 @@ def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
 
 
 @pytest.mark.parametrize(
-    ('name', 'rate'), [('four_bar', 100.0), ('jansen_leg', 500.0), ('scotch_yoke', 200.0)]
-)
+    ('name', 'rate'),
+    [
+        ('four_bar', 100.0), ('jansen_leg', 500.0), ('scotch_yoke', 200.0), ('five_bar', 200.0),
+        ('rssr', 100.0), ('delta', 200.0), ('ankle_motors', 200.0), ('wishbone', 100.0),
+    ],
+)  # fmt: skip
 def test_the_age_in_use_is_that_of_a_listener(tmp_path, name, rate):
     (tmp_path / 'scene.yaml').write_text(
         f'linkage: {name}\nrate: {rate}\neffects: {{velocity: {{}}}}\n'
@@ -228,7 +280,7 @@ def test_the_age_in_use_is_that_of_a_listener(tmp_path, name, rate):
     sizes = [1.0 if turns else 1.0 / _size(linkage) for turns in closure.turning]
     ((held, carried),) = errors_in_use(motions, [rate], HORIZON)
     # At each tick comes the exact crank, so that nothing but the age of the state is off.
-    samples = samples_of(motion, linkage.inputs[0].joint, rate, 0.0, HORIZON)
+    samples = samples_of(motion, closure.input_names, rate, 0.0, HORIZON)
     apart = {'held': [], 'carried': []}
     rng = random.Random(2)
     for time, joints, rates in run_scene(scene, len(samples), samples):
@@ -345,6 +397,9 @@ def test_times_that_are_judged_meet_all_phases_of_a_round_period(most):
 
 def _size(linkage):
     apart = 0.0
+    if isinstance(linkage, SpaceLinkage):
+        places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
+        return max(float(np.linalg.norm(np.subtract(*pair))) for pair in combinations(places, 2))
     for points in linkage.links.values():
         places = [complex(*place) for place in points.values()]
         apart = max([apart, *(abs(one - other) for one in places for other in places)])

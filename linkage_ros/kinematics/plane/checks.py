@@ -33,8 +33,8 @@ _LEAST_RATIO = 1e-30
 
 
 PLANAR_ONLY = (
-    'name a planar one; check, solve, draw, compile, urdf, run, simulate, plot, report and '
-    'replay take others'
+    'name a planar one; check, solve, draw, compile, urdf, run, simulate, accuracy, plot, report '
+    'and replay take others'
 )
 """Remedy where a spatial linkage is of no use."""
 

@@ -39,7 +39,6 @@ from linkage_ros.cli import (
 )
 from linkage_ros.description import atomic_write, load_scene, Scene
 from linkage_ros.errors import did_you_mean, LinkageError, list_names
-from linkage_ros.kinematics import check_planar
 from linkage_ros.tools.study.budget import Budget, NeedAnswer
 from linkage_ros.tools.study.budget_text import (
     budget_json,
@@ -210,8 +209,6 @@ def _load_source(arguments: argparse.Namespace, stop: Event) -> _StudySource:
         scene = scene_of(open_bag(path, stop), trust_effects=False, settings=arguments.set)
     else:
         scene = load_scene(arguments.scene, arguments.set)
-    for each in scene.linkages:
-        check_planar(arguments.scene, each.linkage)
     return _StudySource(scene, arguments.scene if is_bag else arguments.like, is_bag=is_bag)
 
 

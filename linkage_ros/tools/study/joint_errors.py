@@ -12,17 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from math import nan, tau
+from math import dist, nan, tau
 from typing import Any
 
-from linkage_ros.kinematics import Closure, Linkage, RevoluteJoint
+from linkage_ros.kinematics import Closure, Linkage, RevoluteJoint, SpaceLinkage
 from linkage_ros.tools.study.budget import JointError
 from linkage_ros.tools.study.member_motion import Crank
 import numpy as np
 
 
-def size_of(linkage: Linkage) -> float:
-    """Return the greatest distance between two points of a link, in [m]."""
+def size_of(linkage: Linkage | SpaceLinkage) -> float:
+    """Return the greatest distance between two points of a link, in space of the pose, in [m]."""
+    if isinstance(linkage, SpaceLinkage):
+        places = [*linkage.points.values(), *(hinge.at for hinge in linkage.hinges.values())]
+        return max((dist(*pair) for pair in combinations(places, 2)), default=1.0) or 1.0
     return max(
         abs(complex(*one) - complex(*other))
         for points in linkage.links.values()

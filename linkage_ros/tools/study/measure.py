@@ -18,6 +18,7 @@ from time import process_time
 
 from linkage_ros.description import Scene
 from linkage_ros.errors import FileError
+from linkage_ros.kinematics import SpaceClosure
 from linkage_ros.messages import NANOSECONDS
 from linkage_ros.tick import Pipeline
 from linkage_ros.tools.study.age import measure_age_in_use, measure_age_of_command
@@ -159,7 +160,9 @@ def _measure_errors(
         of = f' of {motion.scene_linkage.name}' if motion.scene_linkage.name else ''
         knobs.append(knob._replace(name=knob.name + of))
     progress(0.5)
-    if any(motion.closure.linkage.ratios for motion in motions):
+    if any(isinstance(motion.closure, SpaceClosure) for motion in motions):
+        left_out.append('solving: the reference lies in the plane')
+    elif any(motion.closure.linkage.ratios for motion in motions):
         left_out.append('solving: the reference knows no ratios')
     else:
         from linkage_ros.tools.study.solving import (
