@@ -241,7 +241,8 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
         'point': tuple(f'{link}.{point}' for link, points in carried for point in points),
     }
     if isinstance(linkage, SpaceLinkage):
-        return {**parts, 'axis': ('x', 'y', 'z')}
+        joints = {'pin': parts['any_joint'], 'slider': parts['slide']}
+        return {**parts, **joints, 'axis': ('x', 'y', 'z')}
     points = [point for _, points in carried for point in points]
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]

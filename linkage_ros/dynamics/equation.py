@@ -516,19 +516,28 @@ class Mechanics:
                 EXACT,
             )
 
-    def _find_friction_joints(self) -> Iterator[FrictionJoint]:
-        closure = self.closure
-        # Spatial linkages have no friction, and no structure of pins and sliders.
-        joints = closure.structure.joints if self.friction.joints else ()
-        for index, joint in enumerate(joints):
-            friction = self.friction.joints.get(joint.name)
-            if friction is None:
+    def _find_rubbing_joints(self) -> Iterator[tuple[int, JointFriction, int, int, float]]:
+        """Yield joints with friction: its number, and its rate as factor·(v[one] − v[other])."""
+        closure: Any = self.closure
+        joints = self.friction.joints
+        if not isinstance(closure, Closure):
+            for index, (name, friction) in enumerate(joints.items()):
+                slides = name not in closure.linkage.hinges
+                coordinate = closure.joint_coordinates[name]
+                yield index, friction, coordinate, 0, closure.scale if slides else 1.0
+            return
+        for index, joint in enumerate(closure.structure.joints if joints else ()):
+            if joint.name not in joints:
                 continue
             one, other = closure.angles[joint.link].coordinate, closure.angles[joint.to].coordinate
             factor = 1.0
             if joint.kind == 'P':
                 slide = closure.slides[joint.name]
                 one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
+            yield index, joints[joint.name], one, other, factor
+
+    def _find_friction_joints(self) -> Iterator[FrictionJoint]:
+        for index, friction, one, other, factor in self._find_rubbing_joints():
             law = None
             if friction.breakaway_excess and friction.stribeck:
                 from linkage_ros.dynamics.laws import Stribeck  # local import: only with it

@@ -327,7 +327,8 @@ def check_loads(
 
 def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None:
     if not isinstance(linkage, Linkage):
-        raise DefinitionError('effects.friction', 'is for planar linkages', 'leave it out')
+        _check_friction_in_space(linkage, friction)
+        return
     carried = [name for names in linkage.links.values() for name in names]
     carried += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {name for name in carried if carried.count(name) > 1}
@@ -364,6 +365,23 @@ def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None
             'has its friction',
             'leave it out, or write breakaway instead of coefficient',
         )
+
+
+def _check_friction_in_space(linkage: SpaceLinkage, friction: Friction) -> None:
+    """Refuse friction of what is no joint, and friction by a force, which nothing computes."""
+    known = (*linkage.driven, *(name for name in linkage.published if name not in linkage.driven))
+    for name, joint in friction.joints.items():
+        key = f'effects.friction.joints.{name}'
+        if name not in known:
+            raise DefinitionError(
+                key, f'{quote(name)} is neither an input nor a published joint', _one_of(known)
+            )
+        if joint.coefficient or joint.radius:
+            raise DefinitionError(
+                f'{key}.{"coefficient" if joint.coefficient else "radius"}',
+                'friction by the force in a joint is for planar linkages',
+                'write coulomb or viscous instead',
+            )
 
 
 def _one_of(names: Iterable[str]) -> str:

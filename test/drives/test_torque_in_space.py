@@ -8,9 +8,18 @@
 """The torque drive in space: against Lagrange multipliers, by energy, and at stops."""
 
 from dataclasses import replace
-from math import inf
+from math import copysign, inf
 
-from linkage_ros.dynamics import AppliedLoads, JointLoad, JointSpring, Loads, Mechanics, SoftStop
+from linkage_ros.dynamics import (
+    AppliedLoads,
+    Friction,
+    JointFriction,
+    JointLoad,
+    JointSpring,
+    Loads,
+    Mechanics,
+    SoftStop,
+)
 from linkage_ros.kinematics import Limits, SpaceClosure
 from linkage_ros.messages import EffortCommand
 from linkage_ros.stages.drives import Context, TorqueDrive
@@ -26,8 +35,8 @@ MS = 1_000_000
 GRAVITY = (0.7, -1.1, -9.81)
 
 
-def drive(closure, loads, **parameters):
-    context = Context(closure, 1000.0, True, 'seed', loads, None)
+def drive(closure, loads, friction=None, **parameters):
+    context = Context(closure, 1000.0, True, 'seed', loads, friction)
     return TorqueDrive(**parameters).build(context)
 
 
@@ -114,3 +123,40 @@ def test_it_is_pushed_back_by_a_stop_that_yields():
     assert state.rates[0] == pytest.approx(0.0, abs=1e-9)
     # At rest spring and weight bear the command.
     assert 500.0 * (state.angles[0] - 0.5) == pytest.approx(2.0 - slope, rel=1e-9)
+
+
+@pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'hooke_joint'])
+def test_friction_in_its_joints_is_that_of_efforts_against_their_rates(name):
+    """Moments at hinges, a force at a slide: applied in absolute coordinates, by the signs."""
+    closure = weighed(name)
+    joints = dict.fromkeys((*closure.input_names, *closure.joint_names))
+    friction = Friction(
+        {joint: JointFriction(viscous=0.02, coulomb=0.01 * k) for k, joint in enumerate(joints, 1)}
+    )
+    at, effort = closure.linkage.pose.inputs[0] + 0.1, 0.4
+
+    def loads(motion, _):
+        parts = []
+        for joint, rubbing in friction.joints.items():
+            rate = motion.joint_rate(joint)
+            pull = rubbing.viscous * rate + copysign(rubbing.coulomb, rate)
+            parts += motion.joint_loads(joint, -pull)
+        return parts
+
+    crank = drive(closure, Loads(GRAVITY), friction, start=at, rate=3.0)
+    crank.offer(EffortCommand(0, effort), BEGIN)
+    crank.state(BEGIN)
+    now = crank.state(BEGIN + 40 * MS)
+    expected = by_multipliers(closure, (at, 3.0), 0.04, effort, loads)
+    assert expected[1] > 0.1, 'it slides all the time'
+    assert (*now.angles, *now.rates) == pytest.approx(tuple(expected), rel=1e-6)
+
+
+def test_friction_at_rest_holds_what_it_can():
+    closure = weighed('rssr')
+    for coulomb, moves in ((5.0, False), (1e-4, True)):
+        friction = Friction({'rocker_joint': JointFriction(coulomb=coulomb)})
+        crank = drive(closure, Loads(GRAVITY), friction, start=0.6)
+        crank.state(BEGIN)
+        (angle,) = crank.state(BEGIN + 100 * MS).angles
+        assert (angle != 0.6) is moves

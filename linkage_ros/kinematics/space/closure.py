@@ -220,6 +220,11 @@ class SpaceClosure(StepwiseClosure):
 
         return SpaceClosure(with_measured(self.linkage, names), self.name)
 
+    @property
+    def joint_coordinates(self) -> dict[str, int]:
+        """Return for each joint whose value is known its index among the coordinates."""
+        return self._plan.coordinates
+
     def points(self, position: Position) -> dict[str, Vector]:
         """
         Return every point in the frame of the ground, as (x, y, z), in [m].

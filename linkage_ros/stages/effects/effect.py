@@ -180,7 +180,6 @@ class ForceEffect(Effect):
 
     __slots__ = ()
     place: ClassVar[str] = 'in the forces'
-    is_planar: ClassVar[bool] = True
 
     @property
     @abstractmethod

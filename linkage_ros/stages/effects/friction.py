@@ -38,7 +38,7 @@ from linkage_ros.stages.effects.effect import ForceEffect
 
 @dataclass(frozen=True, slots=True)
 class FrictionEffect(ForceEffect):
-    """Friction in pins and sliders, for all effects and drives that use forces."""
+    """Friction in pins and sliders, in space in joints, for what uses forces."""
 
     joints: Mapping[str, JointFriction] = each_part(
         'of each pin or slider', 'pin', JointFriction, required=True
