@@ -168,6 +168,23 @@ def test_a_scene_publishes_what_is_commanded_and_ticks_compiled_as_interpreted(
     assert tuple(state.velocity) == last.rates
 
 
+def test_commands_of_one_motor_each_are_counted_for_their_motor():
+    # Two controllers, a message of each between two ticks: none takes the place of the other.
+    pipeline = pipeline_of(PUSHED % ('{m1: {start: 0.05}}', '[0, 0, -9.81]'), ANKLE)
+    pipeline.tick(BEGIN)
+    for name in ('m1', 'm2', 'm2'):
+        assert pipeline.offer(serialized([name], efforts=[0.1]), BEGIN + MS) is None
+        ((_, number),) = pipeline.moved_inputs
+        assert pipeline.linkages[0].scene_linkage.input_names[number] == name
+    assert pipeline.count_fresh_and_stale(BEGIN + MS) == (2, 0)
+    assert pipeline.offer(serialized(['m1', 'm2'], efforts=[0.1, nan]), BEGIN + MS) is not None
+    assert pipeline.moved_inputs == ()
+    later = BEGIN + 50 * MS
+    assert pipeline.offer(serialized(['m2'], efforts=[0.1]), later) is None
+    # Commands are valid for 0.1 s.
+    assert pipeline.silent_inputs(BEGIN + 120 * MS) == {'m1': BEGIN + MS}
+
+
 def test_an_input_at_its_stop_shows_its_command():
     pipeline = pipeline_of(PUSHED % ('{m1: {start: 0.55}}', '[0, 0, 0]'), ANKLE)
     for time in range(400):

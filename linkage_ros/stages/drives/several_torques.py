@@ -40,7 +40,7 @@ class SeveralTorqueCrank(TorqueCrank):
     input, with the step to which its command is rounded; None for an input without one.
     """
 
-    __slots__ = ('_commands', '_most_each', '_motors', '_untils')
+    __slots__ = ('_commands', '_most_each', '_motors', '_newest_inputs', '_stamps', '_untils')
 
     def __init__(
         self,
@@ -68,7 +68,19 @@ class SeveralTorqueCrank(TorqueCrank):
         )  # fmt: skip
         self._commands: list[float | None] = [None] * len(motors)
         self._untils = [NEVER] * len(motors)
+        self._stamps = [0] * len(motors)
+        self._newest_inputs: tuple[int, ...] = ()
         self._acting = self._idle = self._actuation()
+
+    @property
+    def stamps(self) -> tuple[int, ...]:
+        """Arrival of the newest good command of each input, in [ns]; 0 before the first."""
+        return tuple(self._stamps)
+
+    @property
+    def newest_inputs(self) -> tuple[int, ...]:
+        """Numbers of the inputs that the last good message commands."""
+        return self._newest_inputs
 
     def offer(  # type: ignore[override]
         self, command: EffortsCommand, now: int
@@ -88,6 +100,8 @@ class SeveralTorqueCrank(TorqueCrank):
             self.saturated += not -most <= effort <= most
             self._commands[number] = min(max(effort, -most), most)
             self._untils[number] = now + self.max_age
+            self._stamps[number] = now
+        self._newest_inputs = tuple([number for number, _ in named])
         acting = self._actuation()
         if self._time >= 0 and acting != self._acting and now > self._time:
             self._go_to(now)
