@@ -39,7 +39,7 @@ EXAMPLE = 'linkage gallery worn_press -o my_press.yaml'
 _FOLDERS = ('linkages', 'scenes')
 
 _SCHEMA = re.compile(r'^# yaml-language-server:.*\n')
-_REFERENCE = re.compile(r'^( *linkage: +)\.\./linkages/(\S+)', re.MULTILINE)
+_REFERENCE = re.compile(r'^( *linkage: +)\.\./(linkages/(?:space/)?)([^/\s]+)', re.MULTILINE)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,9 +102,9 @@ def _copied_files(file: Path, output: Path) -> dict[Path, str]:
     are left out.
     """
     text = _SCHEMA.sub('', file.read_text('utf-8'))
-    copies = {output: _REFERENCE.sub(r'\1\2', text)}
+    copies = {output: _REFERENCE.sub(r'\1\3', text)}
     for found in _REFERENCE.finditer(text):
-        copy, linkage = output.with_name(found[2]), shipped_path(f'linkages/{found[2]}')
+        copy, linkage = output.with_name(found[3]), shipped_path(found[2] + found[3])
         linkage_text = _SCHEMA.sub('', linkage.read_text('utf-8'))
         if copy == output or (copy.exists() and copy.read_bytes() != linkage_text.encode()):
             raise FileError(
