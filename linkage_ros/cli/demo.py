@@ -9,9 +9,9 @@
 """
 Run a scene that comes with the package: the node in this process, its companions in others.
 
-Companions are a crank on a topic, or a controller of its effort. Nothing leaves the machine, and
-no other ROS graph on it is heard: discovery is local, in a separate domain. If the scene records a
-bag, the command draws it at the end.
+Companions are a crank on a topic, or a controller of the efforts of the inputs. Nothing leaves the
+machine, and no other ROS graph on it is heard: discovery is local, in a separate domain. If the
+scene records a bag, the command draws it at the end.
 """
 
 from __future__ import annotations
@@ -42,10 +42,24 @@ if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultEntry
 
 _BESIDE = {
-    'topic': ('linkage_ros.node.crank_source',),
-    'torque': ('linkage_ros.node.pd_controller', 'swing:=1.0'),
+    'topic': ('linkage_ros.node.crank_source', 'joint:={}'),
+    'torque': ('linkage_ros.node.pd_controller', 'joints:=[{}]'),
 }
-"""Companion processes of the drives that listen to a topic, with parameters."""
+"""Companion programs of the drives that listen to a topic, and how they take the inputs."""
+
+_PARAMETERS = {
+    'torque_crank': ('swing:=1.0',),
+    # Of two periods: the motors' sum rolls the foot, their difference nods it.
+    'torque_ankle': (
+        'target:=0.0',
+        'swing:=0.3',
+        'period:=4.0',
+        'm2.period:=2.5',
+        'kp:=8.0',
+        'kd:=0.3',
+    ),
+}
+"""Parameters of the companion of a scene, other than the companion's defaults."""
 
 _SECONDS = 10.0
 """Duration of a demo without ``--seconds``, in [s]; longer if its faults end later."""
@@ -123,7 +137,7 @@ def _run_companions(scene: Scene, seconds: float) -> Iterator[None]:
             start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
         for scene_linkage in scene.linkages
-        if (command := _companion_command(scene_linkage, seconds))
+        if (command := _companion_command(scene.name, scene_linkage, seconds))
     ]
     try:
         yield
@@ -134,15 +148,19 @@ def _run_companions(scene: Scene, seconds: float) -> Iterator[None]:
             process.wait()
 
 
-def _companion_command(scene_linkage: SceneLinkage, seconds: float) -> list[str]:
-    """Return the command of a linkage's companion; empty if it needs none."""
+def _companion_command(name: str, scene_linkage: SceneLinkage, seconds: float) -> list[str]:
+    """Return the command of the companion of a scene's linkage; empty if it needs none."""
     drive, _ = scene_linkage.drive
     if drive not in _BESIDE:
         return []
-    module, *parameters = _BESIDE[drive]
+    module, joints = _BESIDE[drive]
     # A time limit, so that it ends by itself even if this process is killed.
     limit = seconds + _PATIENCE + 10.0
-    parameters += [f'joint:={scene_linkage.sampled_joints[0]}', f'seconds:={limit:.1f}']
+    parameters = (
+        joints.format(','.join(scene_linkage.sampled_joints)),
+        f'seconds:={limit:.1f}',
+        *_PARAMETERS.get(name, ()),
+    )
     pairs = [part for parameter in parameters for part in ('-p', parameter)]
     return [sys.executable, '-m', module, '--ros-args', *pairs]
 

@@ -9,13 +9,13 @@
 """
 Nodes for demos and tests, in plain rclpy, as a user would write them.
 
-`PDController` reads the position of one joint from ``joint_states`` and commands its effort on
-``crank_commands``::
+`PDController` reads the positions of joints from ``joint_states`` and commands their efforts, in
+one message, on ``crank_commands``; of each::
 
     τ = kp·(r − q) + kd·(ṙ − q̇)        r(t) = target + swing·sin(2π·t/period)
 
 It has no model of weight and friction: under load it stays off its target by the error at which kp
-balances the load. Without joint states it publishes no command.
+balances the load. A joint without joint states gets no command.
 
 `CrankSource` publishes angle and rate of one joint as ``sensor_msgs/JointState`` on
 ``crank_states``. The speed varies about its mean, as in a machine whose load varies with the
@@ -24,7 +24,8 @@ angle: angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from math import cos, inf, sin, tau
 import sys
 from threading import Event
@@ -42,7 +43,6 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-_JOINT = NodeParameter('joint', 'crank_joint', 'Name of the joint')
 _SECONDS = NodeParameter('seconds', 0.0, 'How long [s]; 0 for ever', (0.0, 1e9))
 
 AnyNode = TypeVar('AnyNode', bound=Node)
@@ -59,7 +59,11 @@ class DemoNode(Node):
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        declare_parameters(self, self.PARAMETERS)
+        declare_parameters(self, self.own_parameters())
+
+    def own_parameters(self) -> Iterable[NodeParameter]:
+        """Return the parameters to declare."""
+        return self.PARAMETERS
 
     def value_of_parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
@@ -85,63 +89,95 @@ def run_demo_node(
     return 0
 
 
+_OF_EACH_JOINT = (
+    NodeParameter(
+        'target', 2.0, 'Target position [rad]; of one joint: JOINT.target, and so on', (-1e6, 1e6)
+    ),
+    NodeParameter('swing', 0.0, 'Amplitude about the target [rad]', (0.0, 1e6)),
+    NodeParameter('period', 5.0, 'Of the swing [s]', (1e-3, 1e6)),
+    NodeParameter('kp', 1.0, 'Effort for each unit of error [N·m/rad]', (0.0, 1e9)),
+    NodeParameter('kd', 0.05, "Effort for each unit of the error's rate [N·m·s/rad]", (0.0, 1e9)),
+)
+
+
+@dataclass(slots=True)
+class ControlledJoint:
+    """A joint under a PD law, with its state as last heard; see the module."""
+
+    target: float
+    swing: float
+    period: float
+    kp: float
+    kd: float
+    position: float = 0.0
+    rate: float = 0.0
+    last_heard: float = -inf  # [s], of the monotonic clock
+
+    def effort_at(self, t: float) -> float:
+        """Return the effort at a time since the start, in [s]."""
+        frequency = tau / self.period
+        target = self.target + self.swing * sin(frequency * t)
+        target_rate = self.swing * frequency * cos(frequency * t)
+        return self.kp * (target - self.position) + self.kd * (target_rate - self.rate)
+
+
 class PDController(DemoNode):
-    """Commands the effort of a joint."""
+    """Commands the efforts of joints."""
 
     PARAMETERS = (
-        _JOINT,
+        NodeParameter('joints', ['crank_joint'], 'Names of the joints'),
         NodeParameter('rate', 500.0, 'Commands a second [Hz]', (0.1, 20_000.0)),
-        NodeParameter('target', 2.0, 'Target position of the joint [rad]', (-1e6, 1e6)),
-        NodeParameter('swing', 0.0, 'Amplitude about the target [rad]', (0.0, 1e6)),
-        NodeParameter('period', 5.0, 'Of the swing [s]', (1e-3, 1e6)),
-        NodeParameter('kp', 1.0, 'Effort for each unit of error [N·m/rad]', (0.0, 1e9)),
-        NodeParameter(
-            'kd', 0.05, "Effort for each unit of the error's rate [N·m·s/rad]", (0.0, 1e9)
-        ),
+        *_OF_EACH_JOINT,
         _SECONDS,
     )
 
     def __init__(self) -> None:
         super().__init__('pd_controller')
-        self._joint = self.value_of_parameter('joint')
-        self._target = self.value_of_parameter('target')
-        self._swing = self.value_of_parameter('swing')
-        self._period = self.value_of_parameter('period')
-        self._kp, self._kd = self.value_of_parameter('kp'), self.value_of_parameter('kd')
+        self._joints = {
+            joint: ControlledJoint(
+                *(self.value_of_parameter(f'{joint}.{each.name}') for each in _OF_EACH_JOINT)
+            )
+            for joint in self.value_of_parameter('joints')
+        }
         self._seconds = self.value_of_parameter('seconds')
-        self._state = (0.0, 0.0)
-        self._last_heard = -inf
         self._begin_time = self.get_clock().now()
         # Reliable, for any subscriber; depth 1, since only the newest command matters.
         self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
         self.create_subscription(JointState, 'joint_states', self._on_joint_state, 10)
-        self.create_timer(1.0 / self.value_of_parameter('rate'), self._publish_effort)
+        self.create_timer(1.0 / self.value_of_parameter('rate'), self._publish_efforts)
         ClockGuard(self._time_source)
 
-    def _on_joint_state(self, message: JointState) -> None:
-        """Store position and rate of the joint."""
-        if self._joint not in message.name:
-            return
-        place = message.name.index(self._joint)
-        # Array fields without values are empty, not None.
-        if place < min(len(message.position), len(message.velocity)):
-            self._state = message.position[place], message.velocity[place]
-            self._last_heard = monotonic()
+    def own_parameters(self) -> Iterator[NodeParameter]:
+        """Yield the common parameters, and those of each joint, by default the common."""
+        yield from self.PARAMETERS
+        for joint in self.value_of_parameter('joints'):
+            for common in _OF_EACH_JOINT:
+                value = self.value_of_parameter(common.name)
+                yield common._replace(name=f'{joint}.{common.name}', default=value)
 
-    def _publish_effort(self) -> None:
-        """Publish an effort."""
-        if monotonic() - self._last_heard > _OLDEST:
-            return
+    def _on_joint_state(self, message: JointState) -> None:
+        """Store positions and rates of the joints."""
+        # Array fields without values are empty, not None.
+        for name, position, rate in zip(
+            message.name, message.position, message.velocity, strict=False
+        ):
+            if (joint := self._joints.get(name)) is not None:
+                joint.position, joint.rate, joint.last_heard = position, rate, monotonic()
+
+    def _publish_efforts(self) -> None:
+        """Publish the efforts of the joints that were heard."""
         now = self.get_clock().now()
-        frequency = tau / self._period
-        phase = frequency * (now - self._begin_time).nanoseconds * 1e-9
-        target = self._target + self._swing * sin(phase)
-        target_rate = self._swing * frequency * cos(phase)
-        position, rate = self._state
-        effort = self._kp * (target - position) + self._kd * (target_rate - rate)
-        message = JointState(name=[self._joint], effort=[effort])
-        message.header.stamp = now.to_msg()
-        self._publisher.publish(message)
+        t = (now - self._begin_time).nanoseconds * 1e-9
+        oldest = monotonic() - _OLDEST
+        efforts = {
+            name: joint.effort_at(t)
+            for name, joint in self._joints.items()
+            if joint.last_heard >= oldest
+        }
+        if efforts:
+            message = JointState(name=[*efforts], effort=[*efforts.values()])
+            message.header.stamp = now.to_msg()
+            self._publisher.publish(message)
 
     def run(self, stop: Event) -> None:
         """Control until the event is set, or for the configured time."""
@@ -155,7 +191,7 @@ class PDController(DemoNode):
 
 def run_pd_controller(stop: Event) -> int:
     """Control until the event is set, or for the configured time, and return the exit code."""
-    purpose = 'Reads a joint from joint_states and commands its effort on crank_commands.'
+    purpose = 'Reads joints from joint_states and commands their efforts on crank_commands.'
     if show_help('pd_controller', purpose, PDController.PARAMETERS, '-p target:=1.0'):
         return 0
     return run_demo_node('pd_controller', PDController, PDController.run, stop)
@@ -165,7 +201,7 @@ class CrankSource(DemoNode):
     """Publishes the angle of a turning crank."""
 
     PARAMETERS = (
-        _JOINT,
+        NodeParameter('joint', 'crank_joint', 'Name of the joint'),
         NodeParameter('rate', 500.0, 'Messages a second [Hz]', (0.1, 20_000.0)),
         NodeParameter('speed', tau, 'Mean speed [rad/s]', (-1e4, 1e4)),
         NodeParameter('ripple', 0.3, 'Swing of the speed, of its mean', (0.0, 1.0)),

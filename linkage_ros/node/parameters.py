@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import pi
 import sys
 from textwrap import fill
@@ -114,9 +114,14 @@ SET_BEFORE_CONFIGURATION = frozenset(
 )
 
 
-def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
-    """Declare parameters; rclpy refuses values out of bounds. Warn of unknown ones."""
+def declare_parameters(node: Node, parameters: Iterable[NodeParameter]) -> None:
+    """
+    Declare parameters; rclpy refuses values out of bounds. Warn of unknown ones.
+
+    Each is declared before the next is asked for, which may depend on its value.
+    """
     given = node._parameter_overrides  # noqa: SLF001 (rclpy has no other way)
+    names = []
     for name, default, meaning, bounds, changeable in parameters:
         if name in given and given[name].type_ is Parameter.Type.NOT_SET:
             del given[name]  # an empty list in a file
@@ -131,7 +136,7 @@ def declare_parameters(node: Node, parameters: Sequence[NodeParameter]) -> None:
             else:
                 descriptor.integer_range = [IntegerRange(from_value=low, to_value=high, step=1)]
         node.declare_parameter(name, default, descriptor)
-    names = [parameter.name for parameter in parameters]
+        names.append(name)
     for name in given:
         # Qualities of service are declared with their publisher.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):

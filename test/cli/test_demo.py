@@ -115,6 +115,33 @@ def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     assert Path(f'{bag}.png').read_bytes().startswith(PNG)
 
 
+def test_a_controller_moves_both_motors_of_an_ankle(linkage: Run, tmp_path: Path) -> None:
+    answer = linkage('demo', 'torque_ankle', '--seconds', '3')
+    assert answer.returncode == 0, answer.stderr
+    assert 'several publishers' not in answer.stderr
+    bag = only_bag(tmp_path / 'runs')
+    counts = messages(bag)
+    same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
+    assert same == of == counts['/joint_states']
+    assert Path(f'{bag}.png').read_bytes().startswith(PNG)
+
+    commands, states = [], []
+    with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        for connection, _, data in reader.messages():
+            if connection.topic == '/crank_commands':
+                commands.append(reader.deserialize(data, connection.msgtype))
+            elif connection.topic == '/joint_states' and len(commands) > 150:  # no longer sinking
+                states.append(reader.deserialize(data, connection.msgtype))
+    assert {tuple(command.name) for command in commands} == {('m1', 'm2')}
+    assert states[0].name == ['m1', 'm2', 'pitch', 'roll']
+    # Whatever 2 s of the swings these are.
+    for joint, least in enumerate((0.2, 0.2, 0.05, 0.1)):
+        values = [state.position[joint] for state in states]
+        assert max(values) - min(values) > least, states[0].name[joint]
+    for motor in (0, 1):
+        assert max(abs(state.effort[motor]) for state in states) > 0.1
+
+
 def test_a_scene_that_makes_its_crank_up_needs_nothing_beside_it(
     linkage: Run, tmp_path: Path
 ) -> None:

@@ -20,6 +20,7 @@ from visualization_msgs.msg import MarkerArray
 
 from .graph import NS, stamp_of, wait_for
 from .loops import four_bar, inverted_slider_crank, modulo_turns
+from .test_spatial import RODS
 from .turning import angle_at, turning
 
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
@@ -43,6 +44,7 @@ PUBLISHED = {
     'inverted_slider_crank': (['rod_joint', 'rod_slide'], 'velocity', {}, True),
     'jansen_leg': (JANSEN, 'velocity', {'motion': 'trajectory_msgs/msg/JointTrajectory'}, True),
     'motion': (FOUR_BAR, 'velocity', {'motion': 'trajectory_msgs/msg/JointTrajectory'}, True),
+    'torque_ankle': (['m1', 'm2', 'pitch', 'roll'], 'velocity effort', {}, False),
     'torque_crank': (DRIVEN_FOUR_BAR, 'velocity effort', {}, False),
     'two_fingers': (FINGERS, 'velocity', {}, False),
     'visible_bucket': (
@@ -114,6 +116,17 @@ def at_rest_under_its_brake(states, _):
         assert list(state.effort[1:]) == [0.0, 0.0]
 
 
+def sinks_without_commands(states, _):
+    for state in states:
+        values = dict(zip(state.name, state.position, strict=True))
+        assert all(abs(gap(values)) < 1e-9 for gap in RODS['ankle_motors'])
+        assert list(state.effort) == [0.0] * 4
+    # The foot's centre of mass is before the ankle: the toes sink.
+    pitch = [state.position[2] for state in states]
+    assert pitch == sorted(pitch)
+    assert pitch[-1] > 0.1
+
+
 def two_loops_of_their_own(states, _):
     for state in states:
         is_a_four_bar(*state.position[:3])
@@ -178,6 +191,7 @@ SHOWN = {
     'inverted_slider_crank': closes(inverted_slider_crank),
     'jansen_leg': accelerations_of_the_same_instant,
     'motion': accelerations_of_the_same_instant,
+    'torque_ankle': sinks_without_commands,
     'torque_crank': at_rest_under_its_brake,
     'two_fingers': two_loops_of_their_own,
     'visible_bucket': drawn_where_it_is,

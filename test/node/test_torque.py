@@ -251,6 +251,28 @@ def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, 
         assert controller.end(number) == (0, '')
 
 
+def test_a_controller_of_several_joints_commands_those_that_it_hears(graph, control):
+    commands = graph.listen(JointState, '/crank_commands')
+    states = graph.publisher(JointState, '/joint_states')
+    given = ('joints:=[left, right]', 'right.target:=3.0', 'kd:=0.5', 'left.kd:=0.25')
+    controller = control(*given, 'rate:=100.0')
+    both = JointState(
+        name=['right', 'x', 'left'], position=[1.0, 9.0, 1.5], velocity=[2.0, 9.0, 4]
+    )
+    alone = JointState(name=['left'], position=[1.5], velocity=[4.0])
+    # kp·(target − q) − kd·q̇
+    left = pytest.approx(1.0 * (TARGET - 1.5) - 0.25 * 4.0)
+    right = pytest.approx(1.0 * (3.0 - 1.0) - 0.5 * 2.0)
+
+    def commanded():
+        return dict(zip(commands[-1].name, commands[-1].effort, strict=True)) if commands else {}
+
+    for message, efforts in ((both, {'left': left, 'right': right}), (alone, {'left': left})):
+        with publishing(states, lambda: message):  # noqa: B023
+            wait_for(lambda: commanded() == efforts, 'commands of what was heard')  # noqa: B023
+    assert controller.end() == (0, '')
+
+
 def test_a_controller_ends_after_its_time_and_says_what_is_wrong(control):
     bounded, wrong = control('seconds:=0.3'), control('kp:=-1.0')
     assert bounded.wait() == (0, '')

@@ -12,7 +12,7 @@ from math import acos, hypot, pi, tau
 
 from linkage_ros.description import load_scene, parse_scene, RecordParameters, StorageParameters
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics import RevoluteJoint, SlideJoint, Status
+from linkage_ros.kinematics import RevoluteJoint, SlideJoint, SpaceClosure, Status
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.stages.drives import ConstantRateDrive, TopicDrive
 from linkage_ros.stages.effects import VelocityEffect
@@ -51,7 +51,8 @@ def assert_it_closes(closure):
                 value = interval.lowest + 0.1 * i * (interval.highest - interval.lowest)
                 assert closure.position(value).joints, value
     else:
-        assert closure.position(1.5, 1.5).joints
+        inputs = closure.linkage.pose.inputs if isinstance(closure, SpaceClosure) else (1.5, 1.5)
+        assert closure.position(*inputs).joints
 
 
 def test_a_seed_that_is_not_said_follows_from_the_name_of_the_scene():

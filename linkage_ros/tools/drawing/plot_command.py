@@ -79,7 +79,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bag(parser)
     add_output(parser, PICTURES, 'BAG.png')
     parser.add_argument(
-        '--over', choices=('crank', 'time'), default='crank', help='the axis (default: crank)'
+        '--over',
+        choices=('crank', 'time'),
+        help='the axis (default: crank; of several inputs time)',
     )
     add_trust(parser)
 
@@ -91,7 +93,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         arguments.bag,
         picture,
         stop,
-        over_time=arguments.over == 'time',
+        over=arguments.over or '',
         trust_effects=arguments.trust_effects,
     )
     print(picture)
@@ -103,12 +105,13 @@ def draw_bag(
     picture: Path,
     stop: Event,
     *,
-    over_time: bool = False,
+    over: str = '',
     trust_effects: bool = False,
 ) -> None:
     """
     Draw a bag: each published joint, and its rate and acceleration if they were recorded.
 
+    ``over`` is the axis: 'crank' or 'time'; by default the crank, and of several inputs the time.
     Angles are continuous over the range of the crank, as in `linkage draw`, in whichever turn they
     were recorded. A LinkageError is raised if matplotlib is not installed, or the bag holds
     nothing to draw; a StoppedError if the event was set.
@@ -145,6 +148,7 @@ def draw_bag(
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
     seconds = (np.array(times) - times[0]) / NANOSECONDS
     gaps = is_after_gap(seconds, steady=scene.rate > 0.0)
+    over_time = over == 'time' or (not over and len(scene_linkage.linkage.inputs) > 1)
     curves = partial(curves_over_time, scene_linkage.linkage, seconds)
     if not over_time:
         curves = partial(crank_curves, scene_linkage.linkage)
