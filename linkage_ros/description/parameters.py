@@ -46,7 +46,7 @@ KINDS = {
     'joint': 'published joint',
     'input': 'driven joint',
     'any_joint': 'driven or published joint',
-    'pin': 'pin or slider, in space a joint',
+    'pin': 'pin or slider',
     'link': 'moving link',
     'body': 'link or the ground',
     'point': 'point: LINK.POINT',

@@ -41,7 +41,7 @@ class FrictionEffect(ForceEffect):
     """Friction in pins and sliders, in space in joints, for what uses forces."""
 
     joints: Mapping[str, JointFriction] = each_part(
-        'of each pin or slider', 'pin', JointFriction, required=True
+        'of each pin or slider, in space of each joint', 'pin', JointFriction, required=True
     )
     holds: bool = flag(
         'at rest friction carries what it can, and effort the rest; for a linkage of one input',
