@@ -11,6 +11,7 @@
 from math import remainder, tau
 from pathlib import Path
 
+from linkage_ros.cli import simulate
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.kinematics import Closure, Curve, InputSweep, usual_inputs
 from linkage_ros.resources import shipped_path
@@ -150,6 +151,20 @@ def test_the_axis_of_time_has_its_unit(tmp_path: Path) -> None:
     text = (tmp_path / 'x.svg').read_text()
     assert '<!-- time since the first joint state [s] -->' in text
     assert text.count('<!-- crank_joint -->') == 1
+
+
+@pytest.mark.parametrize(
+    ('typed', 'axis'),
+    [((), 'time since the first joint state [s]'), (('--over', 'crank'), 'm1 [°]')],
+)
+def test_joints_of_several_inputs_are_drawn_over_time_unless_said(
+    tmp_path: Path, typed: tuple[str, ...], axis: str
+) -> None:
+    linkage = shipped_path('linkages/space/ankle_motors.yaml').read_text()
+    scene = scene_file(tmp_path, 'drive: {sine: {amplitude: 0.1, frequency: 2.0}}\n', linkage)
+    assert answer(simulate, scene, '--seconds', '0.5', '-o', tmp_path / 'bag') == 0
+    assert answer(command, tmp_path / 'bag', *typed, '-o', tmp_path / 'x.svg') == 0
+    assert f'<!-- {axis} -->' in (tmp_path / 'x.svg').read_text()
 
 
 @pytest.fixture
