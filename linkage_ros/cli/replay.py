@@ -332,13 +332,15 @@ def _replayed_with(
 ) -> dict[str, Any]:
     """Run another scene over a bag's samples; return the comparison with the recorded run."""
     check_drives(scene, scene.linkages[0].content.file)
-    run, recorded = _own_account(bag)
+    run, recorded, unreadable = _own_account(bag)
     topic = find_crank_topic(bag, reading.read_silently(), scene, run, recorded, crank_topic)
     source = ReplaySource(bag, run, recorded, topic)
     own_samples = topic == run.crank_topic
     counterfactual = Counterfactual(bag, scene, recorded, takes_own_samples=own_samples)
     names = names_for(source, scene, counterfactual)
     _check_joints(bag, scene, recorded, output)
+    if unreadable:
+        print(f'linkage replay: nothing to compare with: {unreadable}', file=sys.stderr)
     kinds = {run.joint_states_topic: JOINT_STATE_TYPE}
     extras = {name: topic.type for topic, name in names.items() if topic.key == EXTRA}
     kinds |= extras
@@ -415,16 +417,12 @@ def _rate_text(scene: Scene) -> str:
     return f'{scene.rate:g} Hz' if scene.rate else 'a tick for each sample'
 
 
-def _own_account(bag: Bag) -> tuple[RunMetadata, Scene | None]:
-    """Return the run account and the scene in a bag; a blank account and None if unreadable."""
+def _own_account(bag: Bag) -> tuple[RunMetadata, Scene | None, str]:
+    """Return the run account and the scene in a bag; blank, None and why not if unreadable."""
     try:
-        return read_run_metadata(bag), recorded_scene(bag)
+        return read_run_metadata(bag), recorded_scene(bag), ''
     except LinkageError as error:
-        print(
-            f'linkage replay: nothing to compare with: {error.where}: {error.reason}',
-            file=sys.stderr,
-        )
-        return RunMetadata(), None
+        return RunMetadata(), None, f'{error.where}: {error.reason}'
 
 
 def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path | None) -> None:

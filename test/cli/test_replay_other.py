@@ -19,6 +19,7 @@ from typing import Any
 
 from linkage_ros.bag import BagMessage, BagWriter, read_bag, RUN_FILE
 from linkage_ros.cli import replay
+from linkage_ros.cli.main import main
 from linkage_ros.description import load_scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import JointStateWriter
@@ -297,6 +298,13 @@ def test_a_foreign_bag_takes_a_scene(tmp_path, capsys, topics, typed, used):
     for number in (0, 100, 299):
         expected = rocker(0.04, 0.12, 0.08, 0.1, angle(number))
         assert at[BEGIN + (5 * number + 1) * MS] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_foreign_bag_that_is_refused_is_told_so_in_one_line(tmp_path, capsys):
+    bag = foreign(tmp_path, '/motor', joints=('x', 'y'))
+    assert main(['replay', str(bag), '--scene', 'torque_ankle']) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'its run took no commands, which a torque drive needs' in line
 
 
 def test_a_foreign_bag_is_ticked_at_the_rate_of_the_scene(tmp_path, capsys):
