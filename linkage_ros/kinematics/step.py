@@ -282,7 +282,7 @@ class RelativeAngle(LinearStep):
 
 @dataclass(frozen=True, slots=True)
 class GearedAngle(LinearStep):
-    """The angle of a link that ratios turn: factors times known coordinates, and a constant."""
+    """What ratios turn, a link or a joint: factors times known coordinates, and a constant."""
 
     factors: tuple[tuple[int, float], ...]  # Indices among the coordinates, and factors
     constant: float

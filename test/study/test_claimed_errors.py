@@ -38,6 +38,7 @@ from .own_runs import (
     parabolas_with_play,
     run_scene,
 )
+from ..dynamics.test_bodies import RSSR
 from ..support.multipliers import AbsoluteMotion
 
 HORIZON = 4.0
@@ -145,23 +146,16 @@ def test_the_step_of_a_drive_is_as_far_off_as_a_run_is(
     assert rms / 1.5 <= claimed.rms <= 1.5 * rms
 
 
-RSSR = """
-points: {A: [0.04, 0, 0], B: [0.1, 0.02, 0.12]}
-links: {crank: [A], rod: [A, B], rocker: [B]}
-hinges:
-  crank_joint: {parent: ground, child: crank, at: [0, 0, 0], axis: [0, 0, 1]}
-  rocker_joint: {parent: ground, child: rocker, at: [0.15, 0.05, 0.03], axis: [0, 1, 0.3]}
-input: crank_joint
-masses:
-  crank: {mass: 0.3, center: [0.02, 0, 0], inertia: [1.0e-4, 0, 0, 2.0e-4, 0, 2.0e-4]}
-  rod: {mass: 0.1}
-  rocker: {mass: 0.2, center: [0.12, 0.03, 0.08], inertia: [3.0e-4, 0, 0, 2.0e-4, 0, 4.0e-4]}
+WEIGHED = f"""{RSSR}masses:
+  crank: {{mass: 0.3, center: [0.02, 0, 0], inertia: [1.0e-4, 0, 0, 2.0e-4, 0, 2.0e-4]}}
+  rod: {{mass: 0.1}}
+  rocker: {{mass: 0.2, center: [0.12, 0.03, 0.08], inertia: [3.0e-4, 0, 0, 2.0e-4, 0, 4.0e-4]}}
 """
 
 
 def test_the_step_of_a_drive_in_space_is_as_far_off_as_bodies_say(tmp_path):
     """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
-    (tmp_path / 'rssr.yaml').write_text(RSSR)
+    (tmp_path / 'rssr.yaml').write_text(WEIGHED)
     (tmp_path / 'scene.yaml').write_text(
         'linkage: rssr.yaml\nrate: 100\nloads: {gravity: [0, 0, -9.81]}\n'
         'drive: {torque: {start: 0.5, method: semi_implicit_euler, step: 0.002}}\n'

@@ -95,8 +95,7 @@ class SpaceClosure(StepwiseClosure):
         check_space_linkage(linkage)
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
-        planned, hung, one_with, self.held = plan_balls_of_hinges(linkage)
-        """Hinges of rods that keep their value."""
+        planned, hung, one_with = plan_balls_of_hinges(linkage)
         plan = SpacePlan(planned, _add_knot)
         if platforms := free_platforms(plan):
             planned = carry_platforms(planned, platforms)
@@ -106,6 +105,8 @@ class SpaceClosure(StepwiseClosure):
             plan.hang_rods(hung)
         plan.finish()
         self._plan = plan
+        self.held = tuple(plan.linkage.held)
+        """Hinges of rods that keep their value."""
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy
             find_freedom,  # local import: it loads numpy

@@ -55,21 +55,20 @@ class BallsOfHinges(NamedTuple):
     linkage: SpaceLinkage
     hung: SpaceLinkage | None  # None if there are none
     one_with: Mapping[str, str]  # For each link that is not there, that which it is one with
-    held: tuple[str, ...]  # Names of the hinges that keep their value
 
 
 def plan_balls_of_hinges(linkage: SpaceLinkage) -> BallsOfHinges:
     """Return a linkage whose rods hang on balls, and the same whose rods do not spin."""
     one_with: dict[str, str] = {}
-    held: list[str] = []
+    held: dict[str, float] = {}
     chains: list[str] = []
     points, links = dict(linkage.points), dict(linkage.links)
     for rod, balls in _rods(linkage):
         name = _hinge_to_hold(linkage, balls)
         if name in chains:
             continue
-        held.append(name)
         hinge = linkage.hinges[name]
+        held[name] = hinge.value
         gone, kept = hinge.parent, hinge.child
         if gone in (rod, GROUND) or links.get(gone) or gone == balls[0].on:
             gone, kept = kept, gone
@@ -82,7 +81,7 @@ def plan_balls_of_hinges(linkage: SpaceLinkage) -> BallsOfHinges:
                 for link in (rod, ball.on):
                     links[link] = (*links.get(link, ()), point)
     if not held:
-        return BallsOfHinges(linkage, None, {}, ())
+        return BallsOfHinges(linkage, None, {})
     on_balls = replace(
         linkage,
         points=points,
@@ -98,9 +97,8 @@ def plan_balls_of_hinges(linkage: SpaceLinkage) -> BallsOfHinges:
         for name, hinge in linkage.hinges.items()
         if name not in held
     }
-    values = {name: linkage.hinges[name].value for name in held}
-    hung = replace(on_balls, hinges=hinges, held=values)
-    return BallsOfHinges(on_balls, hung, one_with, tuple(held))
+    hung = replace(on_balls, hinges=hinges, held=held)
+    return BallsOfHinges(on_balls, hung, one_with)
 
 
 def _rods(linkage: SpaceLinkage) -> Iterator[tuple[str, list[_Ball]]]:
