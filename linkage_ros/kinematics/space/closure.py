@@ -98,8 +98,8 @@ class SpaceClosure(StepwiseClosure):
         planned, hung, one_with = plan_balls_of_hinges(linkage)
         plan = SpacePlan(planned, _add_knot)
         if platforms := free_platforms(plan):
-            planned = carry_platforms(planned, platforms)
-            hung = hung and carry_platforms(hung, platforms)
+            planned = carry_platforms(planned, platforms, linkage)
+            hung = hung and carry_platforms(hung, platforms, linkage)
             plan = SpacePlan(planned, _add_knot)
         if hung is not None:
             plan.hang_rods(hung)

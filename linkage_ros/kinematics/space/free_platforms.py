@@ -14,6 +14,7 @@ has none; its place and its turn about the axes of the ground are six.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import fsum
 
@@ -36,20 +37,26 @@ def free_platforms(plan: SpacePlan) -> list[str]:
     ]
 
 
-def carry_platforms(linkage: SpaceLinkage, platforms: list[str]) -> SpaceLinkage:
-    """Return the linkage with joints that lead to these links from the ground."""
+def carry_platforms(
+    linkage: SpaceLinkage, platforms: Sequence[str], whole: SpaceLinkage
+) -> SpaceLinkage:
+    """
+    Return the linkage with joints that lead to these links from the ground.
+
+    No link or joint of the ``whole`` linkage, of which this may be a part, has their names.
+    """
+    taken = {*whole.link_names, *whole.struts, *whole.pair_joints}
     hinges, slides = dict(linkage.hinges), dict(linkage.slides)
     for link in platforms:
         places = [linkage.points[point] for point in linkage.links[link]]
         x, y, z = (fsum(one) / len(places) for one in zip(*places, strict=True))
         at, on = (x, y, z), GROUND
-        for letter, axis, joints in (
-            *((letter, axis, slides) for letter, axis in zip('xyz', GROUND_FRAME, strict=False)),
-            *((f'r{x}', axis, hinges) for x, axis in zip('xyz', GROUND_FRAME, strict=False)),
-        ):
-            names = (*linkage.link_names, *linkage.struts, *hinges, *slides)
-            name = free_name(f'{link}_{letter}', names)
-            child = link if letter == 'rz' else f'{name}_carrier'
-            joints[name] = SpatialJoint(on, child, axis, at)
-            on = child
+        for prefix, joints in (('', slides), ('r', hinges)):
+            for letter, axis in zip('xyz', GROUND_FRAME[:3], strict=True):
+                name = free_name(f'{link}_{prefix}{letter}', taken)
+                is_last = prefix and letter == 'z'
+                child = link if is_last else free_name(f'{name}_carrier', taken)
+                taken |= {name, child}
+                joints[name] = SpatialJoint(on, child, axis, at)
+                on = child
     return replace(linkage, hinges=hinges, slides=slides)

@@ -88,10 +88,17 @@ def test_a_robot_with_such_rods_closes_where_its_tree_says():
         assert walked.gap() < 1e-12
 
 
-def test_a_head_on_six_rods_is_where_its_tree_says(tmp_path):
-    """Nothing but rods carries the head: no joint leads to it, and it has no closed form."""
-    robot = tmp_path / 'head.urdf'
-    robot.write_text(head(RNG))
+@pytest.mark.parametrize('named', [{}, {'top1_a': 'neck_x', 'top1_b': 'neck_rz'}])
+def test_a_head_on_six_rods_is_where_its_tree_says(tmp_path, named):
+    """
+    Nothing but rods carries the head: no joint leads to it, and it has no closed form.
+
+    Hinges may be named as those that its plan adds would be.
+    """
+    robot, text = tmp_path / 'head.urdf', head(RNG)
+    for old, new in named.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    robot.write_text(text)
     closure = load(robot, {'input': [f'motor{number}' for number in range(1, 7)]})
     assert len(closure.held) == 6
     walked = Walked(robot.read_bytes())
