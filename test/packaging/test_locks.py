@@ -64,7 +64,7 @@ def wanted(root, extra):
             yield requirement
 
 
-@pytest.mark.parametrize('name', ['bench.txt', 'dev.txt', 'demo.txt', 'run.txt'])
+@pytest.mark.parametrize('name', ['bench.txt', 'dev.txt', 'demo.txt', 'npm.txt', 'run.txt'])
 def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
     found = pins(root / 'requirements' / name)
     assert found
