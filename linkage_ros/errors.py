@@ -15,14 +15,17 @@ value, and the remedy. The line is printable and of bounded length.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copyreg import __newobj__  # type: ignore[attr-defined]
 from difflib import get_close_matches
 from importlib.util import find_spec
 from os import PathLike
 import re
-from typing import Any
+from typing import Any, TypeVar
+
+K = TypeVar('K')
+V = TypeVar('V')
 
 _LONGEST_VALUE = 80
 _LONGEST_LIST = 800
@@ -109,8 +112,38 @@ class FileError(LinkageError):
         self.file = str(file)
         self.key = key
         self.line = line
+        self.others: Sequence[FileError] = ()
         place = f'{self.file}:{line}' if line else self.file
         super().__init__(f'{place}: {key}' if key else place, reason, remedy)
+
+    @property
+    def in_file(self) -> list[FileError]:
+        """Return this error and all ``others`` that were found in the file, by line."""
+        return sorted((self, *self.others), key=lambda error: error.line)
+
+
+def read_each(readers: Mapping[K, Callable[[], V]]) -> dict[K, V]:
+    """
+    Return what each reader returns, all of which are called.
+
+    Where they raise FileErrors, these are raised at the end, as by `raise_each`.
+    """
+    values: dict[K, V] = {}
+    found: list[FileError] = []
+    for key, read in readers.items():
+        try:
+            values[key] = read()
+        except FileError as error:  # noqa: PERF203 (few files are wrong)
+            found += (error, *error.others)
+    raise_each(found)
+    return values
+
+
+def raise_each(errors: Iterable[FileError]) -> None:
+    """Raise the first of some errors, with the others; none if there is none."""
+    for first in (found := iter(errors)):
+        first.others = tuple(found)
+        raise first
 
 
 class RecordingError(LinkageError):

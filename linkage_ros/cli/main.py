@@ -26,6 +26,7 @@ from linkage_ros.cli.terminal import clean_output, give_up_output, tell_who_wait
 from linkage_ros.errors import (
     decimal_comma,
     did_you_mean,
+    FileError,
     LinkageError,
     list_names,
     missing_packages_reported,
@@ -217,7 +218,8 @@ def _run_command(arguments: Sequence[str], stop: Event) -> int:
     except LinkageError as error:
         # A command that reads a linkage sets the units in which it shows values.
         told = typed.angles.convert_error(error) if 'angles' in typed else error
-        print(f'linkage {name}: {told}', file=sys.stderr)
+        for line in told.in_file if isinstance(told, FileError) else (told,):
+            print(f'linkage {name}: {line}', file=sys.stderr)
         return 2
 
 

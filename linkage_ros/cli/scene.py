@@ -6,20 +6,13 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""
-Describe a scene, or list its errors; or list what scenes can name.
-
-If the library jsonschema is installed, all errors of the files are listed; else the first one.
-"""
+"""Describe a scene, or list its errors; or list what scenes can name."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from importlib.util import find_spec
-from os.path import isfile
-from pathlib import Path
 import sys
 from threading import Event
 from typing import Any
@@ -33,20 +26,16 @@ from linkage_ros.description import (
     default_of,
     first_docstring_line,
     is_required,
-    kind_of,
     linkage_schema,
     load_scene,
     parameter_rows,
-    read_yaml,
     Scene,
     scene_notes,
     scene_schema,
-    Section,
     Units,
 )
-from linkage_ros.errors import did_you_mean, FileError, LinkageError, list_names
+from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.messages import JOINT_STATE_TYPE
-from linkage_ros.resources import linkage_of_scene, named_file
 from linkage_ros.stages.drives import drive_class, DRIVES
 from linkage_ros.stages.effects import effect_class, EFFECTS, effects_requiring
 from linkage_ros.stages.faults import FAULTS
@@ -311,11 +300,6 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         account = tables_json(table for table in tables if table.key)
         show_result(Result(account, tables), arguments)
         return 0
-    wrong = _find_violations(named_file(arguments.file, 'scenes', 'linkages'))
-    for error in wrong:
-        print(f'linkage scene: {error}', file=sys.stderr)
-    if wrong:
-        return 2
     scene = load_scene(arguments.file, arguments.set)
     for note in scene_notes(scene):
         print(f'linkage scene: note: {note}', file=sys.stderr)
@@ -345,29 +329,3 @@ def _items_to_list(names: list[str]) -> Iterator[tuple[str, str]]:
                 did_you_mean(name, words, f'known: {list_names(words)}'),
             )
         yield from found
-
-
-def _find_violations(file: Path) -> list[FileError]:
-    """Return all violations of the schemas in a scene and the linkages that it names."""
-    if find_spec('jsonschema') is None:
-        return []
-    from linkage_ros.description import find_violations
-
-    content, _ = read_yaml(file)
-    if kind_of(content) == 'linkage':
-        return find_violations(content, linkage_schema())
-    wrong = find_violations(content, scene_schema())
-    if wrong:
-        return wrong
-    for linkage in dict.fromkeys(_named_linkages(content)):
-        # The reader reports a missing file, with the line that names it.
-        path = linkage_of_scene(linkage, file.parent)
-        if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
-            wrong += find_violations(read_yaml(path)[0], linkage_schema())
-    return wrong
-
-
-def _named_linkages(content: Section) -> list[str]:
-    entries = content.sections('linkages') if 'linkages' in content else [content]
-    named = [entry.mapping.get('linkage') for entry in entries]
-    return [linkage for linkage in named if isinstance(linkage, str)]

@@ -124,10 +124,6 @@ from linkage_ros.description.units import LENGTHS as LENGTHS, Units as Units
 from linkage_ros.description.urdf_file import (
     read_urdf as read_urdf,
 )
-from linkage_ros.description.violations import (
-    find_violations as find_violations,
-    import_jsonschema as import_jsonschema,
-)
 from linkage_ros.description.yaml_file import (
     bounded_yaml as bounded_yaml,
     DEEPEST as DEEPEST,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from linkage_ros.description.parameters import (
@@ -32,6 +33,7 @@ from linkage_ros.description.parameters import (
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import LENGTHS
+from linkage_ros.errors import read_each
 
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
 LENGTH_UNIT = choice(
@@ -59,17 +61,18 @@ class Named(Kind):
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
         named = content.section(key, example=lambda name: self._example_for(name, parts))
-        values = {}
         if self.most is not None and len(named.mapping) > self.most:
             count = len(named.mapping)
             raise content.error(key, f'there are {count}', f'write at most {self.most}')
-        for name in named:
+
+        def read_value(name: str) -> Any:
             if self.check is not None:
                 self.check(named, name, parts)
             if 'slide' in parts:
                 named.units = replace(named.units, slides=name in parts['slide'])
-            values[name] = self.of.read(named, name, parts, folder)
-        return values
+            return self.of.read(named, name, parts, folder)
+
+        return read_each({name: partial(read_value, name) for name in named})
 
     def example(self, parts: Parts) -> str:
         return self._example_for('', parts)
@@ -93,7 +96,10 @@ class OneOrMore(Kind):
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> list[Any]:
         found = content.sections(key, example=lambda _: self.example(parts))
-        return [read_parameters(one, self.of, parts, folder) for one in found]
+        readers = {
+            i: partial(read_parameters, one, self.of, parts, folder) for i, one in enumerate(found)
+        }
+        return [*read_each(readers).values()]
 
     def example(self, parts: Parts) -> str:
         return example_of(self.of, parts)

@@ -10,8 +10,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from os import PathLike
 from pathlib import Path
@@ -29,7 +30,7 @@ from linkage_ros.description.parameters import read_parameters
 from linkage_ros.description.section import Section
 from linkage_ros.description.space_file import is_spatial, read_space_closure
 from linkage_ros.description.yaml_file import read_yaml
-from linkage_ros.errors import DefinitionError, FileError, list_names
+from linkage_ros.errors import DefinitionError, FileError, list_names, read_each
 from linkage_ros.kinematics import (
     assembly_sides,
     AssemblyPose,
@@ -214,8 +215,11 @@ def written_linkage(content: Section, *, publish_inputs: bool = False) -> tuple[
             return _parse_linkage(expanded, publish_inputs, pose), shorthand
     for key in WRITTEN_OUT:
         content.remove_key(key)
-    content.finish(tuple(SHORTHANDS))
-    return _parse_linkage(content, publish_inputs), ''
+    readers: dict[str, Callable[[], Any]] = {
+        '': partial(content.finish, tuple(SHORTHANDS)),
+        'linkage': partial(_parse_linkage, content, publish_inputs),
+    }
+    return read_each(readers)['linkage'], ''
 
 
 def _parse_linkage(
@@ -242,18 +246,24 @@ def _parse_linkage(
         unit=[driven.unit for driven in inputs],
         slider=tuple(sliders),
     )
-    assembly = read('assembly') or {}
-    joints = published = read('joints')
+    of_linkage = read_each(
+        {
+            key: partial(LINKAGE.read_key, content, key, parts)
+            for key in ('assembly', 'joints', 'traced', 'masses', 'pose', 'axes')
+        }
+    )
+    assembly = of_linkage['assembly'] or {}
+    joints = published = of_linkage['joints']
     if not joints:
         raise content.error('joints', 'publishes nothing', 'name a joint')
     if publish_inputs:
         published = {driven.joint: _published_joint(driven) for driven in inputs} | joints
-    traced = read('traced') or ()
+    traced = of_linkage['traced'] or ()
     masses = {
         link: _mass_of(content, link, given, points[link])
-        for link, given in (read('masses') or {}).items()
+        for link, given in (of_linkage['masses'] or {}).items()
     }
-    pose = pose or read('pose')
+    pose = pose or of_linkage['pose']
     units = {name: joint.unit for name, joint in joints.items()}
     units |= {driven.joint: driven.unit for driven in inputs}
     parts['slide'] = [name for name, unit in units.items() if unit == 'm']
@@ -261,7 +271,7 @@ def _parse_linkage(
         name: ratio_in_si(one, name, units, content.units)
         for name, one in (read('ratios') or {}).items()
     }
-    x, y = read('axes')
+    x, y = of_linkage['axes']
     return Linkage(
         points, inputs, assembly, published, sliders, traced, pose, masses, ratios, axes=(x, y)
     )

@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import most_in_one, unit_of
-from linkage_ros.errors import did_you_mean, list_names, quote
+from linkage_ros.errors import did_you_mean, list_names, quote, read_each
 
 _KEY = 'parameter'
 
@@ -412,13 +412,15 @@ class Each(Name):
         return ParameterGroup('', self.of) if isinstance(self.of, type) else self.of
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        inner, values = content.section(key, example=partial(self._example_for, parts)), {}
-        for name in inner:
+        inner = content.section(key, example=partial(self._example_for, parts))
+
+        def read_value(name: str) -> tuple[str, Any]:
             part = self._known_name(inner, name, name, parts)
             if sliding := _SLIDING.get(self.kind):
                 inner.units = replace(inner.units, slides=name in parts.get(sliding, ()))
-            values[part] = self._value_kind.read(inner, name, parts, folder)
-        return values
+            return part, self._value_kind.read(inner, name, parts, folder)
+
+        return dict(read_each({name: partial(read_value, name) for name in inner}).values())
 
     def json_schema(self) -> Schema:
         of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.json_schema()
@@ -636,14 +638,16 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
         rule.check(content)
     unknown = {key for rule in rules for key in rule.unknown_keys(content)}
     needed = {key for rule in rules for key in rule.needed_keys(content)}
-    values = {
-        entry.name: kind.read(content, entry.name, parts, folder)
+    entries = [(entry, kind) for entry, kind in entries if entry.name not in unknown]
+    known = [entry.name for entry, _ in entries]
+    readers: dict[str, Callable[[], Any]] = {
+        entry.name: partial(kind.read, content, entry.name, parts, folder)
         if entry.name in needed
-        else _read_entry(entry, content, parts, folder)
+        else partial(_read_entry, entry, content, parts, folder)
         for entry, kind in entries
-        if entry.name not in unknown
     }
-    content.finish([entry.name for entry, _ in entries if entry.name not in unknown])
+    values = read_each(readers | {'': partial(content.finish, known)})
+    del values['']
     for rule in rules:
         rule.check_values(content, values)
     if isinstance(of, Keys):

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from os.path import isfile
 from pathlib import Path
@@ -24,7 +25,7 @@ from linkage_ros.description.linkage_file import (
     read_any_closure,
     robot_content,
 )
-from linkage_ros.description.parameters import Parts
+from linkage_ros.description.parameters import Kind, Parts
 from linkage_ros.description.scene import parts_of, Scene, SceneLinkage
 from linkage_ros.description.scene_grammar import (
     DRIVE,
@@ -39,7 +40,14 @@ from linkage_ros.description.scene_grammar import (
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml, read_yaml
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
+from linkage_ros.errors import (
+    DefinitionError,
+    did_you_mean,
+    FileError,
+    list_names,
+    quote,
+    read_each,
+)
 from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.stages.drives import drive_class
@@ -286,13 +294,20 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
     all_joints = SCENE.read_key(content, 'model_joints', {})
     all_joints = has_description if all_joints is None else all_joints
     source = replace(source, publishes_model_joints=all_joints)
-    members, linkage_files = _read_linkages(content, source)
-    parts = _prefixed_parts(members)
+    for key in (*SCENE.entries, *OF_A_LINKAGE.entries, 'linkage', 'linkages'):
+        content.remove_key(key)
 
-    def read(key: str) -> Any:
-        return SCENE.read_key(content, key, parts)
+    def read(key: str, parts: Parts) -> Callable[[], Any]:
+        return partial(SCENE.read_key, content, key, parts)
 
-    rate, seed = read('rate'), read('seed')
+    readers: dict[str, Callable[[], Any]] = {
+        'linkages': partial(_read_linkages, content, source),
+        **{key: read(key, {}) for key in ('rate', 'seed', 'record')},
+        '': content.finish,
+    }
+    of_scene = read_each(readers)
+    members, linkage_files = of_scene['linkages']
+    rate, seed = of_scene['rate'], of_scene['seed']
     if seed is None:
         seed = seed_of(source.name) if source.seed is None else source.seed
     scene = Scene(
@@ -301,16 +316,13 @@ def _read_scene(content: Section, data: bytes, source: _SceneSource) -> Scene:
         rate=rate,
         wrapped=published == 'wrapped',
         seed=seed,
-        faults=read('faults') or {},
-        record=read('record'),
+        faults=read('faults', _prefixed_parts(members))() or {},
+        record=of_scene['record'],
         files={SCENE_FILE: data, **linkage_files},
         folder=source.folder,
         robot_description=has_description,
         units=_table_units(content, members),
     )
-    for key in OF_A_LINKAGE.entries:
-        content.remove_key(key)
-    content.finish(('linkages', *SCENE.entries))
     for scene_linkage in members:
         drive, parameters = scene_linkage.drive
         if scene.rate == 0.0 and not parameters.is_measured:
@@ -417,19 +429,34 @@ def _read_scene_linkage(
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
     parts = {**parts_of(linkage), 'left_out': not_imported}
-    driven = DRIVE.read(section_with('drive'), 'drive', parts, source.folder)
+
+    def read(kind: Kind, key: str, folder: str = '') -> Callable[[], Any]:
+        return partial(kind.read, section_with(key), key, parts, folder)
+
+    def read_key(key: str) -> Callable[[], Any]:
+        return partial(OF_A_LINKAGE.read_key, section_with(key), key, parts)
+
+    values = read_each(
+        {
+            'drive': read(DRIVE, 'drive', source.folder),
+            'effects': read(EFFECTS_BY_NAME, 'effects'),
+            'prefix': read_key('prefix'),
+            'loads': read_key('loads'),
+        }
+    )
+    driven = values['drive']
     if driven[0] == 'topic' and driven[1].joint:
         _check_sampled(section_with('drive'), closure, driven[1].joint)
     if source.confinement is not None:
         source.confinement.refuse_drive(section_with('drive'), driven)
-    prefix = OF_A_LINKAGE.read_key(section_with('prefix'), 'prefix', parts)
+    prefix = values['prefix']
     return SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
         drive=driven,
-        effects=EFFECTS_BY_NAME.read(section_with('effects'), 'effects', parts, ''),
-        loads=OF_A_LINKAGE.read_key(section_with('loads'), 'loads', parts),
+        effects=values['effects'],
+        loads=values['loads'],
         prefix=prefix if prefix is not None else f'{name}_' if name else '',
         content=own,
         linkage_content=linkage_content,

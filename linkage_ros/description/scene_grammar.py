@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 import json
 from pathlib import Path
 from re import fullmatch
@@ -58,7 +59,7 @@ from linkage_ros.description.scene import (
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES
 from linkage_ros.dynamics import AppliedLoads, GREATEST_LOAD, Loads, Spring, STIFFEST
-from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
+from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote, read_each
 from linkage_ros.stages.drives import drive_class, DRIVES
 from linkage_ros.stages.effects import effect_class, EFFECTS, in_order
 
@@ -111,11 +112,14 @@ class _Effects(Kind):
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
         effects = effects_section(content, lambda: parts, key)
         types = effect_types(effects, parts['left_out'])
-        values = {
-            name: ParameterGroup('', of).read(effects, name, parts, '')
+        for name in types:
+            effects.remove_key(name)
+        readers: dict[str, Callable[[], Any]] = {
+            name: partial(ParameterGroup('', of).read, effects, name, parts, '')
             for name, of in types.items()
         }
-        effects.finish(tuple(EFFECTS))
+        values = read_each(readers | {'': partial(effects.finish, tuple(EFFECTS))})
+        del values['']
         return values
 
     def json_schema(self) -> Schema:

@@ -112,6 +112,12 @@ def _parse_value(setting: str, text: str) -> Any:
 
 def blame_setting(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
     """Return an error of a scene; it names the setting that it is about instead of the file."""
+    blamed = _blame(error, content, settings)
+    blamed.others = [_blame(other, content, settings) for other in error.others]
+    return blamed
+
+
+def _blame(error: FileError, content: Section, settings: Sequence[str]) -> FileError:
     for setting in reversed(settings):
         key = setting.partition('=')[0].replace('"', '')
         if error.file == content.file and _is_within(error.key, _counted_key(content, key)):

@@ -17,7 +17,14 @@ from re import fullmatch
 from typing import Any, cast
 
 from linkage_ros.description.units import unit_of, Units
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError, list_names, quote
+from linkage_ros.errors import (
+    DefinitionError,
+    did_you_mean,
+    FileError,
+    list_names,
+    quote,
+    raise_each,
+)
 
 SI = Units()
 
@@ -235,7 +242,9 @@ class Section:
         Where something else stands, the error shows an ``example``: of what belongs to a name that
         stands there, or of the mapping for the name ''.
         """
-        value = self._take_value(key, None if required else {}, 'a mapping')
+        is_missing = required and key not in self._content
+        expected = example('') if example and is_missing else 'a mapping'
+        value = self._take_value(key, None if required else {}, expected)
         line = self._line_of(key)
         if not isinstance(value, dict):
             remedy = f'write {key}: {_as_mapping(value, example)}'
@@ -313,14 +322,16 @@ class Section:
 
         A file without any known key may be any file, and the error names none of its keys.
         """
-        for key in self._content:
-            if key not in self._taken:
-                names = sorted(self._taken | set(known))
-                known_names = f'known: {list_names(names)}' if names else 'leave it out'
-                remedy = did_you_mean(key, names, known_names)
-                if not self._path and not any(each in names for each in self._content):
-                    raise self.error('', 'has no known key', remedy)
-                raise self.error(key, 'unknown key', remedy)
+        names = sorted(self._taken | set(known))
+        known_names = f'known: {list_names(names)}' if names else 'leave it out'
+        unknown = [key for key in self._content if key not in self._taken]
+        if unknown and not self._path and not any(key in names for key in self._content):
+            remedy = did_you_mean(unknown[0], names, known_names)
+            raise self.error('', 'has no known key', remedy)
+        raise_each(
+            self.error(key, 'unknown key', did_you_mean(key, names, known_names))
+            for key in unknown
+        )
 
     def _line_of(self, key: str) -> int:
         """Return the line of a key, or of the longest existing part of a dotted key."""

@@ -96,10 +96,6 @@ class Units:
         """Return how many of a unit in SI are one of the file's unit."""
         return float(self._si_factor(self._unit_alternatives(unit)[0]))
 
-    def convert_brackets(self, text: str) -> str:
-        """Return a text with the file's units in brackets: ``[mm]`` for ``[m]``."""
-        return re.sub(r'\[([^][]*)\]', lambda unit: f'[{self.file_unit(unit[1])}]', text)
-
     def convert_quantities(self, text: str) -> str:
         """
         Return a text whose quantities in SI have these units.

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import fields
-from importlib.util import find_spec
 import json
 from math import inf
 from pathlib import Path
@@ -20,7 +19,6 @@ from threading import Event
 
 from linkage_ros.cli import parameters_of, REGISTRIES, scene as command, table_of, table_text
 from linkage_ros.description import as_text
-from linkage_ros.errors import FileError
 from linkage_ros.messages import JOINT_STATE_TYPE
 import pytest
 
@@ -29,8 +27,6 @@ from .conftest import json_keys
 CONFIG = Path(__file__).parents[2] / 'config'
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
 FOUR_BAR = CONFIG / 'linkages' / 'four_bar.yaml'
-
-needs_jsonschema = pytest.mark.skipif(find_spec('jsonschema') is None, reason='needs jsonschema')
 
 
 def run(*typed: str) -> int:
@@ -47,14 +43,6 @@ def test_json_of_every_shipped_scene_has_the_documented_keys(path, capsys):
     assert {'name': 'joint_states', 'type': JOINT_STATE_TYPE, 'what': 'publishes'} in account[
         'topics'
     ]
-
-
-def test_where_the_library_is_missing_the_first_thing_is_said(tmp_path, monkeypatch):
-    monkeypatch.setattr(command, 'find_spec', lambda _name: None)
-    (tmp_path / 'bad.yaml').write_text('linkage: four_bar\ndrive: {topic: {max_age: 0}}\nx: 1\n')
-    with pytest.raises(FileError) as caught:
-        run(str(tmp_path / 'bad.yaml'))
-    assert 'drive.topic.max_age: 0 is out of bounds' in str(caught.value)
 
 
 def test_every_parameter_has_a_unit_or_values_and_a_meaning():

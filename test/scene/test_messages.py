@@ -8,7 +8,7 @@
 
 """Errors that a newcomer meets: the whole line, with what to write instead."""
 
-from linkage_ros.description import find_violations, load, load_scene, read_yaml, scene_schema
+from linkage_ros.description import load, load_scene
 from linkage_ros.errors import FileError
 from linkage_ros.tick import Pipeline
 import pytest
@@ -178,49 +178,61 @@ def test_an_error_in_a_scene_says_what_to_write(tmp_path, kind):
     assert str(caught.value) == f'{file}{line}'
 
 
-# The same, by the schema: all violations at once.
-VIOLATIONS = {
-    'a rate in words': (
-        'rate: fast',
+# All errors at once, by line; the reader goes on after the first.
+SEVERAL = {
+    'the whole scene': (
+        """\
+rate: fast
+drive: {topic: {max_age: 0, latest: true}}
+effects: {delay: 3, velocty: {}}
+record: {split_byts: 2}
+x: 1
+""",
         [
-            (
-                ":2: rate: 'fast' is not a number; write a number, at least 0 and at most 20000 "
-                '(ticks a second; 0: one for every crank sample [Hz])'
-            )
+            ':2: rate: ',
+            ':3: drive.topic.latest: unknown key',
+            ':3: drive.topic.max_age: 0 is out of bounds',
+            ':4: effects.delay: 3 is not a mapping; write delay: {seconds: 1}',
+            ":4: effects.velocty: unknown key; did you mean 'velocity'?",
+            ":5: record.split_byts: unknown key; did you mean 'split_bytes'?",
+            ':6: x: unknown key',
         ],
     ),
-    'a length in the unit of the file': (
-        'units: mm\neffects: {tolerance: {standard_deviation: few}}',
+    'values by name': (
+        'loads: {forces: {coupler.B: {constant: few}, rocker.B: {direction: [1, 0], at: 2}}}',
         [
-            (
-                ":3: effects.tolerance.standard_deviation: 'few' is not a number; write a "
-                'number, at '
-                'least 0 (of each coordinate of each point, drawn with the seed; no deviation '
-                'exceeds '
-                'three times this value [mm])'
-            )
+            ":2: loads.forces.coupler.B.constant: 'few' is not a number",
+            ":2: loads.forces.coupler.B: the key 'direction' is missing; add direction: ",
+            ':2: loads.forces.rocker.B.at: unknown key',
         ],
     ),
-    'counts beside the joints': (
-        'effects: {encoder: {counts: 4096}}',
+    'a missing key, and what was written instead': (
+        'effects: {delay: {second: 1}}',
         [
-            (
-                ":2: effects.encoder: the key 'joints' is missing; add joints: encoder of a "
-                'joint (by '
-                'the name of a published joint)'
-            ),
-            (
-                ':2: effects.encoder.counts: unknown key; '
-                'write it under joints, as joints: {NAME: {counts: …}}'
-            ),
+            ":2: effects.delay.second: unknown key; did you mean 'seconds'?",
+            ":2: effects.delay: the key 'seconds' is missing; add seconds: ",
         ],
     ),
 }
 
 
-@pytest.mark.parametrize('kind', VIOLATIONS)
-def test_a_violation_of_the_schema_is_told_once(tmp_path, kind):
-    text, lines = VIOLATIONS[kind]
+@pytest.mark.parametrize('kind', SEVERAL)
+def test_all_errors_of_a_scene_are_told(tmp_path, kind):
+    text, expected = SEVERAL[kind]
     file = scene_of(tmp_path, text)
-    found = find_violations(read_yaml(file)[0], scene_schema())
-    assert [str(error) for error in found] == [f'{file}{line}' for line in lines]
+    with pytest.raises(FileError) as caught:
+        load_scene(file)
+    lines = sorted(str(error).removeprefix(str(file)) for error in caught.value.in_file)
+    assert len(lines) == len(expected)
+    assert all(map(str.startswith, lines, expected)), lines
+
+
+def test_all_errors_of_a_linkage_are_told(tmp_path):
+    file = tmp_path / 'wrong.yaml'
+    text = LINKAGE.replace('assembly: {B: left,', 'mases: {}\nassembly: {B: lef,')
+    file.write_text(text.replace('rocker_joint: {parent:', 'rocker_joint: {parnt:'))
+    with pytest.raises(FileError) as caught:
+        load(file)
+    assert {error.key for error in caught.value.in_file} == {
+        'assembly.B', 'mases', 'joints.rocker_joint', 'joints.rocker_joint.parnt',
+    }  # fmt: skip

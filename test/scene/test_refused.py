@@ -13,7 +13,6 @@ from pathlib import Path
 import re
 
 from linkage_ros.description import (
-    import_jsonschema,
     linkage_schema,
     load_scene,
     parse_scene,
@@ -41,7 +40,8 @@ def valid():
     """Return a function that says whether a content is valid, by kind; None without jsonschema."""
     if find_spec('jsonschema') is None:
         return None
-    validator = import_jsonschema().Draft202012Validator
+    from jsonschema import Draft202012Validator as validator  # where it is installed
+
     validators = {'scene': validator(scene_schema()), 'linkage': validator(linkage_schema())}
     return lambda kind, content: validators[kind].is_valid(content)
 

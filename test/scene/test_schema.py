@@ -11,7 +11,6 @@
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
-from importlib.util import find_spec
 import json
 from math import pi
 from pathlib import Path
@@ -29,7 +28,6 @@ from linkage_ros.description import (
     file,
     Flag,
     flag,
-    import_jsonschema,
     KINDS,
     linkage_schema,
     load_scene,
@@ -68,9 +66,7 @@ import yaml
 
 from .conftest import CONFIG
 
-if find_spec('jsonschema') is None:
-    pytest.skip('needs jsonschema', allow_module_level=True)
-Validator = import_jsonschema().Draft202012Validator
+Validator = pytest.importorskip('jsonschema').Draft202012Validator
 SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
 LINKAGES = sorted((CONFIG / 'linkages').glob('*.yaml'))
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}

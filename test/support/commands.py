@@ -38,7 +38,6 @@ from typing import NoReturn
 
 import linkage_ros
 from linkage_ros.cli.main import main
-from linkage_ros.description import import_jsonschema
 from linkage_ros.processes import private_domain
 
 # What commands import only where they need it.
@@ -141,8 +140,6 @@ def _serve(control: socket.socket) -> None:
     for name in (*LIBRARIES, *(module.name for module in modules)):
         with suppress(ImportError):
             import_module(name)
-    with suppress(ImportError):
-        import_jsonschema()
     for name in THREADED:
         del sys.modules[name]
     assert len([*Path('/proc/self/task').iterdir()]) == 1, 'a library has started a thread'
