@@ -66,6 +66,8 @@ VIEW = ['aiohttp>=3.9,<4', 'ezdxf>=1.1,<2', 'plotly>=6,<8', 'ruamel.yaml>=0.18,<
 DEMO = [*ROS, *VIEW, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
 # `linkage fmu`: the wrapper between FMI and Python.
 FMU = ['pythonfmu3>=0.3.4,<0.4']
+# Robots in MJCF.
+MJCF = ['mujoco>=3,<5']
 # Completion of the command line in bash, zsh and fish.
 COMPLETION = ['argcomplete>=3.1,<4']
 # Linkages as functions of arrays; PyTorch's wheel for Linux on PyPI brings gigabytes of CUDA.
@@ -95,13 +97,13 @@ TEST = [
     'fmpy>=0.3.22,<0.4',
     # References: fifty digits, and a rigid-body engine.
     'mpmath>=1.2,<2',
-    'mujoco>=3',
     # `make arrays` adds PyTorch.
     *ARRAYS[:2],
     *COMPLETION,
     *DASK,
     *EXPORT,
     *FMU,
+    *MJCF,
     *VIEW,
 ]
 # `make bench`: another implementation, to compare the speed, and Pinocchio, which then reads robot
@@ -174,6 +176,7 @@ setup(
         'docs': DOCS,
         'export': EXPORT,
         'fmu': FMU,
+        'mjcf': MJCF,
         'test': TEST,
         'view': VIEW,
         'dev': [

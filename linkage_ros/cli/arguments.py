@@ -55,7 +55,9 @@ def add_file(parser: argparse.ArgumentParser) -> None:
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare what may be told of a robot, if the linkage file is a URDF; see `robot_of`."""
-    robot = parser.add_argument_group('of a robot', 'FILE is a URDF; more in docs/how_to/loops.md')
+    robot = parser.add_argument_group(
+        'of a robot', 'FILE is a URDF, SDF or MJCF; more in docs/how_to/loops.md'
+    )
     close = 'links whose origins meet, or places LINK.x,y,z in metres: by a ball, :hinge or :fixed'
     start = 'value of a joint, if not 0, at which the loops close, in radians or metres'
     for option, name, kind, text in (
@@ -65,11 +67,14 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
     ):
         given: dict[str, Any] = {'type': kind, 'default': [], 'metavar': name, 'help': text}
         robot.add_argument(option, action='append', **given)
+    near = 'take a pose near it in which the loops close'
+    robot.add_argument('--near', action='store_true', help=near)
 
 
 def robot_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Return what is told of a robot, by the keys of a scene."""
     told = {'input': arguments.input, 'close': arguments.close, 'at': dict(arguments.start)}
+    told['near'] = arguments.near
     return {key: value for key, value in told.items() if value}
 
 

@@ -85,6 +85,7 @@ from linkage_ros.description.parameters import (
     TextOf as TextOf,
     whole_number as whole_number,
 )
+from linkage_ros.description.robot_formats import read_as_urdf as read_as_urdf
 from linkage_ros.description.scene import (
     LEAST_FLUSH_PERIOD as LEAST_FLUSH_PERIOD,
     RecordParameters as RecordParameters,

@@ -30,6 +30,16 @@ class FileKind(NamedTuple):
     is_foreign: bool = True  # No linkage or scene, not even with mistakes
 
 
+ROBOTS = ('.urdf', '.sdf', '.xml', '.mjcf')
+"""Suffixes of robots in XML, whose root says the format."""
+
+YAML = ('.yaml', '.yml')
+"""Suffixes of a file of closings."""
+
+CLOSINGS = 'closed_loop'
+"""Key of a YAML file that closes the loops of a URDF beside it."""
+
+
 _BAG = FileKind('a bag', 'linkage info, plot and report read bags')
 _EMPTY = FileKind('empty', 'linkage gallery four_bar prints an example')
 BINARY = FileKind('a binary file', 'name a scene or a linkage file, which is UTF-8 text')
@@ -59,8 +69,8 @@ _OF_A_URDF = (
 )
 _ELEMENTS = {
     'robot': FileKind('a URDF', _OF_A_URDF),
-    'mujoco': FileKind('a model of MuJoCo'),
-    'sdf': FileKind('an SDF model'),
+    'mujoco': FileKind('a model of MuJoCo', _OF_A_URDF),
+    'sdf': FileKind('an SDF model', _OF_A_URDF),
     'html': FileKind('a web page'),
     'svg': FileKind('a picture'),
 }

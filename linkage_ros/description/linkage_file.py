@@ -18,6 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from linkage_ros.description.file_kinds import CLOSINGS, ROBOTS
 from linkage_ros.description.linkage_grammar import (
     is_rod,
     LINKAGE,
@@ -62,8 +63,7 @@ _MOST_SIDES = 5
 
 def looks_like_linkage(content: Section) -> bool:
     """Return whether a file of unknown kind has the keys of a linkage, or is a robot's."""
-    is_urdf = Path(content.file).suffix.lower() == '.urdf'
-    return is_urdf or any(key in content for key in ('links', 'points', *SHORTHANDS))
+    return any(key in content for key in ('links', 'points', 'urdf', *SHORTHANDS))
 
 
 def load(
@@ -96,12 +96,14 @@ def load(
 
 def read_content(file: Path, robot: Mapping[str, Any] | None = None) -> tuple[Section, bytes]:
     """Return the content of a file, also of a robot, and its bytes."""
-    if file.suffix.lower() == '.urdf':
+    content, data = Section(str(file), '', {}), b''
+    if file.suffix.lower() not in ROBOTS:
+        content, data = read_yaml(file)
+        if CLOSINGS not in content and robot:
+            raise FileError(file, '', 'is not a robot', f'leave out {list_names(robot)}')
+    if file.suffix.lower() in ROBOTS or CLOSINGS in content:
         content = urdf_content(file, robot or {})
         return content, content.named_data
-    if robot:
-        raise FileError(file, '', 'is no URDF', f'leave out {list_names(robot)}')
-    content, data = read_yaml(file)
     if 'urdf' in content:
         remedy = 'name the URDF itself, or write linkage: {urdf: FILE} for a scene'
         raise content.error('urdf', 'is no key of a linkage', remedy)
@@ -123,9 +125,9 @@ def urdf_content(file: Path, robot: Mapping[str, Any]) -> Section:
 
 def robot_content(content: Section, file: Path) -> Section:
     """Return a section that names a robot, with the content of its URDF."""
-    from linkage_ros.description.urdf_file import read_urdf_file  # local import: for robots
+    from linkage_ros.description.robot_formats import read_as_urdf  # local import: for robots
 
-    content.named_data = read_urdf_file(file)
+    content.named_data = read_as_urdf(file)
     return content
 
 

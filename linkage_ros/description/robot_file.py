@@ -29,6 +29,7 @@ from linkage_ros.description.grammar import ListOf, Named
 from linkage_ros.description.linkage_grammar import FARTHEST, MOST_LINKS
 from linkage_ros.description.parameters import (
     declare,
+    flag,
     Keys,
     Number,
     read_parameters,
@@ -89,6 +90,9 @@ _ROUNDED_VALUE = 1e-12
 _MOST_JOINTS, _MOST_LOOPS = 100, 20
 """Most joints in loops, and most loops: a pose is sought in seconds."""
 
+_NEAR_ZERO, _MOST_TOLD = 1e-9, 6
+"""Least value of a joint that a remedy tells, and the most joints."""
+
 _MOST_TRIED = 20
 """Most choices of mimics that are tried."""
 
@@ -107,6 +111,11 @@ ROBOT = Keys(
                 MOST_LINKS,
             ),
             {},
+        ),
+        'near': flag(
+            'Whether, where the loops are open at these values, the pose is one near it in which '
+            'they close.',
+            False,
         ),
         'close': declare(
             ListOf(
@@ -135,7 +144,7 @@ def read_robot_closure(
         return closure
 
     try:
-        robot = _Robot(urdf, given['input'], given['at'], given['close'])
+        robot = _Robot(urdf, given['input'], given['at'], given['close'], given['near'])
         errors: list[DefinitionError] = []
         for without in robot.needless_choices(publish_inputs):
             try:
@@ -167,8 +176,8 @@ class _LinkageParts(NamedTuple):
 class _Robot:
     """The loops of a robot; a DefinitionError names one of its keys, a FileError its URDF."""
 
-    def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any) -> None:
-        self._urdf, self._told = urdf, {**urdf.start, **told}
+    def __init__(self, urdf: UrdfFile, driven: Any, told: Any, close: Any, near: bool) -> None:
+        self._urdf, self._told, self._near = urdf, {**urdf.start, **told}, near
         self._tree = tree = RobotTree(urdf)
         self._loops: list[UrdfLoop] = []
         taken, said = {*urdf.joints, *urdf.links}, [*urdf.loops, *map(self._read_close, close)]
@@ -399,9 +408,13 @@ class _Robot:
         for (apart, worst), unit, most in (
             (open_by, 'm', _MET * pose.size), (turned_by, 'rad', _MET),
         ):  # fmt: skip
-            if apart > most:
-                reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
-                raise DefinitionError('at', reason, pose.found_pose(values, free, ratios))
+            if apart > most or (self._near and not pose.is_within_limits(values)):
+                near = pose.find_near(values, self._driven, ratios)
+                if near is None or not self._near:
+                    reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
+                    raise DefinitionError('at', reason, self._remedy_of(near, ratios))
+                values = near
+                break
         as_told = values
         values, _ = pose.meet(values, free, ratios)
         frames, joints = self._tree.place_links(values), self._urdf.joints
@@ -445,6 +458,19 @@ class _Robot:
         )
         links = linkage.link_names[1:]
         return linkage.with_masses(self._masses(on, frames, links), massless=links)
+
+    def _remedy_of(self, found: Mapping[str, float] | None, ratios: Mapping[str, Ratio]) -> str:
+        """Return the remedy for loops that are open, with a pose near it in which they close."""
+        if found is None:
+            return 'give values of joints at which all loops close'
+        pose = [
+            f'{name}: {found[name]:.6g}'
+            for name in self._moving
+            if name not in ratios and abs(found[name]) > _NEAR_ZERO
+        ]
+        if len(pose) > _MOST_TOLD:
+            return 'near it all close: near: true (--near)'
+        return f'near it all close: near: true (--near), or at: {{{", ".join(pose)}}}'
 
     def _masses(
         self, on: Mapping[str, str], frames: Mapping[str, SpaceFrame], links: Sequence[str]

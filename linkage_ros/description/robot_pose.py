@@ -8,22 +8,22 @@
 """
 The pose of a robot: frames of its links at values of its joints, and what its loops miss there.
 
-If loops miss a pose by rounding, joints that are not driven are moved until they close (Newton's
-method, damped): no length changes.
+If loops miss a pose by rounding, joints that are not driven are moved until they close: no length
+changes. So is a pose sought in which they close (the method of Levenberg and Marquardt).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
-from math import atan2, hypot, inf, remainder, tau
+from itertools import chain, product
+from math import atan2, hypot, remainder, tau
+from random import Random
 
 from linkage_ros.description.urdf_file import LoopEnd, MOVING, UrdfFile, UrdfJoint, UrdfLoop
 from linkage_ros.kinematics import (
     cross,
     direction_of,
     dot,
-    Elimination,
     extent_of,
     GROUND_FRAME,
     length,
@@ -42,14 +42,19 @@ from linkage_ros.kinematics import (
 _ROUNDED, _CLOSED = 1e-14, 1e-9
 """Gaps that are rounding, and those of a pose that is found, relative to the size."""
 
-_DAMPING, _MOST_STEPS = 1e-10, 12
-"""Of Newton's method: damping relative to the size, and most steps."""
+_LEAST_DAMPING, _SEARCH_DAMPING, _MORE_DAMPING = 1e-10, 1e-3, 10.0
+"""Damping of a step, relative to the size: near a pose, far from it, and its change."""
+
+_MOST_STEPS, _MOST_SEARCH_STEPS = 12, 60
+"""Most steps to a pose: from one that rounding misses, and from any other."""
 
 _BESIDE = 1e-6
 """Least distance of the ends of a pin that is no rounding of CAD, relative to the size."""
 
-_NUDGES = (0.0, 0.5)
-"""How much joints are moved before a pose is sought, which a stretched one does not lead to."""
+_NUDGES = (0.0, 0.3, 1.0, 2.0)
+"""How much joints are moved at random before a pose is sought, in [rad] and [m]."""
+
+_SEED = 20
 
 LINE = 'line'
 """What closes a loop by frames SLIDER_on_LINK on the x axis of SLIDER_line_on_LINK."""
@@ -220,46 +225,83 @@ class RobotPose:
         return [[*chain(*row)] for row in rates.values()]
 
     def meet(
-        self, values: dict[str, float], free: Sequence[str], ratios: Mapping[str, Ratio]
+        self,
+        values: dict[str, float],
+        free: Sequence[str],
+        ratios: Mapping[str, Ratio],
+        *,
+        is_far: bool = False,
+        within_limits: bool = False,
     ) -> tuple[dict[str, float], float]:
         """Return values at which the loops close, as far as free joints do it, and the gap."""
-        for _ in range(_MOST_STEPS):
-            frames = self._tree.place_links(values)
-            left = self._remaining_errors(frames)
+        frames = self._tree.place_links(values)
+        left = self._remaining_errors(frames)
+        damping = _SEARCH_DAMPING if is_far else _LEAST_DAMPING
+        for _ in range(_MOST_SEARCH_STEPS if is_far else _MOST_STEPS):
             if hypot(*left) <= _ROUNDED * self.size or not free:
                 break
-            columns = self._slopes(frames, free, ratios)
-            rows = [*zip(*columns, strict=True)]
+            import numpy as np  # local import: many poses are met
+
+            slopes = np.array(self._slopes(frames, free, ratios))
             # The shortest step: J·Jᵀ is smaller than Jᵀ·J.
-            matrix = [[_product(one, other) for other in rows] for one in rows]
-            for number, row in enumerate(matrix):
-                row[number] += _DAMPING * self.size**2
-            pulls = Elimination(matrix, ()).solve([-gap for gap in left])
-            steps = [_product(column, pulls) for column in columns]
-            values = self.move(values, dict(zip(free, steps, strict=True)), ratios)
+            matrix = slopes.T @ slopes + damping * self.size**2 * np.eye(len(left))
+            steps = slopes @ np.linalg.solve(matrix, -np.array(left))
+            moves = dict(zip(free, steps.tolist(), strict=True))
+            if within_limits:
+                moves = {
+                    name: self._bring_within(name, values[name] + move) - values[name]
+                    for name, move in moves.items()
+                }
+            moved = self.move(values, moves, ratios)
+            frames_there = self._tree.place_links(moved)
+            left_there = self._remaining_errors(frames_there)
+            if hypot(*left_there) < hypot(*left):
+                values, frames, left = moved, frames_there, left_there
+                damping = max(damping / _MORE_DAMPING, _LEAST_DAMPING)
+            else:
+                damping *= _MORE_DAMPING
         return values, hypot(*left)
 
-    def found_pose(
-        self, values: dict[str, float], free: list[str], ratios: Mapping[str, Ratio]
-    ) -> str:
-        """Return a pose near values of joints in which all loops close, as a remedy."""
+    def _bring_within(self, name: str, value: float) -> float:
+        limits = self._tree.joints[name].limits
+        return min(max(value, limits.low), limits.high)
+
+    def is_within_limits(self, values: Mapping[str, float]) -> bool:
+        """Return whether the joints that move are within their limits."""
+        limits = ((values[name], self._tree.joints[name].limits) for name in self._moving)
+        return all(within.low <= value <= within.high for value, within in limits)
+
+    def _draw(self, name: str, value: float, nudge: float, drawn: Random) -> float:
+        """Return by how much a joint is moved: into its limits, and there at random."""
+        limits, within = self._tree.joints[name].limits, self._bring_within(name, value)
+        low, high = max(within - nudge, limits.low), min(within + nudge, limits.high)
+        return drawn.uniform(low, high) - value
+
+    def find_near(
+        self, values: dict[str, float], driven: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> dict[str, float] | None:
+        """
+        Return a pose near values of joints in which all loops close; None if none is found.
+
+        It is sought within the limits of the joints, and beyond them if there is none. Inputs are
+        moved if others do not suffice, and what is told at last.
+        """
+        free = [name for name in self._moving if name not in ratios]
         untold = [name for name in free if name not in self._told]
-        # What is told is moved last.
-        for moved, nudge in (*((untold, nudge) for nudge in _NUDGES), (free, 0.0)):
-            start = self.move(values, dict.fromkeys(moved, nudge), ratios)
-            met, gap = self.meet(start, moved, ratios)
-            if gap < _CLOSED * self.size:
-                pose = []
-                for name in self._moving:
-                    turn = inf if self._tree.joints[name].kind == 'prismatic' else tau
-                    if name not in ratios and abs(value := remainder(met[name], turn)) > _CLOSED:
-                        pose.append(f'{name}: {value:.6g}')
-                return f'near it all close: at: {{{", ".join(pose)}}}'
-        return 'give values of joints at which all loops close'
-
-
-def _product(one: Sequence[float], other: Sequence[float]) -> float:
-    return sum(a * b for a, b in zip(one, other, strict=True))
+        others = [name for name in untold if name not in driven]
+        drawn = Random(_SEED)
+        starts = [*product((True,), (others, untold, free), _NUDGES)]
+        starts += product((False,), (others, free), (0.0,))
+        for within_limits, moved, nudge in starts:
+            nudges = {name: self._draw(name, values[name], nudge, drawn) for name in moved}
+            start = self.move(values, nudges, ratios)
+            met, gap = self.meet(start, moved, ratios, is_far=True, within_limits=within_limits)
+            for name in moved:
+                if self._tree.joints[name].kind != 'prismatic' and not within_limits:
+                    met[name] = remainder(met[name], tau)
+            if gap < _CLOSED * self.size and (self.is_within_limits(met) or not within_limits):
+                return met
+        return None
 
 
 def _is_directed(loop: UrdfLoop) -> bool:

@@ -23,6 +23,7 @@ from linkage_ros.description.confinement import Confinement
 from linkage_ros.description.linkage_file import (
     looks_like_linkage,
     read_any_closure,
+    read_content,
     robot_content,
 )
 from linkage_ros.description.parameters import Kind, Parts
@@ -39,7 +40,7 @@ from linkage_ros.description.scene_grammar import (
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
-from linkage_ros.description.yaml_file import parse_yaml, read_yaml
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import (
     DefinitionError,
     did_you_mean,
@@ -112,7 +113,7 @@ def load_scene(
     file = named_file(file, 'scenes', 'linkages')
     if confinement is not None:
         confinement.refuse_file(file, None, '')
-    content, data = read_yaml(file)
+    content, data = read_content(file)
 
     def check_file(where: Section, key: str, named: Path) -> Path:
         if confinement is not None:
@@ -136,7 +137,7 @@ def load_scene(
                     'name one relative to the scene, or one that linkage gallery lists',
                 ),
             )
-        return read_yaml(linkage)
+        return read_content(linkage)
 
     source = _SceneSource(
         file.stem,
@@ -235,15 +236,17 @@ def parse_scene(
     linkages = iter([part for part in files if part != SCENE_FILE])
 
     def open_linkage(within: Section) -> tuple[Section, bytes]:
-        is_robot = isinstance(within.mapping.get('linkage'), dict)
-        robot = within.section('linkage') if is_robot else within.text('linkage')
+        is_told = isinstance(within.mapping.get('linkage'), dict)
+        robot = within.section('linkage') if is_told else None
+        named = within.text('linkage') if robot is None else ''
         part = next(linkages, None)
         if part is None:
             raise within.error('linkage', 'is not among the files', 'name another bag')
-        if isinstance(robot, Section):
-            robot.named_data = files[part]
-            return robot, files[part]
-        return parse_yaml(files[part], f'{where}: {part}'), files[part]
+        if robot is None and not part.endswith('.urdf'):
+            return parse_yaml(files[part], f'{where}: {part}'), files[part]
+        robot = robot or Section(f'{where}: {part}', '', {'urdf': named})
+        robot.named_data = files[part]
+        return robot, files[part]
 
     source = _SceneSource(name, folder, open_linkage, seed, trust_effects=trust_effects)
     return _build_scene(content, files[SCENE_FILE], source, settings)
@@ -252,7 +255,7 @@ def parse_scene(
 def files_of_scene(file: Path) -> Iterator[Path]:
     """Yield the files that a scene names; none for another file, or one that cannot be read."""
     try:
-        scene = read_yaml(file)[0].mapping
+        scene = read_content(file)[0].mapping
     except FileError:
         return
     linkages = scene.get('linkages')

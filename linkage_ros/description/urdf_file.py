@@ -62,6 +62,9 @@ LOOP_KINDS = {
 }  # fmt: skip
 """What closes a loop, by its type; without a type it is a ball, a pin in the plane."""
 
+UNREAD = 'unread'
+"""Tag of what is not read of a robot in another format, in words."""
+
 _USUAL_TAGS = (
     'link', 'joint', 'material', 'gazebo', 'transmission', 'ros2_control', 'linkage_start',
     'coupling', *_LOOP_TAGS,
@@ -172,11 +175,16 @@ def read_urdf_file(file: Path) -> bytes:
 
 def read_urdf(data: bytes, file: str) -> UrdfFile:
     """Read a URDF; a FileError has file, link or joint, and remedy."""
+    return _UrdfReader(file).read(parse_robot(data, file))
+
+
+def parse_robot(data: bytes, file: str) -> ET.Element:
+    """Return the root of a robot's XML; a FileError says why it cannot be read."""
     if b'<!DOCTYPE' in data.replace(b'\0', b''):  # also in UTF-16
-        reason = 'declares a document type, which a URDF does not need'
+        reason = 'declares a document type, which a robot does not need'
         raise FileError(file, '', reason, 'remove <!DOCTYPE …> and its entities')
     try:
-        root = ET.fromstring(data)
+        return ET.fromstring(data)
     except ET.ParseError as error:
         noun = kind_of_bytes(data).noun
         if noun not in ('a URDF', 'an XML file'):
@@ -186,10 +194,9 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
         raise FileError(file, '', reason, 'name a URDF file', line) from None
     except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration
         raise FileError(file, '', f'is not XML ({error})', 'name a URDF file') from None
-    return _Reader(file).read(root)
 
 
-class _Reader:
+class _UrdfReader:
     def __init__(self, file: str) -> None:
         self._file = file
 
@@ -502,7 +509,9 @@ def _unread_tags(root: ET.Element) -> Iterator[str]:
         ends = f'{joint.findtext("parent", "")} and {joint.findtext("child", "")}'
         yield f'joint {joint.get("name", "")} of <gazebo>, between {ends}'
     for element in root:
-        if isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
+        if element.tag == UNREAD:
+            yield element.get('of', '')
+        elif isinstance(element.tag, str) and element.tag not in _USUAL_TAGS:
             yield f'<{element.tag}>'
 
 

@@ -12,6 +12,7 @@ from math import floor, hypot, inf, sqrt
 import random
 
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput
+import numpy as np
 import pytest
 
 
@@ -107,3 +108,15 @@ def test_the_way_that_a_grid_follows_is_the_same_whatever_was_asked_before(seed)
     for inputs in draw(40):
         grid(*inputs)
     assert [grid.reach(inputs) for inputs in states] == fresh
+
+
+@pytest.mark.parametrize('count', [1, 2])
+@pytest.mark.parametrize('states', [0, 1, 30])
+def test_many_inputs_at_once_have_the_cells_of_each(states, count):
+    make, draw = sphere_grid(random.Random(states), count)
+    inputs, one_by_one = draw(states), make()
+    rows, found = make().rows_at(*np.array(inputs).reshape(states, count).T)
+    for number, given in enumerate(inputs):
+        cell = one_by_one(*given)
+        assert found[number] == (cell is not None)
+        assert cell is None or tuple(rows[:, number]) == cell

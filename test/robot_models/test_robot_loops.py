@@ -19,7 +19,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.description import linkage_content, parse_yaml
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure
-from linkage_ros.resources import spatial_linkage_names
+from linkage_ros.resources import named_file, spatial_linkage_names
 from linkage_ros.tools.models import model_of, ModelPart, urdf_model
 import numpy as np
 import pytest
@@ -480,8 +480,8 @@ def test_bad_robots_are_refused_in_one_line(tmp_path, case):
 
 
 def test_a_robot_that_a_linkage_file_cannot_be_is_said(tmp_path):
-    with pytest.raises(LinkageError, match='is no URDF; leave out input'):
-        linkage_content(Path('four_bar.yaml'), {'input': 'x'})
+    with pytest.raises(LinkageError, match='is not a robot; leave out input'):
+        linkage_content(named_file('four_bar', 'linkages'), {'input': 'x'})
     scene = parse_yaml(SCENE.encode(), 'legs.yaml')
     assert scene.section('linkage').text('urdf') == 'robots/ankle.urdf'
 

@@ -224,6 +224,8 @@ class Grid:
         rows, found = np.zeros((count, given.shape[1])), np.zeros(given.shape[1], bool)
         left = np.arange(given.shape[1])
         for level, width in enumerate(self.widths):
+            if not left.size:
+                break
             ways = np.clip((given[:, left] - home) / width, -_ALL, _ALL)
             places, of_states = np.unique(np.rint(ways), axis=1, return_inverse=True)
             with BUILD_LOCK:
@@ -236,8 +238,6 @@ class Grid:
             rows[:, left[proven]] = table[:, of_states[proven]]
             found[left[proven]] = True
             left = left[~proven]
-            if not left.size:
-                break
         return rows, found
 
     def _write_look_up(self) -> Callable[..., tuple[float, ...] | None]:

@@ -10,8 +10,9 @@ Rods whose balls are written as hinges: planned as rods, whatever their turn abo
 
 A robot's file has no balls: exporters write one as three hinges through one point, with two links
 that carry nothing else. A rod between two balls may turn about itself, and nothing else depends on
-that turn. So one hinge of a ball keeps its value: the one whose axis is most along the rod, since
-the other two then point the rod nearly everywhere. The plan has the links at that hinge as one.
+that turn. So one hinge of a ball keeps its value: the one whose axis is most along the rod, if the
+other two lie across each other, since these then point the rod nearly everywhere. The plan has the
+links at that hinge as one.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import combinations
 from typing import NamedTuple
 
 from linkage_ros.kinematics.plane.linkage import GROUND
@@ -37,8 +37,8 @@ from linkage_ros.kinematics.space.vectors import (
 )
 from linkage_ros.names import free_name
 
-_SQUARE = 1e-3
-"""Largest cosine of the angles between the axes of a ball."""
+_INDEPENDENT = 0.1
+"""Least volume that the axes of a ball span in the pose: 1 if they are at right angles."""
 
 
 class _Ball(NamedTuple):
@@ -141,7 +141,7 @@ def _ball(
     u, v = direction_of(one.axis), direction_of(two.axis)
     normal = cross(u, v)
     square = dot(normal, normal)
-    if max(abs(dot(a, b)) for a, b in combinations((u, v, direction_of(three.axis)), 2)) > _SQUARE:
+    if abs(dot(normal, direction_of(three.axis))) < _INDEPENDENT:
         return None
     # The point of the first axis that is nearest to the second.
     along = dot(cross(minus(two.at, one.at), v), normal) / square
@@ -153,10 +153,12 @@ def _ball(
 
 
 def _hinge_to_hold(linkage: SpaceLinkage, balls: list[_Ball]) -> str:
-    """Return the hinge whose axis is most along the rod, and lies across the two others."""
+    """Return the hinge that is most along the rod, where the others lie across each other."""
     rod = direction_of(minus(balls[1].place, balls[0].place))
-    along = {}
+    fitness = {}
     for ball in balls:
-        for name in ball.hinges:
-            along[name] = abs(dot(direction_of(linkage.hinges[name].axis), rod))
-    return max(along, key=along.__getitem__, default='')
+        axes = {name: direction_of(linkage.hinges[name].axis) for name in ball.hinges}
+        for name, axis in axes.items():
+            others = (other for of, other in axes.items() if of != name)
+            fitness[name] = abs(dot(axis, rod)) * length(cross(*others))
+    return max(fitness, key=fitness.__getitem__, default='')

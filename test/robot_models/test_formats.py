@@ -1,0 +1,294 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+
+"""Robots in SDF and MJCF, and a YAML file of closings beside a URDF: the states of the URDF."""
+
+from pathlib import Path
+
+from linkage_ros.description import load, load_scene, read_as_urdf
+from linkage_ros.errors import LinkageError
+from linkage_ros.tick import Pipeline
+import numpy as np
+import pytest
+
+ROBOTS = Path(__file__).parent / 'robots'
+ANKLE = {'input': ['pitch', 'roll']}
+STATES = [(0.0, 0.0), (0.1, 0.2), (-0.3, 0.15), (0.25, -0.3)]
+
+
+def joints_at(closure, inputs):
+    return dict(zip(closure.linkage.joints, closure.position(*inputs).joints, strict=True))
+
+
+def assert_same_states(closure, names, states=STATES, told=ANKLE):
+    """Compare joints, by their names here and there, with those of ankle.urdf."""
+    urdf = load(ROBOTS / 'ankle.urdf', told)
+    for inputs in states:
+        wanted, found = joints_at(urdf, inputs), joints_at(closure, inputs)
+        assert {name: found[here] for name, here in names.items()} == pytest.approx(
+            {name: wanted[name] for name in names}, abs=1e-13
+        )
+
+
+def test_sdf_has_the_states_of_the_urdf():
+    closure = load(ROBOTS / 'ankle.sdf', ANKLE)
+    names = {'m1': 'm1', 'm2': 'm2', 'rod1_y': 'rod1_ends_1', 'rod1_x': 'rod1_ends_2'}
+    assert_same_states(closure, names)
+    limits = closure.linkage.limits
+    assert (limits['roll'].low, limits['roll'].high) == (-0.4, 0.4)
+    assert 'm2' not in limits  # 1e16 is none
+
+
+def test_sdf_has_its_masses_in_the_pose_of_its_model():
+    mass = load(ROBOTS / 'ankle.sdf', ANKLE).linkage.masses['rod2']
+    # 0.1 below rod2 on the shin, and turned by 0.4 about x; the shin is turned in the model.
+    x, y, z = np.eye(3)
+    shin = rotation(z, -1) @ rotation(y, 0.2) @ rotation(x, 0.3)
+    turn = shin @ rotation(x, 0.4)
+    assert mass.mass == 0.1
+    assert mass.center == pytest.approx(
+        shin @ (0.040, -0.0165, 0.111) + (0.3, 0.1, -0.4), abs=1e-15
+    )
+    xx, xy, xz, yy, yz, zz = mass.inertia
+    assert np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) == pytest.approx(
+        turn @ np.diag([3e-4, 3e-4, 1e-5]) @ turn.T, abs=1e-17
+    )
+
+
+CLOSINGS = """\
+closed_loop: [[rod1_tip, foot_eye], ['rod2_tip_joint', foot_eye2]]
+type: ['3D', 6d]
+name_mot: [toe, pitch, roll]
+joint_name: [rod1_start, rod2_start, rod2_socket, gone, bolted]
+joint_type: [UJOINT_YX, UJOINT_YX, SPHERICAL, SPHERICAL, FIXED]
+"""
+
+
+def ankle_with_closings(folder):
+    """Write the ankle with rods of one joint each, and the file that says what they are."""
+    text = (ROBOTS / 'ankle.urdf').read_text('utf-8')
+    begin, end = text.index('<joint name="rod1_y"'), text.index('<joint name="m2"')
+    parts = [
+        text[:begin],
+        joint(
+            'rod1_start', 'revolute', 'bar1', 'rod1', '0 -0.004 -0.0165', '-1.5707963267948966 0 0'
+        ),
+        joint('rod1_tip_joint', 'fixed', 'rod1', 'rod1_tip', '-0.013 -0.0015 -0.156'),
+        joint('bolted', 'revolute', 'shin', 'cover', '0 0 0'),
+        text[end : text.index('<joint name="rod2_y"')],
+        joint('rod2_start', 'revolute', 'bar2', 'rod2', '0 -0.0165 -0.004'),
+        joint('rod2_socket', 'revolute', 'rod2', 'rod2_tip', '-0.018 0.0015 -0.221'),
+        joint('rod2_tip_joint', 'fixed', 'rod2_tip', 'rod2_eye', '0 0 0'),
+        joint('foot_eye_joint', 'fixed', 'foot', 'foot_eye', '0.022 0.015 0.008'),
+        joint('foot_eye2_joint', 'fixed', 'foot', 'foot_eye2', '0.022 -0.015 0.008'),
+        '</robot>',
+    ]
+    (folder / 'robot.urdf').write_text('\n'.join(parts))
+    (folder / 'robot.yaml').write_text(CLOSINGS)
+    return folder / 'robot.yaml'
+
+
+def joint(name, kind, parent, child, xyz, rpy='0 0 0'):
+    return (
+        f'<link name="{child}"/><joint name="{name}" type="{kind}"><parent link="{parent}"/>'
+        f'<child link="{child}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="0 0 1"/></joint>'
+    )
+
+
+def test_closings_beside_a_urdf_have_the_states_of_one_that_says_them(tmp_path):
+    closure = load(ankle_with_closings(tmp_path))
+    assert [driven.joint for driven in closure.linkage.inputs] == ['pitch', 'roll']
+    names = {'m1': 'm1', 'm2': 'm2', 'rod1_y': 'rod1_start_Y', 'rod1_x': 'rod1_start_X',
+             'rod2_y': 'rod2_start_Y', 'rod2_x': 'rod2_start_X'}  # fmt: skip
+    assert_same_states(closure, names)
+    assert 'SPHERICAL of gone, which is no joint (not read)' in closure.linkage.left_out
+
+
+def test_a_bag_has_such_a_robot_as_one_urdf(tmp_path):
+    file = ankle_with_closings(tmp_path)
+    (tmp_path / 'scene.yaml').write_text('linkage: robot.yaml\nrate: 100\n')
+    scene = load_scene(tmp_path / 'scene.yaml')
+    assert scene.files['linkage.urdf'] == read_as_urdf(file)
+    assert Pipeline(scene).linkages
+
+
+def mujoco_gap(model, data, closure, inputs):
+    """Return by how much MuJoCo's own kinematics miss the closings at the closure's joints."""
+    import mujoco
+
+    values = joints_at(closure, inputs)
+    values |= dict(zip((each.joint for each in closure.linkage.inputs), inputs, strict=True))
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_kinematics(model, data)
+    for number in range(model.njnt):
+        name, address = model.joint(number).name, model.jnt_qposadr[number]
+        if model.jnt_type[number] == mujoco.mjtJoint.mjJNT_BALL:
+            # Turns about the axes of the world in the pose, as a turn about the body's own.
+            body = data.body(name).xmat.reshape(3, 3)
+            turn = np.eye(3)
+            for letter, axis in zip('123', np.eye(3), strict=True):
+                turn = turn @ rotation(axis, values[f'{name}_{letter}'])
+            quaternion = np.zeros(4)
+            mujoco.mju_mat2Quat(quaternion, (body.T @ turn @ body).reshape(-1))
+            data.qpos[address : address + 4] = quaternion
+        else:
+            data.qpos[address] = values[name]
+    mujoco.mj_forward(model, data)
+    return np.abs(data.efc_pos[: data.ne]).max()
+
+
+def rotation(axis, angle):
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_mjcf_closes_as_mujoco_has_it():
+    mujoco = pytest.importorskip('mujoco')
+    closure = load(ROBOTS / 'cassie_leg.xml', {'near': True})
+    assert [driven.joint for driven in closure.linkage.inputs] == ['knee', 'foot']
+    text = (ROBOTS / 'cassie_leg.xml').read_text('utf-8')
+    for part in ('<asset><mesh name="shin" file="shin.obj"/></asset>',
+                 '<geom type="mesh" mesh="shin"/>'):  # fmt: skip
+        text = text.replace(part, '')
+    text = text.replace('<compiler ', '<compiler boundmass="1" boundinertia="1" ')
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    draw = np.random.default_rng(7)
+    for knee, foot in draw.uniform(np.radians([-110, -120]), np.radians([-45, -50]), (50, 2)):
+        assert mujoco_gap(model, data, closure, (knee, foot)) < 1e-12
+
+
+def test_mjcf_ties_joints_by_polynomials_and_tendons(tmp_path):
+    pytest.importorskip('mujoco')
+    (tmp_path / 'tied.xml').write_text("""\
+<mujoco><worldbody>
+  <body name="arm"><joint name="a" axis="0 0 1"/>
+    <body name="hand" pos="1 0 0"><joint name="b" axis="0 0 1"/>
+      <body name="tip" pos="1 0 0"><joint name="c" axis="0 0 1"/></body></body></body>
+</worldbody>
+<tendon>
+  <fixed name="cord"><joint joint="b" coef="2"/><joint joint="c" coef="-0.5"/></fixed>
+</tendon>
+<equality><joint joint1="b" joint2="a" polycoef="0.1 -3 0 0 0"/><tendon tendon1="cord"/></equality>
+<actuator><position joint="a"/></actuator></mujoco>
+""")
+    closure = load(tmp_path / 'tied.xml')
+    # The tendon keeps its length at 0: 2 b = 0.5 c.
+    b = 0.1 - 3.0 * 0.2
+    assert joints_at(closure, (0.2,)) == pytest.approx({'b': b, 'c': 4.0 * b}, abs=1e-15)
+
+
+@pytest.mark.parametrize('turns', [(90, -90, 90), (-90, 90, 90), (37, 143, -10)])
+def test_mjcf_may_begin_at_any_values_of_its_joints(tmp_path, turns):
+    mujoco = pytest.importorskip('mujoco')
+    ref = [f'ref="{turn}"' for turn in turns]
+    text = f"""\
+<mujoco><compiler boundmass="1" boundinertia="1"/><worldbody>
+  <body name="crank"><joint name="a" axis="0 1 0" {ref[0]}/>
+    <body name="coupler" pos="0 0 0.04" euler="0 70 0">
+      <joint name="b" axis="0 1 0" {ref[1]}/></body>
+  </body>
+  <body name="rocker" pos="0.1 0 0"><joint name="c" axis="0 -1 0" {ref[2]}/></body>
+</worldbody>
+<equality><connect body1="coupler" body2="rocker" anchor="0 0 0.12"/></equality></mujoco>
+"""
+    (tmp_path / 'bars.xml').write_text(text)
+    closure = load(tmp_path / 'bars.xml', {'input': ['a']})
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    start = np.radians(turns[0])
+    for angle in np.linspace(start - 0.3, start + 0.3, 7):
+        assert mujoco_gap(model, data, closure, (angle,)) < 1e-14
+
+
+SDF = '<sdf version="1.7"><model name="m">{}</model></sdf>'
+LINK = '<link name="a"/><link name="b"/>'
+HINGE = (
+    '<joint name="j" type="revolute"><parent>a</parent><child>b</child>'
+    '<axis><xyz>0 0 1</xyz></axis></joint>'
+)
+BODY = '<mujoco><worldbody><body name="b"><joint name="j"/></body></worldbody>{}</mujoco>'
+REFUSED = {
+    'two models': ('r.sdf', SDF.replace('</model>', '</model><model name="n"/>'),
+                   'r.sdf: has 2 models: m, n; keep one'),
+    'a nested model': ('r.sdf', SDF.format('<include/>'),
+                       ('r.sdf: model m: has a nested <include>; write one model without others: '
+                       'gz sdf -p FILE')),
+    'a pose in a circle': ('r.sdf', SDF.format('<link name="a"><pose relative_to="b"/></link>'
+                           '<link name="b"><pose relative_to="a"/></link>' + HINGE),
+                           'r.sdf: b: its pose is relative to itself; name another frame'),
+    'a frame that is not there': ('r.sdf', SDF.format(
+        '<link name="a"><pose relative_to="bb"/></link><link name="b"/>' + HINGE),
+        "r.sdf: there is no frame 'bb'; did you mean 'b'?"),
+    'a pose of five numbers': ('r.sdf', SDF.format(
+        '<link name="a"><pose>1 2 3 4 5</pose></link><link name="b"/>' + HINGE),
+        "r.sdf: link a: '1 2 3 4 5' is not 6 finite numbers; correct it"),
+    'a screw': ('r.sdf', SDF.format(LINK + HINGE.replace('revolute', 'screw')),
+                ("r.sdf: joint j: type='screw' is not read; write revolute, continuous, "
+                 'prismatic, ball, fixed, universal, revolute2')),
+    'a link on its own': ('r.sdf', SDF.format(LINK + '<link name="c"/>' + HINGE),
+                          'r.sdf: no joint leads from world to c; write a joint of type fixed'),
+    'no axis': ('r.sdf', SDF.format(LINK + HINGE.replace('0 0 1', '0 0 0')),
+                'r.sdf: joint j: its axis is 0 0 0; write 0 0 1, for example'),
+    'another file': ('r.xml', BODY.format('<include file="/etc/passwd"/>'),
+                     ('r.xml: has an element <include>; write one file without others: '
+                     'mj_saveLastXML')),
+    'a plugin': ('r.xml', BODY.format('<extension><plugin plugin="a"/></extension>'),
+                 ('r.xml: has an element <plugin>; write one file without others: '
+                  'mj_saveLastXML')),
+    'no model of MuJoCo': ('r.xml', BODY.replace('name="j"', 'nam="j"').format(''),
+                           ('r.xml: is refused by MuJoCo (XML Error: Schema violation: '
+                           "unrecognized attribute: 'nam'); correct the file")),
+    'a weld that is open': ('r.xml', BODY.format(
+        '<equality><weld body1="b" relpose="0 0 1 1 0 0 0"/></equality>'),
+        ('r.xml: weld closing_1: holds its bodies 1 from their pose in the file; leave relpose '
+        'out, or write the pose in which it holds')),
+    'closings without a URDF': ('r.yaml', 'closed_loop: [[a, b]]',
+                                ('r.yaml: closed_loop: closes loops of no URDF; write the URDF '
+                                'beside it as r.urdf')),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_a_robot_that_cannot_be_read_is_refused_in_a_line(tmp_path, monkeypatch, case):
+    name, text, line = REFUSED[case]
+    if name.endswith('.xml'):
+        pytest.importorskip('mujoco')
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text(text)
+    with pytest.raises(LinkageError) as caught:
+        load(Path(name), {'input': ['j']})
+    assert str(caught.value) == line
+
+
+WRONG_CLOSINGS = {
+    'a frame that is not there': (
+        'foot_eye2]]', 'foot_ey2]]',
+        "1: closed_loop: there is no 'foot_ey2'; did you mean 'foot_eye2'?"),
+    'no pair': ("['rod2_tip_joint', foot_eye2]", 'rod2_tip',
+                "1: closed_loop: 'rod2_tip' is not a pair; write [FRAME, FRAME]"),
+    'an unknown type': ("'3D', 6d", "'3D', 5d", "2: type: there is no '5d'; name one of 3d, 6d"),
+    'a type too few': ("'3D', 6d", "'3D'", '2: type: has 1 entries; write 2 of them'),
+    'a motor that is no joint': ('toe, pitch', 'toe, pich',
+                                 "3: name_mot: there is no 'pich'; did you mean 'pitch'?"),
+    'a key that is not known': (
+        'name_mot', 'name_mott', "3: name_mott: unknown key; did you mean 'name_mot'?"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('case', WRONG_CLOSINGS)
+def test_wrong_closings_are_refused_in_a_line(tmp_path, case):
+    old, new, line = WRONG_CLOSINGS[case]
+    file = ankle_with_closings(tmp_path)
+    assert CLOSINGS.count(old) == 1
+    file.write_text(CLOSINGS.replace(old, new))
+    with pytest.raises(LinkageError) as caught:
+        load(file)
+    assert str(caught.value) == f'{file}:{line}'
