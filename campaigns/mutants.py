@@ -69,7 +69,7 @@ TESTS: dict[str, Sequence[str]] = {
     'kinematics/plane/diagonals': KINEMATICS,
     'kinematics/plane/rail': KINEMATICS,
     'kinematics/analysis/ranges': ('kinematics/test_ranges.py', *KINEMATICS),
-    'kinematics/iterated/newton_group': ('kinematics/test_iteration.py', *KINEMATICS),
+    'kinematics/iterated/iterated_step': ('kinematics/test_iteration.py', *KINEMATICS),
     'kinematics/iterated/branch': ('kinematics/test_branches.py', *KINEMATICS),
     'kinematics/space/plan': ('kinematics/space',),
     'kinematics/space/steps': ('kinematics/space',),

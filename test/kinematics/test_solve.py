@@ -384,14 +384,14 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, mon
 
 def test_every_kind_of_step_is_tested():
     steps = [step for name in (*KINDS, *OTHERS, EXCHANGED) for step in case_of(name)[0].steps]
-    diagonals, dyads, newton_group, rail = (
+    diagonals, dyads, iterated_step, rail = (
         import_module(f'linkage_ros.kinematics.{name}')
-        for name in ('plane.diagonals', 'plane.dyads', 'iterated.newton_group', 'plane.rail')
+        for name in ('plane.diagonals', 'plane.dyads', 'iterated.iterated_step', 'plane.rail')
     )
     kinds = [
         import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
     ]
-    assert {type(step) for step in steps} == classes_with('close', step, newton_group, *kinds)
+    assert {type(step) for step in steps} == classes_with('close', step, iterated_step, *kinds)
     parts = [one.span for one in steps if one.span is not one]
     wanted = classes_with('diagonal_at', diagonals) | classes_with('pin_at', rail)
     assert {type(part) for part in parts if part is not None} == wanted

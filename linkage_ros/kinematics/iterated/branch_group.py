@@ -116,11 +116,11 @@ class BranchGroup(IteratedGroup):
     ) -> list[float] | None:
         """Return the numbers of a line at an input, or None."""
         given = LinkState([x], []), LinkState([*values], [])
-        found = line(*given)
+        found: list[float] | None = line(*given)
         if found is None:
             # The steps before may decide otherwise than in the pose.
             with suppress(UndecidedError):
-                found = [*line.function(*given)]
+                return [*line.function(*given)]
         return found
 
     def _list_place(self, given: LinkState, pose: LinkState) -> list[float]:

@@ -266,30 +266,48 @@ class GridGroup(IteratedGroup):
         for k, rate in zip(self.inputs, direction, strict=True):
             rates.coordinates[k] = rate
         slopes = self._list_rates(given, pose, rates)
-        still = LinkState([0.0] * len(given.coordinates), [])
-        bends = self._list_accelerations(given, pose, rates, LinkState(slopes, []), still)
-        return [*slopes, *(0.5 * bend for bend in bends)]
+        bends = self._list_bends(given, pose, rates, slopes)
+        return [*self._free_of(slopes), *(0.5 * bend for bend in bends)]
+
+    def _free_of(self, values: Sequence[Any]) -> list[Any]:
+        return [values[k] for k in self._equations.free]
+
+    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
+        """Return the rates of all unknowns at rates of the inputs."""
+        states = self._before.moving_at(given.coordinates, rates.coordinates)
+        known, velocities = require_state(states)
+        unknowns = self._equations.complete(pose.coordinates, known)
+        return self._equations.solve_rates(known, unknowns, velocities)
+
+    def _list_bends(
+        self, given: LinkState, pose: LinkState, rates: LinkState, slopes: Sequence[Any]
+    ) -> list[Any]:
+        """Return the accelerations of the free unknowns at steady rates of the inputs."""
+        still = [0.0] * len(given.coordinates)
+        states = self._before.changing_at(given.coordinates, rates.coordinates, still)
+        known, velocities, changes = require_state(states)
+        unknowns = self._equations.complete(pose.coordinates, known)
+        return self._free_of(
+            self._equations.solve_accelerations(known, unknowns, velocities, slopes, changes)
+        )
 
     def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""
         slopes: list[Any] = []
         squares: dict[tuple[int, int], list[Any]] = {}
         alone: dict[int, list[Any]] = {}
-        still = LinkState([0.0] * len(given.coordinates), [])
 
         def rates_along(*inputs: int) -> LinkState:
             return LinkState([float(k in inputs) for k in range(len(given.coordinates))], [])
 
         for one in self.inputs:
             alone[one] = self._list_rates(given, pose, rates_along(one))
-            slopes += alone[one]
+            slopes += self._free_of(alone[one])
         for one, other in combinations_with_replacement(self.inputs, 2):
             along, found = rates_along(one, other), alone[one]
             if one != other:
                 found = [a + b for a, b in zip(found, alone[other], strict=True)]
-            squares[one, other] = self._list_accelerations(
-                given, pose, along, LinkState(found, []), still
-            )
+            squares[one, other] = self._list_bends(given, pose, along, found)
         bends = []
         for (one, other), both in squares.items():
             if one == other:

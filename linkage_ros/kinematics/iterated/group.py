@@ -16,7 +16,7 @@ from linkage_ros.kinematics.arithmetic import UndecidedError
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.compiling import Tape
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
-from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
+from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
 
@@ -28,7 +28,7 @@ _REMEMBERED = 1024
 
 
 class GroupPose(NamedTuple):
-    """The unknowns at a state, and what their angles gain by the turns before, in [rad]."""
+    """The unknowns at a state, and what they gain by the turns before; nothing if it is open."""
 
     status: Status
     unknowns: Sequence[Any]
@@ -56,23 +56,11 @@ class Equations(Protocol):
     def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
         """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
 
-    def solve_rates(
-        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the unknowns."""
-
-    def solve_accelerations(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        """Return the accelerations of the unknowns."""
-
     def shortfalls(self, known: LinkState) -> list[Any]:
         """Return lengths by which parts of the links are too short to close, where positive."""
+
+    def missing_length(self, known: LinkState) -> float | None:
+        """Return by how much a part has no length; None if all have some."""
 
     # The same and those of pins, by all unknowns
 
@@ -110,13 +98,55 @@ class Equations(Protocol):
     def is_meshed(self, off: Sequence[float], part: float) -> bool:
         """Return whether the errors of ratios are off by less than a part of their periods."""
 
+    def solve_rates(
+        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
+    ) -> list[Any]:
+        """Return the rates of the unknowns."""
+
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns."""
+
+    # The links, as coordinates and pins
+
+    def place(self, known: LinkState, unknowns: Sequence[Any], gained: Sequence[Any]) -> LinkState:
+        """Return the links; ``gained`` is added to the unknowns."""
+
+    def move(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+    ) -> LinkState:
+        """Return the rates of the links."""
+
+    def change(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+        accelerations: Sequence[Any],
+    ) -> LinkState:
+        """Return the accelerations of the links."""
+
+    def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:
+        """Return numbers in which two solutions differ if a link lies elsewhere, in lengths."""
+
 
 class IteratedGroup:
     """
     Equations after the steps ``before``, as a function of the inputs with the numbers ``inputs``.
 
-    ``start`` has unknowns in the pose. What takes numbers is straight-line code, with the steps
-    before in it.
+    ``start`` has unknowns in the pose.
     """
 
     def __init__(
@@ -129,12 +159,6 @@ class IteratedGroup:
         self._equations, self._before, self._start = equations, before, tuple(start)
         self.inputs = tuple(inputs)
         self._slow: dict[tuple[float, ...], GroupPose] = {}
-        given, pose = LinkState([*before.inputs], []), LinkState([*start], [])
-        self._solution_line = compile_later(self._list_solution, given)
-        self._rates_line = compile_later(self._list_rates, given, pose, given)
-        self._accelerations_line = compile_later(
-            self._list_accelerations, given, pose, given, pose, given
-        )
 
     def close_straight(self, known: LinkState) -> GroupPose:
         """
@@ -144,19 +168,6 @@ class IteratedGroup:
         is raised.
         """
         raise NotImplementedError
-
-    def close(self, solved: LinkState) -> GroupPose:
-        """Return the links."""
-        if has_symbols(solved):
-            return self.close_straight(solved)
-        pose = self.remembered_pose(solved)
-        if pose is not None:
-            return pose
-        numbers = self._solution_line(self._inputs_of(solved))
-        if numbers is None:
-            return self.close_slowly(solved)
-        count = len(numbers) // 2
-        return GroupPose(Status.CLOSED, numbers[:count], numbers[count:])
 
     def remembered_pose(self, solved: LinkState) -> GroupPose | None:
         """Return the links of a state that straight lines did not lead to before."""
@@ -180,65 +191,6 @@ class IteratedGroup:
 
     def _key_of(self, solved: LinkState) -> tuple[float, ...]:
         return tuple([solved.coordinates[1 + k] for k in self.inputs])
-
-    def rates(
-        self, solved: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> Sequence[Any]:
-        """Return the rates of the unknowns."""
-        found = None
-        if not has_symbols(solved, velocities):
-            pose = LinkState([*unknowns], [])
-            found = self._rates_line(self._inputs_of(solved), pose, self._inputs_of(velocities))
-        return found or self._equations.solve_rates(solved, unknowns, velocities)
-
-    def accelerations(
-        self,
-        solved: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> Sequence[Any]:
-        """Return the accelerations of the unknowns."""
-        found = None
-        if not has_symbols(solved, velocities, changes):
-            known, moving, changing = map(self._inputs_of, (solved, velocities, changes))
-            pose, speeds = LinkState([*unknowns], []), LinkState([*rates], [])
-            found = self._accelerations_line(known, pose, moving, speeds, changing)
-        return found or self._equations.solve_accelerations(
-            solved, unknowns, velocities, rates, changes
-        )
-
-    def _inputs_of(self, state: LinkState) -> LinkState:
-        """Return the inputs of a state, or their derivatives."""
-        end = 1 + len(self._before.inputs)
-        return LinkState(state.coordinates[1:end], [])
-
-    def _list_solution(self, given: LinkState) -> list[Any]:
-        known = require_state(self._before.known_at(given.coordinates))
-        pose = self.close_straight(known)
-        if pose.status is not Status.CLOSED:
-            raise UndecidedError
-        return [*pose.unknowns, *pose.gained]
-
-    def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
-        states = self._before.moving_at(given.coordinates, rates.coordinates)
-        known, velocities = require_state(states)
-        return self._equations.solve_rates(known, pose.coordinates, velocities)
-
-    def _list_accelerations(
-        self,
-        given: LinkState,
-        pose: LinkState,
-        rates: LinkState,
-        speeds: LinkState,
-        accelerations: LinkState,
-    ) -> list[Any]:
-        states = self._before.changing_at(*(x.coordinates for x in (given, rates, accelerations)))
-        known, velocities, changes = require_state(states)
-        return self._equations.solve_accelerations(
-            known, pose.coordinates, velocities, speeds.coordinates, changes
-        )
 
 
 def find_inputs(

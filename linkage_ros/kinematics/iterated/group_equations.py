@@ -17,26 +17,44 @@ the places are the constants 1 and −1, which the elimination takes first.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import prod
-from typing import Any, NamedTuple
+from operator import add
+from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
+from linkage_ros.errors import DefinitionError, list_names
+from linkage_ros.kinematics.arithmetic import (
+    make_vector,
+    SMALLEST,
+    UndecidedError,
+    unit_vector,
+)
 from linkage_ros.kinematics.iterated.bend_bounds import ArmSums, list_bounds
 from linkage_ros.kinematics.iterated.elimination import Elimination, is_zero, subtract
 from linkage_ros.kinematics.iterated.equations import (
     bound_jacobian_change,
     CoincidentPoints,
     Constraint,
+    Constraints,
     differentiate_constraints,
     End,
     evaluate_constraints,
     GroupMotion,
     is_meshed,
+    OnLine,
 )
+from linkage_ros.kinematics.iterated.grid import grid_inputs
 from linkage_ros.kinematics.iterated.group import Solve
+from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
+from linkage_ros.kinematics.iterated.steps_before import StepsBefore
+from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.plane.rough_pose import close_in_pose, guess_unknowns
+from linkage_ros.kinematics.plane.topology import Iterated, Joint
 from linkage_ros.kinematics.step import LinkState
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.plane.solved_links import SolvedLinks
 
 
 class _PlacedBody(NamedTuple):
@@ -51,11 +69,13 @@ class GroupEquations:
     """
     As many equations as unknowns: for each of ``bodies`` links its angle and its place.
 
-    ``free`` has the indices of the unknowns that no pin gives.
+    ``free`` has the indices of the unknowns that no pin gives, ``slides`` are appended to them.
     """
 
-    def __init__(self, constraints: Sequence[Constraint], bodies: int) -> None:
-        self._constraints = constraints
+    def __init__(
+        self, constraints: Sequence[Constraint], slides: Iterable[OnLine], bodies: int
+    ) -> None:
+        self._constraints, self._slides = constraints, tuple(slides)
         self._count = 3 * bodies
         self._placed = _place_bodies(constraints, bodies)
         by_pins = {each.end.body for each in self._placed}
@@ -128,26 +148,8 @@ class GroupEquations:
         bounds = self._sums.bound_bends(self._closing_constraints[number], unknowns, known)
         return list_bounds(bounds, self.free)
 
-    def solve_rates(
-        self, known: LinkState, values: Sequence[Any], velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the free unknowns."""
-        rates = self._all_rates(known, self.complete(values, known), velocities)
-        return [rates[k] for k in self.free]
-
-    def solve_accelerations(
-        self,
-        known: LinkState,
-        values: Sequence[Any],
-        velocities: LinkState,
-        _rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        """Return the accelerations of the free unknowns."""
-        unknowns, still = self.complete(values, known), [0.0] * self._count
-        rates = self._all_rates(known, unknowns, velocities)
-        found = self.solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
-        return [found[k] for k in self.free]
+    def missing_length(self, _known: LinkState) -> None:
+        """Return nothing: no part has a length that an input sets."""
 
     # All equations, as functions of all unknowns; see `BranchGroup` and `NewtonSystem`
 
@@ -176,18 +178,76 @@ class GroupEquations:
         """Return whether the residuals of ratios are off by less than a part of their periods."""
         return is_meshed(self._constraints, off, part)
 
-    def _all_rates(
+    def solve_rates(
         self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
     ) -> list[Any]:
-        return self.solve_motion(GroupMotion(unknowns, known, [0.0] * self._count, velocities))
+        """Return the rates of the unknowns."""
+        return self._solve_motion(GroupMotion(unknowns, known, [0.0] * self._count, velocities))
 
-    def solve_motion(self, motion: GroupMotion) -> list[Any]:
+    def solve_accelerations(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the accelerations of the unknowns."""
+        still = [0.0] * self._count
+        return self._solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
+
+    def _solve_motion(self, motion: GroupMotion) -> list[Any]:
         """Return the highest derivatives of the unknowns, for a motion that has 0 for them."""
         drift = differentiate_constraints(self._constraints, motion)
         # On a tape the matrix is that of rates and of accelerations, and is there only once.
         jacobian = evaluate_constraints(self._constraints, motion.unknowns, motion.solved)[1]
         right = [0.0 if is_zero(each) else -each for each in drift]
         return Elimination(jacobian, self._unit_pivots).solve(right)
+
+    # The links: the angles of the bodies and the slides, and the places of the bodies
+
+    def place(self, known: LinkState, unknowns: Sequence[Any], gained: Sequence[Any]) -> LinkState:
+        """Return the links; ``gained`` is added to the angles."""
+        angles = map(add, unknowns[0::3], gained[0::3])
+        slides = (slide.place(unknowns, known).real for slide in self._slides)
+        return LinkState([*angles, *slides], _body_places(unknowns))
+
+    def move(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+    ) -> LinkState:
+        """Return the rates of the links."""
+        return self._list_changes(GroupMotion(unknowns, known, rates, velocities))
+
+    def change(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+        accelerations: Sequence[Any],
+    ) -> LinkState:
+        """Return the accelerations of the links."""
+        return self._list_changes(
+            GroupMotion(unknowns, known, rates, velocities, accelerations, changes)
+        )
+
+    def _list_changes(self, motion: GroupMotion) -> LinkState:
+        values, _ = motion.highest
+        slides = (slide.measured_change(motion) for slide in self._slides)
+        return LinkState([*values[0::3], *slides], _body_places(values))
+
+    def list_places(self, _known: LinkState, unknowns: Sequence[float]) -> list[complex]:
+        """Return the directions and places of the bodies."""
+        return [*map(unit_vector, unknowns[0::3]), *_body_places(unknowns)]
+
+
+def _body_places(values: Sequence[Any]) -> list[Any]:
+    return list(map(make_vector, values[1::3], values[2::3]))
 
 
 def _place_bodies(constraints: Sequence[Constraint], bodies: int) -> list[_PlacedBody]:
@@ -210,3 +270,39 @@ def _place_bodies(constraints: Sequence[Constraint], bodies: int) -> list[_Place
         # Where nothing places a body, its own place is free, and others may follow from it.
         unknown.remove(unknown[0] if pin is None else pin.end.body)
     return placed
+
+
+def make_iterated_step(
+    linkage: Linkage, group: Iterated, joints: Sequence[Joint], planner: SolvedLinks
+) -> tuple[IteratedStep, list[str]]:
+    """
+    Return the step that solves a group of links, and the sliders that it appends.
+
+    A DefinitionError says that there is no pose, or that it has too few points of a link.
+    """
+    if linkage.pose is None:
+        raise DefinitionError(
+            'pose',
+            f'is missing: no dyad covers {list_names(group.links)}, they are solved by iteration',
+            'give inputs, and where points of these links lie then: '
+            'pose: {inputs: [...], points: {...}}',
+        )
+    found = Constraints(linkage, joints, group.links, planner, group.ratios)
+    solved = close_in_pose(linkage, planner.scale, planner.steps)
+    inputs = tuple(solved.coordinates[1 : 1 + len(linkage.inputs)])
+    pins = {name: solved.pins[i] for name, i in found.known_pins.items()}
+    start = guess_unknowns(linkage, group.links, planner, pins, solved)
+    far = sum(
+        max(abs(one - other) for one in points.values() for other in points.values())
+        for points in planner.points.values()
+    )
+    step = IteratedStep(
+        GroupEquations(found.constraints, found.slides.values(), len(group.links)),
+        StepsBefore(tuple(planner.steps), inputs),
+        (len(solved.coordinates), len(solved.pins)),
+        start,
+        grid_inputs(linkage.inputs, inputs, planner.scale),
+        far,
+        found.turns,
+    )
+    return step, [*found.slides]

@@ -11,8 +11,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 from typing import Any
 
+from linkage_ros.generated_code import define_function
 from linkage_ros.kinematics.arithmetic import UndecidedError
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.compiling import compile_line
@@ -26,8 +28,8 @@ class StraightLine:
     A function of states, or of lists, as straight-line code for numbers, with a tape's bits.
 
     ``examples`` returns states as symbols; what is a number there is the same at all states.
-    Without them the code is compiled at the first states. It returns None where the function
-    would decide otherwise.
+    Without them the code is compiled at the first states. What it returns is nested as what the
+    function returns; None where the function would decide otherwise.
     """
 
     __slots__ = ('_examples', '_line', 'function')
@@ -41,33 +43,63 @@ class StraightLine:
         self._examples = examples
         self._line: Callable[..., Any] | None = None
 
-    def __call__(self, *states: Sequence[Any]) -> list[float] | None:
-        """Return the numbers of the function."""
+    def __call__(self, *states: Sequence[Any]) -> Any:
+        """Return what the function returns, or None."""
         if self._line is None:
             with BUILD_LOCK:
                 self._line = self._compile(self._examples() or states)
         try:
-            found = self._line(*list_numbers(states))
+            return self._line(*states)
         except (ValueError, OverflowError, ZeroDivisionError):
             return None  # Numbers overflow: it is no function of them.
-        return found and list(found[0])
 
     def _compile(self, states: Sequence[Sequence[Any]]) -> Callable[..., Any]:
-        examples = list_numbers(states)
+        examples, found = list_numbers(states), None
         varying = list(map(_is_symbol, examples))
         values = [one.operation.value if _is_symbol(one) else one for one in examples]
         if not any(varying):
             varying = [True] * len(varying)
 
         def compute(*numbers: Any) -> Sequence[Any]:
+            nonlocal found
             given = zip(numbers, values, varying, strict=True)
             left = iter([number if varies else value for number, value, varies in given])
-            return self.function(*(_fill_numbers(state, left) for state in states))
+            found = self.function(*(_fill_numbers(state, left) for state in states))
+            return list_numbers(found)
 
         try:
-            return compile_line(compute, values)
+            return _nest_call(compile_line(compute, values), states, found)
         except UndecidedError:
             return lambda *_: None
+
+
+def _nest_call(line: Callable[..., Any], states: Sequence[Any], result: Any) -> Callable[..., Any]:
+    """Return a line that takes and returns numbers as one of states, nested as the result."""
+    given = [f'x{k}' for k in range(len(list_numbers(states)))]
+    types: dict[str, Any] = {}
+    returned = _part_text(result, (f'found[{k}]' for k in count()), types)
+    source = f"""\
+def call(*states):
+    {_part_text(tuple(states), iter(given))} = states
+    found = line({', '.join(given)})
+    if found is not None:
+        found, = found
+        return {returned}
+"""
+    return define_function(source, 'call', {'line': line, **types})  # type: ignore[no-any-return]
+
+
+def _part_text(part: Any, names: Iterator[str], types: dict[str, Any] | None = None) -> str:
+    """Return the text of nested names; with ``types``, which it fills, tuples with fields too."""
+    if not isinstance(part, _PARTS):
+        return next(names)
+    text = ''.join(f'{_part_text(each, names, types)}, ' for each in part)
+    if isinstance(part, list):
+        return f'[{text}]'
+    if types is None or not hasattr(part, '_fields'):
+        return f'({text})'
+    types[type(part).__name__] = type(part)
+    return f'{type(part).__name__}({text})'
 
 
 def list_numbers(parts: Sequence[Any]) -> list[Any]:

@@ -20,7 +20,7 @@ from cmath import rect
 from math import tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.iterated.newton_group import Iteration
+from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
 from linkage_ros.kinematics.plane.topology import Iterated
 import numpy as np
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.plane.closure import Closure
 
 STARTS = 400
-_SEED = 1
 _SAME = 1e-6
 """Largest difference of angles [rad] and places [lengths] within one assembly."""
 
@@ -55,34 +54,14 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
     (step,) = (
         step
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
-        if owner == number and isinstance(step, Iteration)
+        if owner == number and isinstance(step, IteratedStep)
     )
-    solutions = _search_solutions(step)
-    if not solutions:
-        return []
-    first, *others = solutions
     return [
         Assembly(
             _pose_points(closure, group, unknowns), _turns_to_reach(closure, group, step, unknowns)
         )
-        for unknowns in others
-        if not _are_same(unknowns, first)
+        for unknowns in map(np.array, step.other_solutions(STARTS))
     ]
-
-
-def _search_solutions(step: Iteration) -> list[Array]:
-    """Return the solutions at the pose's inputs, first the pose itself."""
-    first = step.solution
-    if first is None:
-        return []
-    solutions = [first]
-    rng = np.random.default_rng(_SEED)
-    for _ in range(STARTS):
-        angles = rng.uniform(-np.pi, np.pi, len(first) // 3)
-        solution = step.solution_from(angles)
-        if solution is not None and not any(_are_same(solution, one) for one in solutions):
-            solutions.append(solution)
-    return solutions
 
 
 def _are_same(one: Array, other: Array) -> bool:
@@ -107,15 +86,16 @@ def _pose_points(closure: Closure, group: Iterated, unknowns: Array) -> dict[str
     return places
 
 
-def _turns_to_reach(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:
+def _turns_to_reach(closure: Closure, group: Iterated, step: IteratedStep, unknowns: Array) -> int:
     """Return the number of turns after which the pose's branch reaches a solution; 0 if never."""
-    if len(step.inputs) > 1 or closure.linkage.inputs[0].slider:
+    if len(closure.linkage.inputs) > 1 or closure.linkage.inputs[0].slider:
         return 0
     branch = step.branch()
     if branch is None:
         return 0
     low, high, _, turns, _ = branch.interval
-    (x,) = step.inputs
+    assert closure.linkage.pose is not None
+    (x,) = closure.linkage.pose.inputs
     last = turns - 1 if turns else int((high - x) // tau)
     first = 0 if turns else -int((x - low) // tau)
     for k in range(first, last + 1):

@@ -421,17 +421,12 @@ class SolutionPlan(SolvedLinks):
         return state.coordinates, start[0::3]
 
     def _add_iteration(self, group: Iterated) -> None:
-        from linkage_ros.kinematics.iterated.equations import (
-            Constraints,  # local import: it loads numpy
-        )
-        from linkage_ros.kinematics.iterated.newton_group import (
-            make_iteration,  # local import: likewise
+        from linkage_ros.kinematics.iterated.group_equations import (
+            make_iterated_step,  # local import: it loads numpy
         )
 
         joints = self._structure.joints_of(group)
-        constraints = Constraints(self._linkage, joints, group.links, self, group.ratios)
-        slides = constraints.slides
-        step = make_iteration(self._linkage, group.links, constraints, self, tuple(self.steps))
+        step, slides = make_iterated_step(self._linkage, group, joints, self)
         self.add_step(step)
         k = self.new_coordinates(len(group.links) + len(slides))
         for i, link in enumerate(group.links):

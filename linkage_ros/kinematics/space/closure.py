@@ -431,18 +431,18 @@ class SpaceClosure(StepwiseClosure):
         joints, in [rad] or [m]: another assembly is another pose of the file.
         """
         found: dict[int, list[dict[str, float]]] = {}
-        for number, knot in self._knots.items():
+        for number, (knot, unknown) in self._knots.items():
             # A platform that only rods carry has no joints of the file.
             joints = self.linkage.pair_joints
-            units = [1.0 if name in self.linkage.hinges else self.scale for name in knot.unknown]
+            units = [1.0 if name in self.linkage.hinges else self.scale for name in unknown]
             found[number] = [
                 {
                     name: value * unit
-                    for name, value, unit in zip(knot.unknown, values, units, strict=True)
+                    for name, value, unit in zip(unknown, values, units, strict=True)
                     if name in joints
                 }
                 for values in knot.other_solutions(starts)
-                if not joints.keys().isdisjoint(knot.unknown)
+                if not joints.keys().isdisjoint(unknown)
             ]
         return found
 

@@ -14,9 +14,10 @@ places on two links. All functions take numbers or symbols, and decide nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations, combinations_with_replacement
 from math import dist, hypot, inf, prod
+from operator import add
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
@@ -25,7 +26,7 @@ from linkage_ros.kinematics.iterated.elimination import Elimination
 from linkage_ros.kinematics.iterated.group import Solve
 from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
-from linkage_ros.kinematics.space.steps import Rod
+from linkage_ros.kinematics.space.steps import missing_length, Rod
 from linkage_ros.kinematics.space.vectors import (
     dot,
     length,
@@ -93,7 +94,7 @@ class KnotEquations:
     """
 
     def __init__(self, movers: Sequence[Mover], rods: Sequence[KnotRod], first: int) -> None:
-        self._movers, self.rods, self.first = tuple(movers), tuple(rods), first
+        self._movers, self._rods, self._first = tuple(movers), tuple(rods), first
         self._chains = [self._moving_chains(rod) for rod in rods]
         unknown = sorted((one for one in movers if one.unknown >= 0), key=lambda one: one.unknown)
         self.angles = [not isinstance(one.joint, SlidePair) for one in unknown]
@@ -119,8 +120,8 @@ class KnotEquations:
         self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
     ) -> list[float]:
         """Return what the unknowns must add to each rod's (C − B)·(Ċ − Ḃ)."""
-        state = self.place_links(known, unknowns)
-        still = self.add_motions(state, velocities, [0.0] * len(self.rods))
+        state = self._place_links(known, unknowns)
+        still = self._add_motions(state, velocities, [0.0] * len(self._rods))
         return [
             subtract(rod.rod.power(state, velocities), dot(vector, slip))
             for rod, vector, slip in self._slips(state, still)
@@ -135,9 +136,9 @@ class KnotEquations:
         changes: LinkState,
     ) -> list[float]:
         """Return the accelerations: (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² = L·L̈ + L̇² for each rod."""
-        state = self.place_links(known, unknowns)
-        moving = self.add_motions(state, velocities, rates)
-        before = self.add_changes(state, moving, changes, rates, [0.0] * len(self.rods))
+        state = self._place_links(known, unknowns)
+        moving = self._add_motions(state, velocities, rates)
+        before = self._add_changes(state, moving, changes, rates, [0.0] * len(self._rods))
         right = []
         for rod, vector, slip in self._slips(state, moving):
             one, other = (
@@ -150,27 +151,27 @@ class KnotEquations:
             right.append(subtract(bend, dot(vector, minus(other, one))))
         return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
 
-    def place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
+    def _place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
         """Return the state with the frames of the links."""
-        first = self.first
+        first = self._first
         state = LinkState(known.coordinates, known.pins[:first])
         for mover in self._movers:
             value = mover.value(unknowns, known)
             state.pins.append(mover.joint.child_frame(mover.joint.base(state), value))
         return state
 
-    def add_motions(
+    def _add_motions(
         self, state: LinkState, velocities: LinkState, rates: Sequence[float]
     ) -> LinkState:
         """Return the velocities with the motions of the links."""
-        first = self.first
+        first = self._first
         moving = LinkState(velocities.coordinates, velocities.pins[:first])
         for number, mover in enumerate(self._movers, first):
             rate = mover.value(rates, velocities)
             moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
         return moving
 
-    def add_changes(
+    def _add_changes(
         self,
         state: LinkState,
         moving: LinkState,
@@ -179,7 +180,7 @@ class KnotEquations:
         accelerations: Sequence[float],
     ) -> LinkState:
         """Return the accelerations with the derivatives of the motions."""
-        first = self.first
+        first = self._first
         changing = LinkState(changes.coordinates, changes.pins[:first])
         for number, mover in enumerate(self._movers, first):
             given = mover.value(rates, moving), mover.value(accelerations, changes)
@@ -191,7 +192,7 @@ class KnotEquations:
         self, state: LinkState, moving: LinkState
     ) -> Iterator[tuple[KnotRod, Vector, Vector]]:
         """Yield each rod, its vector, and the velocity of its end relative to its start."""
-        for rod in self.rods:
+        for rod in self._rods:
             one, other = (
                 moving.pins[end.pin]
                 if end.mover < 0
@@ -201,16 +202,58 @@ class KnotEquations:
             vector = minus(rod.end.locate(state), rod.start.locate(state))
             yield rod, vector, minus(other, one)
 
-    def rod_ends(self, known: LinkState, unknowns: Sequence[float]) -> list[Vector]:
-        """Return the ends of all rods, in the frame of the ground."""
-        state = self.place_links(known, unknowns)
-        return [end.locate(state) for rod in self.rods for end in (rod.start, rod.end)]
+    # The links: the unknown joints, and the frames of the links
+
+    def place(
+        self, known: LinkState, unknowns: Sequence[float], gained: Sequence[float]
+    ) -> LinkState:
+        """Return the links; ``gained`` is added to the unknowns."""
+        return self._own(map(add, unknowns, gained), self._place_links(known, unknowns))
+
+    def move(
+        self,
+        known: LinkState,
+        unknowns: Sequence[float],
+        velocities: LinkState,
+        rates: Sequence[float],
+    ) -> LinkState:
+        """Return the rates of the joints, and the motions of the links."""
+        state = self._place_links(known, unknowns)
+        return self._own(rates, self._add_motions(state, velocities, rates))
+
+    def change(
+        self,
+        known: LinkState,
+        unknowns: Sequence[float],
+        velocities: LinkState,
+        rates: Sequence[float],
+        changes: LinkState,
+        accelerations: Sequence[float],
+    ) -> LinkState:
+        """Return the accelerations of the joints, and the derivatives of the motions."""
+        state = self._place_links(known, unknowns)
+        moving = self._add_motions(state, velocities, rates)
+        changing = self._add_changes(state, moving, changes, rates, accelerations)
+        return self._own(accelerations, changing)
+
+    def _own(self, joints: Iterable[float], state: LinkState) -> LinkState:
+        return LinkState([*joints], state.pins[self._first :])
+
+    def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:
+        """Return the coordinates of the ends of all rods."""
+        state = self._place_links(known, unknowns)
+        ends = (end.locate(state) for rod in self._rods for end in (rod.start, rod.end))
+        return [coordinate for end in ends for coordinate in end]
+
+    def missing_length(self, known: LinkState) -> float | None:
+        """Return by how much a rod has no length; None if all have some."""
+        return missing_length([rod.rod for rod in self._rods], known)
 
     @BuiltProperty
     def _rings(self) -> list[tuple[KnotRod, KnotRod]]:
         """Return the pairs of rods from known places to one link."""
         rods = []
-        for rod in self.rods:
+        for rod in self._rods:
             start, end = sorted((rod.start, rod.end), key=lambda each: each.mover)
             rods.append(KnotRod(start, end, rod.rod))
         return [
@@ -254,17 +297,17 @@ class KnotEquations:
         self, known: LinkState, unknowns: Sequence[float]
     ) -> tuple[list[float], list[list[float]]]:
         """Return the residuals, and their derivatives by the unknowns."""
-        state = self.place_links(known, unknowns)
+        state = self._place_links(known, unknowns)
         errors, rows = [], []
-        for rod, chains in zip(self.rods, self._chains, strict=True):
+        for rod, chains in zip(self._rods, self._chains, strict=True):
             places = rod.start.locate(state), rod.end.locate(state)
             vector, size = minus(places[1], places[0]), rod.rod.length(state)
             errors.append(0.5 * (dot(vector, vector) - size * size))
-            row = [0.0] * len(self.rods)
+            row = [0.0] * len(self._rods)
             for sign, place, chain in zip((-1.0, 1.0), places, chains, strict=True):
                 for number in chain:
                     joint, unknown, _ = self._movers[number]
-                    frame = state.pins[self.first + number]
+                    frame = state.pins[self._first + number]
                     slope = dot(vector, joint.slope(frame.z, minus(place, frame.origin)))
                     if unknown >= 0:
                         row[unknown] = slope if sign > 0.0 else subtract(0.0, slope)
@@ -278,7 +321,7 @@ class KnotEquations:
             chain, number = [], end.mover
             while number >= 0:
                 chain.append(number)
-                number = max(self._movers[number].joint.parent - self.first, -1)
+                number = max(self._movers[number].joint.parent - self._first, -1)
             chains.append(chain)
         one, other = chains
         return [k for k in one if k not in other], [k for k in other if k not in one]
@@ -294,7 +337,7 @@ class KnotEquations:
                 if other != one:
                     # The axis in the frame of the child of the other.
                     found[one, other] = abs(dot(axis, (0.0, 0.0, 1.0)))
-                axis, other = joint.seat.turn(axis), joint.parent - self.first
+                axis, other = joint.seat.turn(axis), joint.parent - self._first
         return found
 
     def complete(self, values: Sequence[float], _known: LinkState) -> list[float]:
@@ -303,7 +346,7 @@ class KnotEquations:
 
     def error_units(self, known: LinkState) -> list[float]:
         """Return for each residual by what it is divided to be a length: its rod's length."""
-        return [max(rod.rod.length(known), _SHORTEST) for rod in self.rods]
+        return [max(rod.rod.length(known), _SHORTEST) for rod in self._rods]
 
     def is_meshed(self, _off: Sequence[float], _part: float) -> bool:
         """Return whether no ratio is off by a tooth: there are none."""
@@ -334,7 +377,7 @@ class KnotEquations:
         return bound_change
 
     def _list_bends(self, known: LinkState, pose: LinkState) -> list[float]:
-        found = (self.bound_bends(k, known, pose.coordinates) for k in range(len(self.rods)))
+        found = (self.bound_bends(k, known, pose.coordinates) for k in range(len(self._rods)))
         return [bend for bends in found for bend in bends]
 
     def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[float]) -> list[float]:
@@ -344,7 +387,7 @@ class KnotEquations:
         An end is never farther from an axis than the links between reach. It moves by no more for
         a turn, and by 1 for a slide; only what is nearer to the ground turns that.
         """
-        start, end, rod = self.rods[number]
+        start, end, rod = self._rods[number]
         size, count = _AMID * rod.length(known), len(unknowns)
         bounds = dict.fromkeys(combinations_with_replacement(range(count), 2), 0.0)
         moves: list[tuple[int, float]] = []

@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 from linkage_ros.errors import list_names
 from linkage_ros.kinematics.iterated.grid import grid_inputs
+from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
-from linkage_ros.kinematics.space.knot import Knot
 from linkage_ros.kinematics.space.knot_equations import KnotEquations, KnotRod, Mover, RodEnd
 from linkage_ros.kinematics.space.plan import SpacePlan
 from linkage_ros.kinematics.space.steps import Rod
@@ -46,6 +46,9 @@ _INDEPENDENT = 1e-6
 
 _BETTER = 1e-6
 """By how much the next rod must be better: among equal ones the first is taken."""
+
+_FAR = 4.0
+"""No slide needs to be longer to stretch a link, in lengths."""
 
 _MOST_SETS = 4096
 """Most sets of joints that are tried."""
@@ -107,12 +110,10 @@ def add_knot(plan: SpacePlan) -> bool:
     before = StepsBefore(tuple(plan.steps), tuple(plan.state.coordinates[1:last]))
     start = list(map(plan.pose_value, found.unknown))
     given = grid_inputs(plan.linkage.inputs, before.inputs, plan.scale)
-    knot = Knot(
-        KnotEquations(movers, rods, first), before, start, given, found.unknown,
-        (coordinates, first), plan.ratio_turns,
-    )  # fmt: skip
-    plan.knots[len(plan.groups)] = knot
-    plan.add_step(knot)
+    equations, sizes = KnotEquations(movers, rods, first), (coordinates, first)
+    step = IteratedStep(equations, before, sizes, start, given, _FAR, plan.ratio_turns)
+    plan.knots[len(plan.groups)] = step, found.unknown
+    plan.add_step(step)
     by = list_names(dict.fromkeys(rod.by for rod in found.rods))
     what = f'{len(rods)} equations for {list_names(found.unknown)}'
     method = f"iterated: Newton's method, {what}: {by}"

@@ -80,7 +80,7 @@ from linkage_ros.kinematics.space.vectors import (
 from linkage_ros.kinematics.step import FollowerJoint, GearedAngle, LinkState
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.space.knot import Knot
+    from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
 
 _SQUARE = 1e-6
 """Least sine of the angle at which a rod may meet the motion of its point in the pose."""
@@ -121,7 +121,7 @@ class SpacePlan:
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
         self.groups: list[SpaceGroup] = []
-        self.knots: dict[int, Knot] = {}
+        self.knots: dict[int, tuple[IteratedStep, tuple[str, ...]]] = {}
         """Links that only close together, by the number of their group."""
         self.coordinates: dict[str, int] = {
             name: 1 + number for number, name in enumerate(linkage.driven)
