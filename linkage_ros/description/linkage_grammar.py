@@ -49,10 +49,10 @@ from linkage_ros.description.parameters import (
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import ANGLES, Units
-from linkage_ros.errors import list_names, quote
+from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import (
     AssemblyPose,
-    GROUND,
+    check_weighed,
     Input,
     Limits,
     Ratio,
@@ -112,12 +112,10 @@ class _InputValues(ListOf):
 
 def _refuse_mass(content: Section, name: str, parts: Parts) -> None:
     """Refuse the mass of what is not a moving link."""
-    if name == GROUND:
-        raise content.error(name, 'the ground does not move', 'leave its mass out')
-    if name not in parts['link']:
-        moving = sorted({*parts['link']} - {GROUND})
-        reason = f'{quote(name)} is not a link'
-        raise content.error(name, reason, f'name one of {list_names(moving)}')
+    try:
+        check_weighed(parts['link'], (name,))
+    except DefinitionError as error:
+        raise content.error(name, error.reason, error.remedy) from None
 
 
 def _refuse_input(content: Section, name: str, parts: Parts) -> None:

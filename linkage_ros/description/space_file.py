@@ -116,7 +116,7 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         traced=values.get('traced', ()),
     )
     weighed = values.get('masses', {})
-    check_weighed(linkage, weighed)
+    check_weighed(linkage.link_names, weighed)
     masses = {
         link: _mass_of(content, link, given, [points[name] for name in links.get(link, ())])
         for link, given in weighed.items()

@@ -96,6 +96,7 @@ from linkage_ros.kinematics.batch import (
     Complex as Complex,
     Mask as Mask,
 )
+from linkage_ros.kinematics.checks import check_weighed as check_weighed
 from linkage_ros.kinematics.doubles import (
     SHRINK as SHRINK,
 )
@@ -190,7 +191,6 @@ from linkage_ros.kinematics.space.freedom import (
     Freedom as Freedom,
 )
 from linkage_ros.kinematics.space.linkage import (
-    check_weighed as check_weighed,
     extent_of as extent_of,
     ONE_PLACE as ONE_PLACE,
     SpaceLinkage as SpaceLinkage,

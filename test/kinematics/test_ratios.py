@@ -559,8 +559,8 @@ def test_gripper_of_the_gallery_is_symmetric() -> None:
 
 WRONG: list[tuple[str, str, dict[str, Ratio], str]] = [
     ('an input that follows', 'ratios.theta2', {'theta2': Ratio('theta5', 2.0)}, 'is an input'),
-    ('no joint', 'ratios.theta6', {'theta6': Ratio('theta2', 2.0)}, 'not a published joint'),
-    ('no other joint', 'ratios.theta5.of', {'theta5': Ratio('theta6', 2.0)}, 'is not a joint'),
+    ('no joint', 'ratios.theta6', {'theta6': Ratio('theta2', 2.0)}, 'no published joint'),
+    ('no other joint', 'ratios.theta5.of', {'theta5': Ratio('theta6', 2.0)}, 'there is no joint'),
     ('itself', 'ratios.theta5.of', {'theta5': Ratio('theta5', 2.0)}, 'theta5 follows theta5'),
     ('zero', 'ratios.theta5.ratio', {'theta5': Ratio('theta2', 0.0)}, '0, offset 0'),
     ('infinite', 'ratios.theta5.ratio', {'theta5': Ratio('theta2', inf)}, 'inf'),

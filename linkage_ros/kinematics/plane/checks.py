@@ -12,14 +12,21 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import combinations
-from math import hypot, inf, isfinite, isnan
+from math import hypot, isfinite
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, LinkageError, list_names, quote
+from linkage_ros.kinematics.checks import (
+    check_all_limits,
+    check_inputs,
+    check_name,
+    check_ratios,
+    check_traced,
+    check_weighed,
+)
 from linkage_ros.kinematics.plane.linkage import (
     GROUND,
     Input,
-    Limits,
     Linkage,
     RevoluteJoint,
     Slider,
@@ -54,32 +61,27 @@ def check_linkage(linkage: Linkage) -> None:
     for name, slider in linkage.sliders.items():
         _check_slider(linkage, name, slider)
     _check_points(linkage)
-    if not linkage.inputs:
-        raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
+    check_inputs(linkage)
     for given in linkage.inputs:
         _check_input(linkage, given)
-    names = [given.joint for given in linkage.inputs]
-    for name in names:
-        if names.count(name) > 1:
-            raise DefinitionError(
-                'input', f'{quote(name)} is named twice', 'give each input its own name'
-            )
     for name, joint in linkage.joints.items():
         if isinstance(joint, RevoluteJoint):
             for end in ('parent', 'child'):
-                _check_link(linkage, f'joints.{name}.{end}', getattr(joint, end))
+                check_name(f'joints.{name}.{end}', getattr(joint, end), 'link', linkage.links)
         else:
-            _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
+            check_name(f'joints.{name}.slider', joint.slider, 'slider', linkage.sliders)
+    joints = [given.joint for given in linkage.inputs]
+    check_ratios(linkage, linkage.joints, 'published joint', {*joints, *linkage.joints})
     for name in linkage.ratios:
-        _check_ratio(linkage, name)
+        _check_follower(linkage, name)
     check_all_limits(linkage)
+    check_weighed(linkage.links, linkage.masses)
     points = {point for carried in linkage.links.values() for point in carried}
-    for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
-        if point not in points:
-            key = 'traced' if point in linkage.traced else 'pose.points'
-            raise DefinitionError(key, f'{quote(point)} is not a point of a link', _one_of(points))
+    check_traced(linkage, points)
+    for point in linkage.pose.points if linkage.pose else ():
+        check_name('pose.points', point, 'point', points)
     for link in linkage.pose.angles if linkage.pose else ():
-        _check_link(linkage, 'pose.angles', link)
+        check_name('pose.angles', link, 'link', linkage.links)
     if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
         raise DefinitionError(
             'pose.inputs',
@@ -136,14 +138,9 @@ def _check_points(linkage: Linkage) -> None:
 
 def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
     key = f'sliders.{name}'
-    _check_link(linkage, f'{key}.along', slider.along)
+    check_name(f'{key}.along', slider.along, 'link', linkage.links)
     points = linkage.links[slider.along]
-    if slider.through not in points:
-        raise DefinitionError(
-            f'{key}.through',
-            f'{quote(slider.through)} is not a point of {slider.along!r}',
-            _one_of(points),
-        )
+    check_name(f'{key}.through', slider.through, f'point of {slider.along!r} called', points)
     carriers = [link for link, carried in linkage.links.items() if slider.point in carried]
     if not carriers or slider.along in carriers:
         raise DefinitionError(
@@ -167,10 +164,10 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
 
 def _check_input(linkage: Linkage, given: Input) -> None:
     if given.slider:
-        _check_slider_name(linkage, 'input.slider', given.slider)
+        check_name('input.slider', given.slider, 'slider', linkage.sliders)
         return
     for end in ('parent', 'child'):
-        _check_link(linkage, f'input.{end}', getattr(given, end))
+        check_name(f'input.{end}', getattr(given, end), 'link', linkage.links)
     if given.parent == given.child:
         raise DefinitionError(
             'input.child', f'{quote(given.child)} is its own parent', 'name two links'
@@ -183,40 +180,9 @@ def _check_input(linkage: Linkage, given: Input) -> None:
         )
 
 
-def _check_ratio(linkage: Linkage, name: str) -> None:
-    """Refuse a joint that cannot follow the other one."""
-    key, given, inputs = f'ratios.{name}', linkage.ratios[name], linkage.inputs
-    names = [one.joint for one in inputs]
-    if name in names:
-        raise DefinitionError(
-            key, f'{quote(name)} is an input, which follows no joint', 'leave one of the two out'
-        )
-    if name not in linkage.joints:
-        free = sorted({*linkage.joints} - {*names})
-        raise DefinitionError(
-            key,
-            f'{quote(name)} is not a published joint',
-            _one_of(free) if free else 'publish it: name it under joints',
-        )
-    if given.of not in (*names, *linkage.joints):
-        choices = {*names, *linkage.joints} - {name}
-        raise DefinitionError(
-            f'{key}.of', f'{quote(given.of)} is not a joint of this linkage', _one_of(choices)
-        )
-    chain = [name]
-    while chain[-1] in linkage.ratios and chain[-1] not in chain[:-1]:
-        chain.append(linkage.ratios[chain[-1]].of)
-    if chain[-1] in chain[:-1]:
-        raise DefinitionError(
-            f'{key}.of', f'{" follows ".join(chain)}', 'let one of them follow an input'
-        )
-    if not given.ratio or not isfinite(given.ratio) or not isfinite(given.offset):
-        raise DefinitionError(
-            f'{key}.ratio',
-            f'{given.ratio:g}, offset {given.offset:g}',
-            'write finite numbers, and a ratio other than 0',
-        )
-    joint = linkage.joints[name]
+def _check_follower(linkage: Linkage, name: str) -> None:
+    """Refuse a joint that cannot follow others since it turns about no pin, or is locked."""
+    key, joint = f'ratios.{name}', linkage.joints[name]
     if isinstance(joint, RevoluteJoint):
         one, other = linkage.links[joint.parent], linkage.links[joint.child]
         if joint.parent == joint.child or not set(one) & set(other):
@@ -226,7 +192,9 @@ def _check_ratio(linkage: Linkage, name: str) -> None:
                 'which it could turn',
                 'name a joint of two links that share a pin, or of a slider',
             )
-    for followed in chain[1:]:
+    followed = name
+    while followed in linkage.ratios:
+        followed = linkage.ratios[followed].of
         if _moved_parts(linkage, followed) == _moved_parts(linkage, name):
             raise DefinitionError(
                 f'{key}.of',
@@ -240,69 +208,6 @@ def _moved_parts(linkage: Linkage, name: str) -> set[str]:
     given = (Input.from_joint(*named) for named in linkage.joints.items())
     joint = next(one for one in (*linkage.inputs, *given) if one.joint == name)
     return {joint.slider} if joint.slider else {joint.parent, joint.child}
-
-
-def check_all_limits(linkage: Any) -> None:
-    """Refuse limits that allow no motion, and a pose beyond those of its inputs."""
-    for given in linkage.inputs:
-        _check_limits('input', given.limits, given.joint, given.unit)
-    for name, joint in linkage.joints.items():
-        _check_limits(f'joints.{name}', joint.limits, name, joint.unit)
-        ends = (joint.limits.low, joint.limits.high)
-        if isinstance(joint, RevoluteJoint) and ends != (-inf, inf) and inf in map(abs, ends):
-            raise DefinitionError(
-                f'joints.{name}.limits',
-                f'{joint.limits} rad limits the angle on one side, and angles come round to it',
-                'write two finite numbers',
-            )
-    if linkage.pose:
-        for given, value in zip(linkage.inputs, linkage.pose.inputs, strict=False):
-            if not given.limits.low <= value <= given.limits.high:
-                raise DefinitionError(
-                    'pose.inputs',
-                    f'{value:g} {given.unit} is beyond the limits {given.limits} {given.unit} of '
-                    f'{quote(given.joint)}',
-                    'start within the limits, or widen them',
-                )
-
-
-def _check_limits(key: str, limits: Limits, name: str, unit: str) -> None:
-    """Refuse limits that allow no motion."""
-    low, high = limits.low, limits.high
-    if isnan(low) or isnan(high) or low == inf or high == -inf:
-        raise DefinitionError(
-            f'{key}.limits',
-            f'{limits} {unit} of {quote(name)} are not valid limits',
-            'write [low, high]; -.inf or .inf for none on a side',
-        )
-    if low >= high:
-        fault = 'are the same number' if low == high else 'cross'
-        raise DefinitionError(
-            f'{key}.limits',
-            f'{limits} {unit} of {quote(name)} {fault}',
-            'write [low, high], the lower one first',
-        )
-    for what in ('velocity', 'effort'):
-        if not (value := getattr(limits, what)) > 0.0:
-            raise DefinitionError(
-                f'{key}.{what}',
-                f'{value:g} of {quote(name)} allows no motion',
-                'write a number of more than 0, or leave it out',
-            )
-
-
-def _check_slider_name(linkage: Linkage, key: str, name: str) -> None:
-    if name not in linkage.sliders:
-        raise DefinitionError(
-            key,
-            f'{quote(name)} is not a slider',
-            _one_of(linkage.sliders) if linkage.sliders else 'this linkage has none',
-        )
-
-
-def _check_link(linkage: Linkage, key: str, name: str) -> None:
-    if name not in linkage.links:
-        raise DefinitionError(key, f'{quote(name)} is not a link', _one_of(linkage.links))
 
 
 def _one_of(names: object) -> str:

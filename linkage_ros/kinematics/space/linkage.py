@@ -20,8 +20,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import dist, frexp, isfinite, ldexp
 
-from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
-from linkage_ros.kinematics.plane.checks import check_all_limits
+from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.kinematics.checks import (
+    check_all_limits,
+    check_inputs,
+    check_name,
+    check_named_once,
+    check_ratios,
+    check_traced,
+    check_weighed,
+)
 from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
     GROUND,
@@ -215,13 +223,11 @@ def check_space_linkage(linkage: SpaceLinkage) -> None:
         )
     for link, points in linkage.links.items():
         for point in points:
-            _check_name(f'links.{link}', point, 'point', linkage.points)
-        if points and max(Counter(points).values()) > 1:
-            twice = Counter(points).most_common(1)[0][0]
-            raise DefinitionError(f'links.{link}', f'names {quote(twice)} twice', 'name it once')
+            check_name(f'links.{link}', point, 'point', linkage.points)
+        check_named_once(f'links.{link}', points)
     for name, ends in linkage.struts.items():
         for point in ends:
-            _check_name(f'struts.{name}', point, 'point', linkage.points)
+            check_name(f'struts.{name}', point, 'point', linkage.points)
         if dist(*(linkage.points[point] for point in ends)) == 0.0:
             reason = f'{quote(ends[0])} and {quote(ends[1])} are in one place'
             raise DefinitionError(f'struts.{name}', reason, 'name two points apart')
@@ -239,21 +245,10 @@ def check_space_linkage(linkage: SpaceLinkage) -> None:
                     'write for example [0, 0, 1]',
                 )  # fmt: skip
     _check_held(linkage)
-    _check_driven(linkage)
-    for point in linkage.traced:
-        _check_name('traced', point, 'point', linkage.points)
-    check_weighed(linkage, linkage.masses)
+    _check_joints(linkage)
+    check_traced(linkage, linkage.points)
+    check_weighed(linkage.link_names, linkage.masses)
     check_all_limits(linkage)
-
-
-def check_weighed(linkage: SpaceLinkage, links: Iterable[str]) -> None:
-    """Refuse the mass of what is not a moving link."""
-    for link in links:
-        if link == GROUND:
-            raise DefinitionError(
-                f'masses.{link}', 'the ground does not move', 'leave its mass out'
-            )
-        _check_name(f'masses.{link}', link, 'link', linkage.link_names[1:])
 
 
 def _check_held(linkage: SpaceLinkage) -> None:
@@ -291,53 +286,24 @@ def _check_held(linkage: SpaceLinkage) -> None:
                 )
 
 
-def _check_driven(linkage: SpaceLinkage) -> None:
-    """Refuse inputs, published joints and ratios that name no joint."""
+def _check_joints(linkage: SpaceLinkage) -> None:
+    """Refuse inputs, published joints and ratios that name no joint, or do not fit the pose."""
     names = (*linkage.pair_joints, *linkage.struts)
     for key, chosen in (('input', linkage.driven), ('joints', linkage.published)):
         for name in chosen:
-            _check_name(key, name, 'joint', names)
-            if chosen.count(name) > 1:
-                raise DefinitionError(key, f'{quote(name)} is named twice', 'name it once')
-    if not linkage.driven:
-        raise DefinitionError('input', 'no joint is driven', 'name the driven joint')
+            check_name(key, name, 'joint', names)
+        check_named_once(key, chosen)
+    check_inputs(linkage)
+    check_ratios(linkage, linkage.pair_joints, 'hinge or slide', names)
     for name, ratio in linkage.ratios.items():
-        key = f'ratios.{name}'
-        _check_name(key, name, 'hinge or slide', linkage.pair_joints)
-        _check_name(f'{key}.of', ratio.of, 'joint', names)
-        for other in ratio.also:
-            _check_name(f'{key}.also', other, 'joint', names)
-        if name in linkage.driven:
-            reason = f'{quote(name)} is an input, which follows no joint'
-            raise DefinitionError(key, reason, 'leave one of the two out')
-        if circle := _find_circle(linkage, [name]):
-            reason, remedy = ' follows '.join(circle), 'let one of them follow an input'
-            raise DefinitionError(f'{key}.of', reason, remedy)
         expected = ratio.value_at({each: linkage.pose_value(each) for each in ratio.terms})
         found = linkage.pose_value(name)
-        if not all(ratio.terms.values()) or abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
+        if abs(expected - found) > 1e-9 * (1.0 + abs(expected)):
             raise DefinitionError(
-                key, f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
-                'write a ratio other than 0 and the offset that fits the pose',
-            )  # fmt: skip
-
-
-def _find_circle(linkage: SpaceLinkage, chain: list[str]) -> list[str]:
-    """Return joints that follow each other in a circle, from a chain of followers on; or none."""
-    ratio = linkage.ratios.get(chain[-1])
-    for name in ratio.terms if ratio else ():
-        if name in chain:
-            return [*chain, name]
-        if circle := _find_circle(linkage, [*chain, name]):
-            return circle
-    return []
-
-
-def _check_name(key: str, name: str, what: str, names: object) -> None:
-    known = list(names)  # type: ignore[call-overload]
-    if name not in known:
-        remedy = did_you_mean(name, known, f'name one of {list_names(sorted(known))}')
-        raise DefinitionError(key, f'there is no {what} {quote(name)}', remedy)
+                f'ratios.{name}',
+                f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
+                'write the offset that fits the pose',
+            )
 
 
 def size_of(linkage: SpaceLinkage) -> float:
