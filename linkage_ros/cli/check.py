@@ -17,7 +17,7 @@ from dataclasses import asdict
 from math import tau
 import sys
 from threading import Event
-from typing import Any, NamedTuple
+from typing import Any
 
 from linkage_ros.cli.arguments import (
     add_file,
@@ -45,6 +45,7 @@ from linkage_ros.kinematics import (
     four_bars,
     GearedLinks,
     Group,
+    GroupDescription,
     InputSweep,
     is_iterated,
     Iterated,
@@ -92,15 +93,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         print(f'linkage check: note: {content.locate_error(note)}', file=sys.stderr)
     units = arguments.angles = arguments.angles.of_file(content.units)
     with show_progress('parts examined') as advance:
-        if isinstance(closure, Closure):
-            described, tables = describe_linkage(closure, advance)
-            if arguments.branches:
-                tables.append(_branches_table(closure))
-                described |= tables_json(tables[-1:])
-        elif arguments.branches:
-            raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
-        else:
-            described, tables = _describe_space(closure)
+        described, tables = _describe_linkage(closure, advance)
+        if arguments.branches:
+            if not isinstance(closure, Closure):
+                raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
+            tables.append(_branches_table(closure))
+            described |= tables_json(tables[-1:])
     account = {'file': arguments.file, **described}
     show_result(Result(account, [*_linkage_tables(account, tables, units)]), arguments, units)
     return 0
@@ -110,27 +108,24 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 # the 'unit' beside them.
 
 
-def describe_linkage(
-    closure: Closure, advance: ProgressCallback
+def _describe_linkage(
+    closure: Closure | SpaceClosure, advance: ProgressCallback
 ) -> tuple[dict[str, Any], list[Table]]:
     """Return the description of a linkage as JSON holds it, and tables of it in their order."""
     sweep = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
-    sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
-    groups = [
-        describe_group(closure, number, sides) for number in range(len(closure.structure.groups))
-    ]
-    numbered = [(number, *one) for number, one in enumerate(groups, 1)]
-    tables = [
-        Table('Solved in this order', _ORDER, numbered, 'groups'),
-        _four_bars_table(closure),
-    ]
-    account = _structure_json(closure) | {'groups': [one._asdict() for one in groups]}
-    account |= tables_json(tables[1:])
+    parts: list[Callable[..., dict[str, Any] | Table]] = []
+    assemblies: Callable[..., dict[str, Any] | Table] = _other_poses_table
+    if isinstance(closure, Closure):
+        groups, account = [*_describe_groups(closure)], _structure_json(closure)
+        parts, assemblies = [_four_bars_table], _other_assemblies
+    else:
+        groups, account = closure.groups, _space_json(closure)
+    account['groups'] = [one._asdict() for one in groups]
+    rows = [(number, *one) for number, one in enumerate(groups, 1)]
+    tables = [Table('Solved in this order', _ORDER, rows, 'groups')]
     # Most of the time goes by here.
-    parts: tuple[Callable[[Closure, InputSweep | None], dict[str, Any] | Table], ...] = (
-        *(_examine_reach, _examine_states, _examine_joints, _other_assemblies),
-        *(_transmission_table, _conditioning_table),
-    )
+    parts += [_examine_reach, _examine_states, _examine_joints, assemblies]
+    parts += [_transmission_table, _conditioning_table]
     for index, part in enumerate(parts):
         advance(index, len(parts))
         found = part(closure, sweep)
@@ -142,6 +137,7 @@ def describe_linkage(
 
 
 def _structure_json(closure: Closure) -> dict[str, Any]:
+    """Return what a planar linkage consists of."""
     linkage, structure = closure.linkage, closure.structure
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
@@ -303,16 +299,13 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
     return {'other_assemblies': groups}
 
 
-class GroupDescription(NamedTuple):
-    """A group in words."""
-
-    kind: str
-    links: list[str]
-    method: str  # Of its solution
-    assembly: str
+def _describe_groups(closure: Closure) -> Iterator[GroupDescription]:
+    sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
+    for number in range(len(closure.structure.groups)):
+        yield _describe_group(closure, number, sides)
 
 
-def describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> GroupDescription:
+def _describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> GroupDescription:
     """Return a group in words; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
@@ -354,16 +347,9 @@ def _assembly_text(dyad: Dyad, side: str) -> str:
     return f'slider {closing_name(dyad)}: pin {pin} {side} of {first.name}'
 
 
-def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]:
-    """Return the description of a spatial linkage as JSON holds it, and its tables."""
+def _space_json(closure: SpaceClosure) -> dict[str, Any]:
+    """Return what a spatial linkage consists of."""
     linkage, freedom = closure.linkage, closure.freedom
-    sweep = InputSweep(closure) if len(linkage.inputs) == 1 else None
-    rows = [(number, *group) for number, group in enumerate(closure.groups, 1)]
-    tables = [
-        Table('Solved in this order', _ORDER, rows, 'groups'),
-        _transmission_table(closure, sweep),
-        _other_poses_table(closure),
-    ]
     return {
         'moving_links': len(linkage.link_names) - 1,
         'hinges': len(linkage.hinges),
@@ -377,13 +363,8 @@ def _describe_space(closure: SpaceClosure) -> tuple[dict[str, Any], list[Table]]
         'unwrapped': False,
         'inputs': [{'joint': given.joint, 'unit': given.unit} for given in linkage.inputs],
         'limits': _limits_json(linkage),
-        **_examine_reach(closure, sweep),
-        **_examine_states(closure, sweep),
-        **_examine_joints(closure, sweep),
         **_corrections_json(linkage),
-        'groups': [group._asdict() for group in closure.groups],
-        **tables_json(tables[1:]),
-    }, tables
+    }
 
 
 # The same as tables.
@@ -431,7 +412,7 @@ def _linkage_tables(
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 
 
-def _four_bars_table(closure: Closure) -> Table:
+def _four_bars_table(closure: Closure, _sweep: InputSweep | None) -> Table:
     rows = [
         (
             *(bar.group + 1, list(bar.links), list(bar.lengths)),
@@ -455,7 +436,7 @@ def _transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> T
     return _extremes_table(title, 'transmission_angles', closure, found, ends)
 
 
-def _conditioning_table(closure: Closure, sweep: InputSweep | None) -> Table:
+def _conditioning_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
     least = Column('>least', 'least.conditioning', form='.4f')
     ends = [least, Column(None, 'greatest.conditioning')]
     found = {} if sweep is None else conditioning_curves(sweep)
@@ -546,7 +527,7 @@ def _assemblies_table(
     )
 
 
-def _other_poses_table(closure: SpaceClosure) -> Table:
+def _other_poses_table(closure: SpaceClosure, _sweep: InputSweep | None) -> Table:
     """Return the other assemblies of what closes only together, at the inputs of the pose."""
     rows = [
         (number + 1, joints)

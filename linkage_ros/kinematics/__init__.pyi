@@ -176,6 +176,7 @@ from linkage_ros.kinematics.plane.topology import (
 )
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
+    GroupDescription as GroupDescription,
     InputRange as InputRange,
     Position as Position,
     SingularInput as SingularInput,

@@ -289,7 +289,8 @@ def make_iterated_step(
         )
     found = Constraints(linkage, joints, group.links, planner, group.ratios)
     solved = close_in_pose(linkage, planner.scale, planner.steps)
-    inputs = tuple(solved.coordinates[1 : 1 + len(linkage.inputs)])
+    last = 1 + len(linkage.inputs)
+    inputs = tuple(solved.coordinates[1:last])
     pins = {name: solved.pins[i] for name, i in found.known_pins.items()}
     start = guess_unknowns(linkage, group.links, planner, pins, solved)
     far = sum(

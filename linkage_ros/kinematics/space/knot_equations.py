@@ -15,7 +15,7 @@ places on two links. All functions take numbers or symbols, and decide nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import combinations, combinations_with_replacement
+from itertools import combinations, combinations_with_replacement, islice
 from math import dist, hypot, inf, prod
 from operator import add
 from typing import NamedTuple
@@ -208,7 +208,7 @@ class KnotEquations:
         self, known: LinkState, unknowns: Sequence[float], gained: Sequence[float]
     ) -> LinkState:
         """Return the links; ``gained`` is added to the unknowns."""
-        return self._own(map(add, unknowns, gained), self._place_links(known, unknowns))
+        return self._own_part(map(add, unknowns, gained), self._place_links(known, unknowns))
 
     def move(
         self,
@@ -219,7 +219,7 @@ class KnotEquations:
     ) -> LinkState:
         """Return the rates of the joints, and the motions of the links."""
         state = self._place_links(known, unknowns)
-        return self._own(rates, self._add_motions(state, velocities, rates))
+        return self._own_part(rates, self._add_motions(state, velocities, rates))
 
     def change(
         self,
@@ -234,10 +234,10 @@ class KnotEquations:
         state = self._place_links(known, unknowns)
         moving = self._add_motions(state, velocities, rates)
         changing = self._add_changes(state, moving, changes, rates, accelerations)
-        return self._own(accelerations, changing)
+        return self._own_part(accelerations, changing)
 
-    def _own(self, joints: Iterable[float], state: LinkState) -> LinkState:
-        return LinkState([*joints], state.pins[self._first :])
+    def _own_part(self, joints: Iterable[float], state: LinkState) -> LinkState:
+        return LinkState([*joints], [*islice(state.pins, self._first, None)])
 
     def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:
         """Return the coordinates of the ends of all rods."""

@@ -45,6 +45,7 @@ from linkage_ros.kinematics.plane.topology import (
     Iterated,
     Structure,
 )
+from linkage_ros.kinematics.results import GroupDescription
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
@@ -89,15 +90,6 @@ _BETTER = 1e-6
 """By how much the next pair must be better: among equal ones the first is taken."""
 
 
-class SpaceGroup(NamedTuple):
-    """What a few steps find together, for people."""
-
-    kind: str
-    links: tuple[str, ...]
-    method: str
-    assembly: str = ''
-
-
 class _Pair(NamedTuple):
     """A point of a link, and a known point at a known distance."""
 
@@ -120,7 +112,7 @@ class SpacePlan:
         self.scale = unit_of(linkage)
         self.steps: list[Any] = []
         self.step_groups: list[int] = []
-        self.groups: list[SpaceGroup] = []
+        self.groups: list[GroupDescription] = []
         self.knots: dict[int, tuple[IteratedStep, tuple[str, ...]]] = {}
         """Links that only close together, by the number of their group."""
         self.coordinates: dict[str, int] = {
@@ -356,7 +348,7 @@ class SpacePlan:
     def end_group(
         self, kind: str, links: tuple[str, ...], method: str, assembly: str = ''
     ) -> None:
-        self.groups.append(SpaceGroup(kind, links, method, assembly))
+        self.groups.append(GroupDescription(kind, links, method, assembly))
 
     def _follow(self, name: str) -> bool:
         """Give a joint that follows a known one its value."""
