@@ -84,7 +84,7 @@ def check_ratios(
             raise DefinitionError(
                 f'{key}.ratio',
                 f'{", ".join(f"{factor:g}" for factor in factors)}, offset {ratio.offset:g}',
-                'write finite numbers, and a ratio other than 0',
+                'write a ratio other than 0, and finite numbers',
             )
 
 

@@ -25,6 +25,8 @@ import numpy as np
 import pytest
 import yaml
 
+from ..support.scenes import LINKAGES
+
 ROBOTS = Path(__file__).with_name('robots')
 OWN = Path(__file__).parents[1] / 'kinematics' / 'space' / 'linkages'
 
@@ -398,6 +400,36 @@ def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name, turn
         joints = dict(zip(robot.joint_names, robot.position(*inputs).joints, strict=True))
         found = [joints[joint] for joint in written.joint_names]
         assert found == pytest.approx(written.position(*inputs).joints, abs=1e-12)
+
+
+def test_a_model_has_the_masses_of_a_spatial_file_where_its_pose_has_them(turns):
+    """By yourdfpy, with the frames of links at the joints of the pose, beside the file's text."""
+    yourdfpy = pytest.importorskip('yourdfpy')
+    linkage = load('ankle_motors').linkage
+    hinges = {
+        name: replace(hinge, value=turns.uniform(-0.5, 0.5))
+        for name, hinge in linkage.hinges.items()
+    }
+    closure = SpaceClosure(replace(linkage, hinges=hinges))
+    text = urdf_model('ankle', [ModelPart(closure)]).decode()
+    model = yourdfpy.URDF.load(BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
+    model.update_cfg({
+        joint.get('name'): float(joint.get('value'))
+        for joint in ET.fromstring(text).find('linkage_start')
+    })  # fmt: skip
+    told = yaml.safe_load((LINKAGES / 'space' / 'ankle_motors.yaml').read_text())['masses']
+    found = {name: link.inertial for name, link in model.link_map.items() if link.inertial}
+    assert found.keys() == {link for link, body in told.items() if body['mass']}
+    for name, body in found.items():
+        frame = model.get_transform(name, 'ground') @ body.origin
+        assert body.mass == told[name]['mass']
+        if 'center' in told[name]:  # otherwise it is a rod
+            xx, xy, xz, yy, yz, zz = told[name]['inertia']
+            assert frame[:3, 3] == pytest.approx(told[name]['center'], abs=1e-14)
+            turned = frame[:3, :3] @ body.inertia @ frame[:3, :3].T
+            assert turned == pytest.approx(
+                np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), abs=1e-17
+            )
 
 
 def test_each_rod_ends_where_the_platform_carries_it(hexapod):

@@ -130,7 +130,7 @@ class AngleSpan(NamedTuple):
         return self.lowest < -pi or self.highest > pi
 
 
-_ROUND = AngleSpan(-pi, pi, False)
+ROUND = AngleSpan(-pi, pi, False)
 """Range of an angle without limits."""
 
 
@@ -140,7 +140,7 @@ def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     if len(closure.linkage.inputs) > 1:
         far = closure.slide_bound
         return {
-            name: AngleSpan(-far, far) if isinstance(joint, SlideJoint) else _ROUND
+            name: AngleSpan(-far, far) if isinstance(joint, SlideJoint) else ROUND
             for name, joint in joints.items()
         }
     (start,) = usual_inputs(closure)
@@ -153,7 +153,7 @@ def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     margin = _MARGIN * (1.0 if interval.turning else closure.slide_bound)
     own = AngleSpan(interval.lowest - margin, interval.highest + margin)
     if interval.is_whole or (interval.turning and own.passes_pi):
-        own = _ROUND
+        own = ROUND
     ranges.setdefault(given.joint, own)
     return {name: ranges[name] for name in joints}
 
@@ -183,7 +183,7 @@ def _joint_span(
 ) -> AngleSpan:
     low, high = int(row.argmin()), int(row.argmax())
     if turning and interval.is_whole and abs(row[-1] - row[0]) > pi:
-        return _ROUND
+        return ROUND
     margin = _MARGIN * (1.0 if turning else closure.slide_bound)
 
     def highest_beyond(i: int) -> float:
@@ -197,4 +197,4 @@ def _joint_span(
         float(row[low] + begun - highest_beyond(low)),
         float(row[high] + begun + highest_beyond(high)),
     )
-    return _ROUND if turning and span.passes_pi else span
+    return ROUND if turning and span.passes_pi else span

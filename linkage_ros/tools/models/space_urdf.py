@@ -17,7 +17,7 @@ hang on joints of their own, see `with_rod_joints`.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, hypot, isfinite
+from math import atan2, hypot
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics import (
@@ -25,20 +25,26 @@ from linkage_ros.kinematics import (
     GROUND,
     GROUND_FRAME,
     minus,
-    Ratio,
     scale,
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
     turn_about,
+    turned_tensor,
     Vector,
     with_rod_joints,
 )
 from linkage_ros.names import free_name
-from linkage_ros.tools.models.joint_limits import FARTHEST, write_limits
-from linkage_ros.tools.models.orientation import AngleSpan
+from linkage_ros.tools.models.orientation import ROUND
 from linkage_ros.tools.models.part import PrefixedNames
-from linkage_ros.tools.models.xml import format_number, format_numbers
+from linkage_ros.tools.models.urdf_elements import (
+    add_inertial,
+    add_joint,
+    add_start,
+    mimic_of,
+    WrittenJoint,
+)
+from linkage_ros.tools.models.xml import format_numbers
 
 SPACE_HEAD = """\
 A spatial linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
@@ -56,14 +62,14 @@ class SpaceTree:
         self.names = names
         self._linkage = with_rod_joints(linkage)
         self._wrapped = wrapped
-        self._starts: dict[str, ET.Element] = {}
+        self._computed: dict[str, dict[str, str]] = {}
         self._frames = {GROUND: GROUND_FRAME}
         """Frames in the pose of the links that are written."""
 
     def write(self, robot: ET.Element) -> None:
         """Add the tree and the loop joints to a robot."""
         self._robot = robot
-        ET.SubElement(robot, 'link', name=self.names.own_name(GROUND))
+        self._add_link(GROUND)
         links, names = self._linkage.links, self._linkage.link_names
         left = dict(self._linkage.pair_joints)
         while any(self._grow(name, joint, left) for name, joint in [*left.items()]):
@@ -77,9 +83,11 @@ class SpaceTree:
             for number, link in enumerate(on[1:]):
                 name = f'{point}_{number + 1}' if number else point
                 self._add_loop(name, 'spherical', (on[0], link), place)
-        start = ET.SubElement(robot, 'linkage_start')
-        order = dict.fromkeys((*self._linkage.driven, *self._starts))
-        start.extend(map(self._starts.__getitem__, order))
+        own_name, linkage = self.names.own_name, self._linkage
+        order = dict.fromkeys((*linkage.driven, *self._computed))
+        values = {own_name(name): linkage.pose_value(name) for name in order}
+        computed = {own_name(name): made_up for name, made_up in self._computed.items()}
+        add_start(robot, [*map(own_name, linkage.driven)], values, computed)
 
     def _grow(self, name: str, joint: SpatialJoint, left: dict[str, SpatialJoint]) -> bool:
         """Write a joint that leads from the tree to another link."""
@@ -102,33 +110,32 @@ class SpaceTree:
         else:
             x, y, z = (turn_about(axis, joint.value, way) for way in on[:3])
             self._frames[child] = SpaceFrame(x, y, z, at)
+        self._add_link(child)
         own_name = self.names.own_name
-        ET.SubElement(self._robot, 'link', name=own_name(child))
-        low, high = joint.limits.low, joint.limits.high
-        # A wrapped angle that passes π is on both sides.
-        passing = self._wrapped and AngleSpan(low, high).passes_pi
-        kind = 'revolute' if isfinite(low) and not passing else 'continuous'
-        element = ET.SubElement(
-            self._robot, 'joint', name=own_name(name), type='prismatic' if slides else kind
+        placed = WrittenJoint(
+            own_name(name),
+            'prismatic' if slides else 'revolute',
+            own_name(parent),
+            own_name(child),
+            on.locate(at),
+            axis=on.resolve(axis),
         )
-        ET.SubElement(element, 'origin', xyz=format_numbers(*on.locate(at)), rpy='0 0 0')
-        ET.SubElement(element, 'parent', link=own_name(parent))
-        ET.SubElement(element, 'child', link=own_name(child))
-        ET.SubElement(element, 'axis', xyz=format_numbers(*on.resolve(axis)))
-        mimic = linkage.ratios.get(name)
-        while mimic and not mimic.also and (before := linkage.ratios.get(mimic.of)):
-            # A joint mimics one that mimics none.
-            if before.also:
-                break
-            offset = mimic.offset + mimic.ratio * before.offset
-            mimic = Ratio(before.of, mimic.ratio * before.ratio, offset)
         # URDF has no sums.
-        mimic = replace(mimic, of=own_name(mimic.of)) if mimic and not mimic.also else None
-        computed = write_limits(element, joint.limits, -FARTHEST, FARTHEST, mimic)
-        told = 'input' if name in linkage.driven else 'joint'
-        value = format_number(joint.value)
-        self._starts[name] = ET.Element(told, name=own_name(name), value=value)
-        ET.SubElement(self._starts[name], 'computed', computed)
+        mimic = mimic_of(linkage.ratios, name)
+        if mimic:
+            mimic = replace(mimic, of=own_name(mimic.of))
+        self._computed[name] = add_joint(
+            self._robot, placed, joint.limits, ROUND, mimic, wrapped=self._wrapped
+        )
+
+    def _add_link(self, link: str) -> None:
+        """Write a link, with its mass if it has some."""
+        element = ET.SubElement(self._robot, 'link', name=self.names.own_name(link))
+        body, frame = self._linkage.masses.get(link), self._frames[link]
+        if body and body.mass:
+            axes = [frame.resolve(axis) for axis in GROUND_FRAME[:3]]
+            tensor = turned_tensor(axes, body.inertia)
+            add_inertial(element, body.mass, frame.locate(body.center), tensor)
 
     def _add_loop(self, name: str, kind: str, links: tuple[str, str], place: Vector) -> None:
         """Write that two links meet at a place, which is given in the pose."""

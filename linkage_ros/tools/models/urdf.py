@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import pi
 import re
 from typing import NamedTuple
@@ -26,10 +27,8 @@ from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import (
     Closure,
     GROUND,
-    Limits,
     Linkage,
     links_by_point,
-    Mass,
     NO_LIMITS,
     Ratio,
     RevoluteJoint,
@@ -37,13 +36,20 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import link_bodies, LinkBody
-from linkage_ros.tools.models.joint_limits import EFFORT, FARTHEST, VELOCITY, write_limits
-from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints
+from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints, ROUND
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
 from linkage_ros.tools.models.space_urdf import SPACE_HEAD, SpaceTree
 from linkage_ros.tools.models.tree import grow_tree, Tree, TreeJoint
+from linkage_ros.tools.models.urdf_elements import (
+    add_inertial,
+    add_joint,
+    add_start,
+    EFFORT,
+    mimic_of,
+    VELOCITY,
+    WrittenJoint,
+)
 from linkage_ros.tools.models.xml import (
-    format_number,
     format_numbers,
     format_rough,
     xml_comment,
@@ -295,44 +301,35 @@ def _write_linkage(robot: ET.Element, model: _Model) -> None:
         origin = model.tree.origins[link]
         mass = linkage.masses.get(link)
         if mass and mass.mass:  # without an inertial a link is massless
-            _write_inertial(element, mass, origin)
+            (x, y), flat, about = mass.center, 0.5 * mass.inertia, mass.inertia
+            center = x - origin.real, y - origin.imag, 0.0
+            add_inertial(element, mass.mass, center, (flat, 0.0, 0.0, flat, 0.0, about))
         _write_visuals(element, names.own_name(link), model.bodies[link], origin)
     links = {names.own_name(link) for link in linkage.links}
     for joint in model.tree.joints:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
-    ranges = {names.own_name(name): span for name, span in model.spans.items()}
+    spans = {names.own_name(name): span for name, span in model.spans.items()}
     given = {names.own_name(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
-    followed = {names.own_name(name): of for name, of in _following_joints(linkage, names)}
+    followed = {
+        names.own_name(name): replace(mimic, of=names.own_name(mimic.of))
+        for name in linkage.ratios
+        if (mimic := mimic_of(linkage.ratios, name))
+    }
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
-        limits = given.get(of, NO_LIMITS)
         mimic = followed.get(of, Ratio(of, 1.0) if joint.mimics else None)
-        computed[of] = _add_joint(robot, joint, ranges.get(of), limits, model.part.wrapped, mimic)
-    start = _start_element(model.part.closure, names, computed)
-    if start is not None:
-        robot.append(start)
-
-
-def _following_joints(linkage: Linkage, names: PrefixedNames) -> Iterator[tuple[str, Ratio]]:
-    """Yield the joints that follow an input, perhaps by others, with its name in the model."""
-    for name, given in linkage.ratios.items():
-        of, ratio, offset = given.of, given.ratio, given.offset
-        while of in linkage.ratios:
-            before = linkage.ratios[of]
-            of, offset = before.of, offset + ratio * before.offset
-            ratio *= before.ratio
-        if of in (driven.joint for driven in linkage.inputs):
-            yield name, Ratio(names.own_name(of), ratio, offset)
-
-
-def _write_inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
-    inertial = ET.SubElement(link, 'inertial')
-    _write_origin(inertial, complex(*mass.center) - origin)
-    ET.SubElement(inertial, 'mass', value=format_number(mass.mass))
-    flat, about = format_number(0.5 * mass.inertia), format_number(mass.inertia)
-    ET.SubElement(inertial, 'inertia', ixx=flat, ixy='0', ixz='0', iyy=flat, iyz='0', izz=about)
+        turns, (x, y) = joint.kind == 'revolute', (joint.axis.real, joint.axis.imag)
+        placed = WrittenJoint(
+            *joint[:4],
+            (joint.place.real, joint.place.imag, 0.0),
+            (0.0, 0.0, joint.turn),
+            (0.0, 0.0, x) if turns else (x, y, 0.0),
+        )
+        limits, span = given.get(of, NO_LIMITS), spans.get(of, ROUND)
+        computed[of] = add_joint(robot, placed, limits, span, mimic, wrapped=model.part.wrapped)
+    _write_start(robot, model.part.closure, names, computed)
 
 
 def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex) -> None:
@@ -358,64 +355,16 @@ def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex)
             ET.SubElement(material, 'color', rgba=format_numbers(*body.colour))
 
 
-def _add_joint(
+def _write_start(
     robot: ET.Element,
-    joint: TreeJoint,
-    span: AngleSpan | None,
-    limits: Limits,
-    wrapped: bool = False,
-    mimic: Ratio | None = None,
-) -> dict[str, str]:
-    """Write a joint; return the limits that were made up because the linkage has none."""
-    kind: str = joint.kind
-    if kind == 'revolute' and span is not None:
-        # A wrapped angle that passes π is on both sides.
-        passing = wrapped and AngleSpan(limits.low, limits.high).passes_pi
-        if passing if limits.is_bounded else not span.limited:
-            kind = 'continuous'
-    element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
-    _write_origin(element, joint.place, joint.turn)
-    ET.SubElement(element, 'parent', link=joint.parent)
-    ET.SubElement(element, 'child', link=joint.child)
-    if joint.kind == 'fixed':
-        return {}
-    assert span is not None, 'all that moves is published'
-    if joint.kind == 'revolute':
-        axis = format_numbers(0.0, 0.0, joint.axis.real)
-    else:
-        axis = format_numbers(joint.axis.real, joint.axis.imag, 0.0)
-    ET.SubElement(element, 'axis', xyz=axis)
-    # A continuous angle that is limited on one side only gets a far limit on the other.
-    lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
-    return write_limits(element, limits, lowest, highest, mimic)
-
-
-def _write_origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
-    xyz, rpy = format_numbers(place.real, place.imag, 0.0), format_numbers(0.0, 0.0, turn)
-    ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
-
-
-def _start_element(
-    closure: Closure, names: PrefixedNames, computed: Mapping[str, Mapping[str, str]]
-) -> ET.Element | None:
-    """
-    Return the data that URDF has no elements for: the inputs, and a pose that closes the loops.
-
-    It also tells which joint limits were made up. Readers of URDF ignore unknown elements; every
-    command reads these. None if several inputs do not close where each is in range.
-    """
-    inputs = usual_inputs(closure)
-    given = zip(closure.linkage.inputs, inputs, strict=True)
-    values = {driven.joint: value for driven, value in given}
-    position = closure.position(*inputs)
-    if not position.joints:
-        return None
-    values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
-    element = ET.Element('linkage_start')
-    for name in named_joints(closure.linkage):
-        kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
-        named = names.own_name(name)
-        joint = ET.SubElement(element, kind, name=named, value=format_number(values[name]))
-        if named in computed:
-            ET.SubElement(joint, 'computed', dict(computed[named]))
-    return element
+    closure: Closure,
+    names: PrefixedNames,
+    computed: Mapping[str, Mapping[str, str]],
+) -> None:
+    """Write where the model starts, unless several inputs do not close where each is in range."""
+    values = dict(zip(closure.input_names, usual_inputs(closure), strict=True))
+    position = closure.position(*values.values())
+    if position.joints:
+        values |= dict(zip(closure.joint_names, position.joints, strict=True))
+        own = {names.own_name(name): values[name] for name in named_joints(closure.linkage)}
+        add_start(robot, [*map(names.own_name, closure.input_names)], own, computed)
