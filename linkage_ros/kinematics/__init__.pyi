@@ -176,7 +176,6 @@ from linkage_ros.kinematics.plane.topology import (
 )
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
-    GroupDescription as GroupDescription,
     InputRange as InputRange,
     Position as Position,
     SingularInput as SingularInput,
@@ -225,6 +224,7 @@ from linkage_ros.kinematics.space.vectors import (
 )
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.kinematics.step import (
+    GroupDescription as GroupDescription,
     LinkState as LinkState,
 )
 from linkage_ros.kinematics.stepwise_closure import StepwiseClosure as StepwiseClosure

@@ -14,7 +14,7 @@ The modules that compute them, and `Closure`, import this one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from math import tau
 from typing import Any, NamedTuple, Protocol
@@ -130,15 +130,6 @@ class SingularityMargin(NamedTuple):
     conditioning: float
     toggle_distance: float
     group: int = -1
-
-
-class GroupDescription(NamedTuple):
-    """What a few steps find together, in words."""
-
-    kind: str
-    links: Sequence[str]
-    method: str
-    assembly: str = ''
 
 
 class LoopClosure(Protocol):

@@ -17,6 +17,7 @@ coordinates that the steps append. Lengths are in the unit of the closure's scal
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import tau
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -142,6 +143,15 @@ class Step:
     def crosses(self) -> tuple[bool, bool]:
         """Return whether it changes its side where it folds, and where it stretches."""
         return self.span.crosses if self.span else (False, False)
+
+
+class GroupDescription(NamedTuple):
+    """What a few steps find together, in words."""
+
+    kind: str
+    links: Sequence[str]
+    method: str
+    assembly: str = ''
 
 
 class LinearStep(Step):

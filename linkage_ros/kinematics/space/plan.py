@@ -45,7 +45,6 @@ from linkage_ros.kinematics.plane.topology import (
     Iterated,
     Structure,
 )
-from linkage_ros.kinematics.results import GroupDescription
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
@@ -78,7 +77,7 @@ from linkage_ros.kinematics.space.vectors import (
     Vector,
     ZERO,
 )
-from linkage_ros.kinematics.step import FollowerJoint, GearedAngle, LinkState
+from linkage_ros.kinematics.step import FollowerJoint, GearedAngle, GroupDescription, LinkState
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
