@@ -166,7 +166,7 @@ def _corrections_json(linkage: Linkage | SpaceLinkage) -> dict[str, Any]:
     corrections = linkage.corrections
     if corrections is None:
         return {}
-    plane = {'plane': list(linkage.axes)} if isinstance(linkage, Linkage) else {}
+    plane = {'plane': list(linkage.axes)} if len(linkage.axes) == 2 else {}
     return plane | {
         'robot_open_by_m': corrections.open_by,
         'robot_turned_by_rad': corrections.turned_by,
@@ -179,10 +179,9 @@ def _corrections_json(linkage: Linkage | SpaceLinkage) -> dict[str, Any]:
 
 def _limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
     """Return the limits of the joints that have any, in SI units."""
-    units = {name: joint.unit for name, joint in linkage.joints.items()}
-    units |= {given.joint: given.unit for given in linkage.inputs}
+    joints = linkage.named_joints
     return [
-        {'joint': name, 'unit': units[name]}
+        {'joint': name, 'unit': joints[name].unit}
         | {key: finite_or_none(value) for key, value in asdict(limits).items()}
         for name, limits in linkage.limits.items()
     ]

@@ -373,7 +373,7 @@ def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Co
             unit = 'rad' if turning else 'm'
             yield _state_column(f'{name}{_ORDERS[order]}', f'{unit}{_PER[order]}')
         for point in question.points:
-            for axis in _axes(closure):
+            for axis in closure.linkage.axes:
                 yield _state_column(f'{point}.{axis}{_ORDERS[order]}', f'm{_PER[order]}')
 
     if question.jacobian:
@@ -386,10 +386,6 @@ def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Co
 
 def _slope_text(slope: float | None, _units: DisplayUnits) -> str:
     return '' if slope is None else f'{slope:.{_DIGITS}f}'
-
-
-def _axes(closure: StepwiseClosure) -> Sequence[str]:
-    return closure.linkage.axes if isinstance(closure, Closure) else 'xyz'
 
 
 def _state_column(name: str, unit: str) -> Column:
@@ -407,7 +403,7 @@ def _state_row(
     row: list[Any] = [*given]
     position = closure.position(*given)
     row += [position.status.value, position.gap]
-    count = len(closure.turning) + len(_axes(closure)) * len(question.points)
+    count = len(closure.turning) + len(closure.linkage.axes) * len(question.points)
     slopes = len(closure.turning) * len(given) if question.jacobian else 0
     if not position.joints:
         return row + [None] * (count * len(_derivative_orders(question)) + slopes)

@@ -92,13 +92,11 @@ def linkage_notes(
 
 def _limit_notes(linkage: Linkage | SpaceLinkage, units: Units) -> Iterator[DefinitionError]:
     """Yield the notes on limits of angles: on each beyond a turn, once on all below 2π degrees."""
-    turning = {given.joint: not given.slider for given in linkage.inputs} | {
-        name: isinstance(joint, RevoluteJoint) for name, joint in linkage.joints.items()
-    }
+    joints = linkage.named_joints
     ends = {
         name: max((abs(end) for end in (limits.low, limits.high) if isfinite(end)), default=0.0)
         for name, limits in linkage.limits.items()
-        if turning[name]
+        if joints[name].unit == 'rad'
     }
     if units.angle == 'degrees':
         widest = degrees(max(ends.values(), default=inf))

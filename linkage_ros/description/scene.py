@@ -19,7 +19,14 @@ from linkage_ros.description.parameters import choice, number, Parts, whole_numb
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import Units
 from linkage_ros.dynamics import Loads
-from linkage_ros.kinematics import Closure, GROUND, Linkage, SlideJoint, SpaceLinkage
+from linkage_ros.kinematics import (
+    Closure,
+    GROUND,
+    JointedLinkage,
+    Linkage,
+    SlideJoint,
+    SpaceLinkage,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.stages.faults import FaultEntry
@@ -242,7 +249,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     }
     if isinstance(linkage, SpaceLinkage):
         joints = {'pin': parts['any_joint'], 'slider': parts['slide']}
-        return {**parts, **joints, 'axis': ('x', 'y', 'z')}
+        return {**parts, **joints, 'axis': linkage.axes}
     points = [point for _, points in carried for point in points]
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
@@ -255,13 +262,11 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     }
 
 
-def _joints_of(linkage: Linkage | SpaceLinkage) -> dict[str, tuple[str, ...]]:
+def _joints_of(linkage: JointedLinkage) -> dict[str, tuple[str, ...]]:
+    joints = linkage.named_joints
     return {
         'joint': tuple(linkage.joints),
         'input': tuple(given.joint for given in linkage.inputs),
-        'any_joint': tuple(dict.fromkeys([*(i.joint for i in linkage.inputs), *linkage.joints])),
-        'slide': (
-            *(given.joint for given in linkage.inputs if given.slider),
-            *(name for name, joint in linkage.joints.items() if isinstance(joint, SlideJoint)),
-        ),
+        'any_joint': tuple(joints),
+        'slide': tuple(name for name, joint in joints.items() if isinstance(joint, SlideJoint)),
     }

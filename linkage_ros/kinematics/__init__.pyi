@@ -138,6 +138,7 @@ from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose as AssemblyPose,
     GROUND as GROUND,
     Input as Input,
+    JointedLinkage as JointedLinkage,
     Limits as Limits,
     Linkage as Linkage,
     links_by_point as links_by_point,

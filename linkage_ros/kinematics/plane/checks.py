@@ -29,6 +29,7 @@ from linkage_ros.kinematics.plane.linkage import (
     Input,
     Linkage,
     RevoluteJoint,
+    SlideJoint,
     Slider,
 )
 
@@ -205,9 +206,8 @@ def _check_follower(linkage: Linkage, name: str) -> None:
 
 def _moved_parts(linkage: Linkage, name: str) -> set[str]:
     """Return the two links that a joint turns, or the slider that it moves."""
-    given = (Input.from_joint(*named) for named in linkage.joints.items())
-    joint = next(one for one in (*linkage.inputs, *given) if one.joint == name)
-    return {joint.slider} if joint.slider else {joint.parent, joint.child}
+    joint = linkage.named_joints[name]
+    return {joint.slider} if isinstance(joint, SlideJoint) else {joint.parent, joint.child}
 
 
 def _one_of(names: object) -> str:

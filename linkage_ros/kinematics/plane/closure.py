@@ -376,8 +376,7 @@ class Closure(StepwiseClosure):
         ratio = linkage.ratios.get(linkage.driven_joints[number].joint)
         if ratio is None:
             return []
-        joints = {**linkage.joints, **{given.joint: given.as_joint() for given in linkage.inputs}}
-        joint = joints[ratio.of]
+        joint = linkage.named_joints[ratio.of]
         if isinstance(joint, SlideJoint):
             return [linkage.sliders[joint.slider].along, self.structure.blocks[joint.slider]]
         return [joint.parent, joint.child]

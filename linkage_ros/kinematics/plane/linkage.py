@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 
@@ -300,8 +300,35 @@ class PoseCorrections:
     beside_by: float = 0.0
 
 
+class JointedLinkage:
+    """What linkages in plane and space have in common: inputs and published joints."""
+
+    __slots__ = ()
+
+    if TYPE_CHECKING:
+
+        @property
+        def inputs(self) -> tuple[Input, ...]: ...
+
+        @property
+        def joints(self) -> Mapping[str, RevoluteJoint | SlideJoint]: ...
+
+    @property
+    def named_joints(self) -> dict[str, RevoluteJoint | SlideJoint]:
+        """Return all joints with a name in messages: the inputs, then the published ones."""
+        return {given.joint: given.as_joint() for given in self.inputs} | {**self.joints}
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """Return the limits of the joints that have any, by name, inputs first."""
+        # An input that is also published has its limits as an input.
+        driven = {given.joint: given.limits for given in self.inputs}
+        named = {name: joint.limits for name, joint in self.named_joints.items()} | driven
+        return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
+
+
 @dataclass(frozen=True, slots=True)
-class Linkage:
+class Linkage(JointedLinkage):
     """
     A planar linkage, as a linkage file says it.
 
@@ -368,15 +395,6 @@ class Linkage:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
         followers = (Input.from_joint(name, self.joints[name]) for name in self.ratios)
         return (*self.inputs, *followers)
-
-    @property
-    def limits(self) -> dict[str, Limits]:
-        """Return the limits of the joints that have any, by name, inputs first."""
-        published = {name: joint.limits for name, joint in self.joints.items()}
-        # An input that is also published has its limits as an input.
-        named = {given.joint: given.limits for given in self.inputs}
-        named |= {name: limits for name, limits in published.items() if name not in named}
-        return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
 
 
 def remove_limits(parts: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:

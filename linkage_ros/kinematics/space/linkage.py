@@ -34,6 +34,7 @@ from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
     GROUND,
     Input,
+    JointedLinkage,
     Limits,
     NO_LIMITS,
     PoseCorrections,
@@ -94,7 +95,7 @@ def _as_doubles(vector: Iterable[float]) -> Vector:
 
 
 @dataclass(frozen=True)
-class SpaceLinkage:
+class SpaceLinkage(JointedLinkage):
     """
     A spatial linkage, as its file says it.
 
@@ -124,6 +125,8 @@ class SpaceLinkage:
         Values of published joints that are left out of the hinges, since they never change.
 
     """
+
+    axes = ('x', 'y', 'z')
 
     points: Mapping[str, Vector]
     links: Mapping[str, tuple[str, ...]]
@@ -184,13 +187,6 @@ class SpaceLinkage:
     def driven_joints(self) -> tuple[Input, ...]:
         """Return the inputs, then the joints that follow others, as if they were inputs."""
         return (*self.inputs, *map(self._as_input, self.ratios))
-
-    @cached_property
-    def limits(self) -> dict[str, Limits]:
-        """Return the limits of the joints that have any, by name, inputs first."""
-        named = {given.joint: given.limits for given in self.inputs}
-        named |= {name: joint.limits for name, joint in self.joints.items()}
-        return {name: limits for name, limits in named.items() if limits != NO_LIMITS}
 
     @cached_property
     def pose(self) -> AssemblyPose:

@@ -28,7 +28,7 @@ from linkage_ros.kinematics import (
     link_lengths,
     SlideJoint,
 )
-from linkage_ros.tools.models.orientation import AngleSpan, named_joints
+from linkage_ros.tools.models.orientation import AngleSpan
 
 _COLOURS = (
     (0.30, 0.47, 0.66, 1.0),
@@ -160,7 +160,7 @@ def slider_travel(
     closure: Closure, slider: str, ranges: Mapping[str, AngleSpan]
 ) -> tuple[float, float]:
     """Return the range of a slider's point along its line, in [m], as far as it is known."""
-    for name, joint in named_joints(closure.linkage).items():
+    for name, joint in closure.linkage.named_joints.items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
             return ranges[name].lowest, ranges[name].highest
     far = 0.5 * closure.slide_bound

@@ -35,7 +35,7 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import bar_width, link_bodies, LinkBody, Solid
-from linkage_ros.tools.models.orientation import joint_spans, named_joints
+from linkage_ros.tools.models.orientation import joint_spans
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
 from linkage_ros.tools.models.xml import (
     format_number,
@@ -151,7 +151,7 @@ def _list_edges(closure: Closure) -> Iterator[_Edge]:
         yield _Edge(0 if is_input else 1, 'P', name, ends)
     published = {
         frozenset((joint.parent, joint.child))
-        for joint in named_joints(linkage).values()
+        for joint in linkage.named_joints.values()
         if isinstance(joint, RevoluteJoint)
     }
     for one, other in combinations(links, 2):
@@ -175,7 +175,7 @@ def _find_cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, 
 
 def _joint_name(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
     """Return the name of a joint in messages, and its sign."""
-    for name, joint in named_joints(closure.linkage).items():
+    for name, joint in closure.linkage.named_joints.items():
         if isinstance(joint, SlideJoint):
             if edge.kind == 'P' and joint.slider == edge.name:
                 return name, 1

@@ -58,17 +58,6 @@ class Turn(NamedTuple):
     constant: float = 0.0  # In [rad]; 0 for a joint
 
 
-def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
-    """Return all joints with a name in messages: the inputs, then the published ones."""
-    inputs: dict[str, RevoluteJoint | SlideJoint] = {
-        given.joint: SlideJoint(given.slider)
-        if given.slider
-        else RevoluteJoint(given.parent, given.child)
-        for given in linkage.inputs
-    }
-    return inputs | dict(linkage.joints)
-
-
 class Orientations:
     """The relative angles of links that messages determine."""
 
@@ -78,7 +67,7 @@ class Orientations:
         for slider in linkage.sliders.values():
             if slider.block:
                 self._add_turn(slider.along, slider.block, '', slider.angle)
-        for name, joint in named_joints(linkage).items():
+        for name, joint in linkage.named_joints.items():
             if isinstance(joint, RevoluteJoint):
                 self._add_turn(joint.parent, joint.child, name, 0.0)
 
@@ -136,7 +125,7 @@ ROUND = AngleSpan(-pi, pi, False)
 
 def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     """Return the range of each joint that has a name in messages."""
-    joints = named_joints(closure.linkage)
+    joints = closure.linkage.named_joints
     if len(closure.linkage.inputs) > 1:
         far = closure.slide_bound
         return {

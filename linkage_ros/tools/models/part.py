@@ -10,14 +10,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.dynamics import Loads
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import Linkage, SpaceLinkage
 from linkage_ros.names import free_name
-from linkage_ros.tools.models.orientation import named_joints
 
 
 class ModelPart(NamedTuple):
@@ -63,11 +62,10 @@ class ModelNames:
 
         A PartError says that two linkages lead to the same name.
         """
-        links, joints = (
-            (linkage.link_names, linkage.pair_joints)
-            if isinstance(linkage, SpaceLinkage)
-            else (linkage.links, named_joints(linkage))
+        joints: Iterable[str] = (
+            linkage.pair_joints if isinstance(linkage, SpaceLinkage) else linkage.named_joints
         )
+        links = linkage.link_names
         for kind, taken, found in (('link', self._frames, links), ('joint', self._joints, joints)):
             for name in found:
                 if prefix + name in taken:

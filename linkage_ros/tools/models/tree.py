@@ -26,7 +26,7 @@ from typing import Literal, NamedTuple
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.names import free_name
-from linkage_ros.tools.models.orientation import named_joints, Orientations, Turn
+from linkage_ros.tools.models.orientation import Orientations, Turn
 from linkage_ros.tools.models.part import ModelNames, PrefixedNames
 
 Kind = Literal['revolute', 'prismatic', 'fixed']
@@ -135,11 +135,11 @@ class _Growth:
         self._linkage = linkage
         self._names = names
         self.tree = Tree(linkage)
-        self.unused = dict.fromkeys(named_joints(linkage))
+        self.unused = dict.fromkeys(linkage.named_joints)
         self._angles = Orientations(linkage)
         self._known = {link: self._angles.angle_between(GROUND, link) for link in linkage.links}
         self._slides: dict[str, list[str]] = {name: [] for name in linkage.sliders}
-        for name, joint in named_joints(linkage).items():
+        for name, joint in linkage.named_joints.items():
             if isinstance(joint, SlideJoint):
                 self._slides[joint.slider].append(name)
 
@@ -265,7 +265,7 @@ def _missing_error(linkage: Linkage) -> DefinitionError:
             break
         link, name, joint = suggest_joint(whole, placed)
         lost[link] = None
-        added[free_name(name, named_joints(whole))] = joint
+        added[free_name(name, whole.named_joints)] = joint
         whole = replace(linkage, joints=dict(linkage.joints) | added)
     several = len(lost) > 1
     return DefinitionError(

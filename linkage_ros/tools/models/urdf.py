@@ -36,7 +36,7 @@ from linkage_ros.kinematics import (
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import link_bodies, LinkBody
-from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, named_joints, ROUND
+from linkage_ros.tools.models.orientation import AngleSpan, joint_spans, ROUND
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
 from linkage_ros.tools.models.space_urdf import SPACE_HEAD, SpaceTree
 from linkage_ros.tools.models.tree import grow_tree, Tree, TreeJoint
@@ -110,7 +110,7 @@ class _FrameAdding:
     def __init__(self, tree: Tree, names: PrefixedNames) -> None:
         self._tree = tree
         self._names = names
-        self._joints = named_joints(tree.linkage)
+        self._joints = tree.linkage.named_joints
         self._spare = list(tree.spare)
 
     def cut_pins(self) -> list[LoopJoint]:
@@ -366,5 +366,5 @@ def _write_start(
     position = closure.position(*values.values())
     if position.joints:
         values |= dict(zip(closure.joint_names, position.joints, strict=True))
-        own = {names.own_name(name): values[name] for name in named_joints(closure.linkage)}
+        own = {names.own_name(name): values[name] for name in closure.linkage.named_joints}
         add_start(robot, [*map(names.own_name, closure.input_names)], own, computed)
