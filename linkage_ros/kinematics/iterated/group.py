@@ -10,11 +10,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from math import prod
+from typing import Any, NamedTuple, TypeVar
 
-from linkage_ros.kinematics.arithmetic import UndecidedError
+from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BUILD_LOCK
 from linkage_ros.kinematics.compiling import Tape
+from linkage_ros.kinematics.iterated.elimination import Elimination, is_zero
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.status import Status
@@ -36,55 +38,42 @@ class GroupPose(NamedTuple):
     gap: float = 0.0  # If they do not close, in lengths
 
 
-class Equations(Protocol):
+class Equations:
     """
     As many equations as unknowns, for numbers and symbols; ``known`` has the steps before.
 
-    Those of the ``free`` unknowns close loops; pins may give the others, the places of links.
+    The ``closing`` equations are solved for the ``free`` unknowns; ``unit_pivots`` of the matrix,
+    as `Elimination` takes them, give the others.
     """
 
-    def errors(self, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
-        """Return how far each equation is from being met."""
+    closing: Sequence[int]
+    free: Sequence[int]
+    angles: Sequence[bool]
+    """For each unknown whether it is an angle."""
+    unit_pivots: Sequence[tuple[int, int]] = ()
 
-    def linearize(self, known: LinkState, unknowns: Sequence[Any]) -> tuple[list[Any], Solve]:
-        """
-        Return the errors, and a function that solves with the matrix of their derivatives.
-
-        An UndecidedError is raised if that is singular.
-        """
-
-    def bound_bends(self, number: int, known: LinkState, unknowns: Sequence[Any]) -> list[Any]:
-        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
-
-    def shortfalls(self, known: LinkState) -> list[Any]:
-        """Return lengths by which parts of the links are too short to close, where positive."""
-
-    def missing_length(self, known: LinkState) -> float | None:
-        """Return by how much a part has no length; None if all have some."""
-
-    # The same and those of pins, by all unknowns
+    # The equations by all unknowns
 
     def evaluate(
         self, known: LinkState, unknowns: Sequence[Any]
     ) -> tuple[list[Any], list[list[Any]]]:
         """Return the errors, and their derivatives by the unknowns, as rows."""
-
-    def error_units(self, known: LinkState) -> Sequence[float]:
-        """Return for each error by what it is divided to be a length, in lengths."""
-
-    @property
-    def free(self) -> Sequence[int]:
-        """Return the indices of the unknowns that are solved for."""
-
-    @property
-    def angles(self) -> Sequence[bool]:
-        """Return for each of all unknowns whether it is an angle."""
-
-    def complete(self, values: Sequence[Any], known: LinkState) -> list[Any]:
-        """Return all unknowns, from those that are free."""
+        raise NotImplementedError
 
     def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
         """Return the derivatives of the errors by time while the unknowns stand."""
+        raise NotImplementedError
+
+    def bend(
+        self,
+        known: LinkState,
+        unknowns: Sequence[Any],
+        velocities: LinkState,
+        rates: Sequence[Any],
+        changes: LinkState,
+    ) -> list[Any]:
+        """Return the second derivatives by time while the rates of the unknowns stand."""
+        raise NotImplementedError
 
     def bound_changes(
         self, known: LinkState, unknowns: Sequence[float]
@@ -94,14 +83,29 @@ class Equations(Protocol):
 
         It takes the largest change of each unknown, in either direction.
         """
+        raise NotImplementedError
 
-    def is_meshed(self, off: Sequence[float], part: float) -> bool:
+    def is_meshed(self, _off: Sequence[float], _part: float) -> bool:
         """Return whether the errors of ratios are off by less than a part of their periods."""
+        return True
+
+    def error_units(self, _known: LinkState) -> Sequence[float]:
+        """Return for each error by what it is divided to be a length, in lengths."""
+        return [1.0] * len(self.angles)
+
+    def shortfalls(self, _known: LinkState) -> list[Any]:
+        """Return lengths by which parts are known to be too short to close, where positive."""
+        return []
+
+    def missing_length(self, _known: LinkState) -> float | None:
+        """Return by how much a part has no length; None if all have some."""
+        return None
 
     def solve_rates(
         self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
     ) -> list[Any]:
         """Return the rates of the unknowns."""
+        return self._undo(self.drift(known, unknowns, velocities), known, unknowns)
 
     def solve_accelerations(
         self,
@@ -112,11 +116,58 @@ class Equations(Protocol):
         changes: LinkState,
     ) -> list[Any]:
         """Return the accelerations of the unknowns."""
+        bend = self.bend(known, unknowns, velocities, rates, changes)
+        return self._undo(bend, known, unknowns)
+
+    def _undo(
+        self, changes: Sequence[Any], known: LinkState, unknowns: Sequence[Any]
+    ) -> list[Any]:
+        """Return what of the unknowns makes up for changes of the errors."""
+        # On a tape the matrix is that of rates and of accelerations, and is there only once.
+        matrix = Elimination(self.evaluate(known, unknowns)[1], self.unit_pivots)
+        return matrix.solve([0.0 if is_zero(change) else -change for change in changes])
+
+    # The closing equations by the free unknowns
+
+    def complete(self, values: Sequence[Any], _known: LinkState) -> list[Any]:
+        """Return all unknowns, from those that are free."""
+        return [*values]
+
+    def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return how far each equation is from being met."""
+        errors, _ = self.evaluate(known, self.complete(values, known))
+        return [errors[row] for row in self.closing]
+
+    def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
+        """
+        Return the errors, and a function that solves with the matrix of their derivatives.
+
+        An UndecidedError is raised if that is singular.
+        """
+        errors, rows = self.evaluate(known, self.complete(values, known))
+        matrix = Elimination(rows, self.unit_pivots)
+        divisors = matrix.divisors
+        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
+            raise UndecidedError
+
+        def solve(right: Sequence[Any]) -> list[Any]:
+            whole = [0.0] * len(errors)
+            for row, value in zip(self.closing, right, strict=True):
+                whole[row] = value
+            found = matrix.solve(whole)
+            return [found[k] for k in self.free]
+
+        return [errors[row] for row in self.closing], solve
+
+    def bound_bends(self, number: int, known: LinkState, values: Sequence[Any]) -> list[Any]:
+        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
+        raise NotImplementedError
 
     # The links, as coordinates and pins
 
     def place(self, known: LinkState, unknowns: Sequence[Any], gained: Sequence[Any]) -> LinkState:
         """Return the links; ``gained`` is added to the unknowns."""
+        raise NotImplementedError
 
     def move(
         self,
@@ -126,6 +177,7 @@ class Equations(Protocol):
         rates: Sequence[Any],
     ) -> LinkState:
         """Return the rates of the links."""
+        raise NotImplementedError
 
     def change(
         self,
@@ -137,9 +189,11 @@ class Equations(Protocol):
         accelerations: Sequence[Any],
     ) -> LinkState:
         """Return the accelerations of the links."""
+        raise NotImplementedError
 
     def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:
         """Return numbers in which two solutions differ if a link lies elsewhere, in lengths."""
+        raise NotImplementedError
 
 
 class IteratedGroup:

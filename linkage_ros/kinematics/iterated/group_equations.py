@@ -19,19 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from math import prod
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.arithmetic import (
     make_vector,
-    SMALLEST,
-    UndecidedError,
     unit_vector,
 )
 from linkage_ros.kinematics.iterated.bend_bounds import ArmSums, list_bounds
-from linkage_ros.kinematics.iterated.elimination import Elimination, is_zero, subtract
+from linkage_ros.kinematics.iterated.elimination import subtract
 from linkage_ros.kinematics.iterated.equations import (
     bound_jacobian_change,
     CoincidentPoints,
@@ -45,7 +42,7 @@ from linkage_ros.kinematics.iterated.equations import (
     OnLine,
 )
 from linkage_ros.kinematics.iterated.grid import grid_inputs
-from linkage_ros.kinematics.iterated.group import Solve
+from linkage_ros.kinematics.iterated.group import Equations
 from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.plane.linkage import Linkage
@@ -65,7 +62,7 @@ class _PlacedBody(NamedTuple):
     other: End
 
 
-class GroupEquations:
+class GroupEquations(Equations):
     """
     As many equations as unknowns: for each of ``bodies`` links its angle and its place.
 
@@ -76,34 +73,29 @@ class GroupEquations:
         self, constraints: Sequence[Constraint], slides: Iterable[OnLine], bodies: int
     ) -> None:
         self._constraints, self._slides = constraints, tuple(slides)
-        self._count = 3 * bodies
+        self._still = [0.0] * (3 * bodies)
+        self.angles = [not k % 3 for k in range(3 * bodies)]
         self._placed = _place_bodies(constraints, bodies)
         by_pins = {each.end.body for each in self._placed}
-        self.free = tuple(k for k in range(self._count) if not k % 3 or k // 3 not in by_pins)
+        self.free = tuple(k for k in range(3 * bodies) if not k % 3 or k // 3 not in by_pins)
         self._rows_of_pins = {each.row + axis for each in self._placed for axis in (0, 1)}
         rows = [
             (constraint, axis)
             for constraint in constraints
             for axis in range(1 + isinstance(constraint, CoincidentPoints))
         ]
-        self._closing = [row for row in range(len(rows)) if row not in self._rows_of_pins]
-        self._closing_constraints = [rows[row][0] for row in self._closing]
+        self.closing = [row for row in range(len(rows)) if row not in self._rows_of_pins]
+        self._closing_constraints = [rows[row][0] for row in self.closing]
         self._sums = ArmSums({each.end.body: (each.end, each.other) for each in self._placed})
         # The last first: its place is in no other of the equations that remain.
-        self._unit_pivots = [
+        self.unit_pivots = [
             (each.row + axis, 3 * each.end.body + 1 + axis)
             for each in reversed(self._placed)
             for axis in (0, 1)
         ]
 
-    @property
-    def angles(self) -> list[bool]:
-        """Return for each of all unknowns whether it is an angle."""
-        return [not k % 3 for k in range(self._count)]
-
     def complete(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
-        """Return all unknowns, from those that are free."""
-        unknowns: list[Any] = [0.0] * self._count
+        unknowns: list[Any] = [*self._still]
         for k, value in zip(self.free, values, strict=True):
             unknowns[k] = value
         for _, end, other in self._placed:
@@ -112,79 +104,21 @@ class GroupEquations:
             unknowns[k + 1], unknowns[k + 2] = place.real, place.imag
         return unknowns
 
-    def shortfalls(self, _known: LinkState) -> list[Any]:
-        """Return nothing: which links are too short is known only by iteration."""
-        return []
-
-    # The equations that close loops, as functions of the free unknowns; see `GridGroup`
-
-    def errors(self, known: LinkState, values: Sequence[Any]) -> list[Any]:
-        """Return how far the equations are from being met."""
-        unknowns = self.complete(values, known)
-        errors, _ = evaluate_constraints(self._constraints, unknowns, known)
-        return [errors[row] for row in self._closing]
-
-    def linearize(self, known: LinkState, values: Sequence[Any]) -> tuple[list[Any], Solve]:
-        """Return the errors, and a function that solves with the matrix of their derivatives."""
-        unknowns = self.complete(values, known)
-        errors, jacobian = evaluate_constraints(self._constraints, unknowns, known)
-        eliminated = Elimination(jacobian, self._unit_pivots)
-        divisors = eliminated.divisors
-        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
-            raise UndecidedError
-
-        def solve(right: Sequence[Any]) -> list[Any]:
-            whole = [0.0] * self._count
-            for row, value in zip(self._closing, right, strict=True):
-                whole[row] = value
-            found = eliminated.solve(whole)
-            return [found[k] for k in self.free]
-
-        return [errors[row] for row in self._closing], solve
-
     def bound_bends(self, number: int, known: LinkState, values: Sequence[Any]) -> list[Any]:
-        """Return bounds of an equation's second derivatives, by all pairs of unknowns."""
         unknowns = self.complete(values, known)
         bounds = self._sums.bound_bends(self._closing_constraints[number], unknowns, known)
         return list_bounds(bounds, self.free)
 
-    def missing_length(self, _known: LinkState) -> None:
-        """Return nothing: no part has a length that an input sets."""
-
-    # All equations, as functions of all unknowns; see `BranchGroup` and `NewtonSystem`
-
     def evaluate(
         self, known: LinkState, unknowns: Sequence[Any]
     ) -> tuple[list[Any], list[list[Any]]]:
-        """Return the residuals, and their derivatives by the unknowns, as rows."""
         return evaluate_constraints(self._constraints, unknowns, known)
 
     def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
-        """Return the derivatives of the residuals by time while the unknowns stand."""
-        motion = GroupMotion(unknowns, known, [0.0] * self._count, velocities)
+        motion = GroupMotion(unknowns, known, self._still, velocities)
         return differentiate_constraints(self._constraints, motion)
 
-    def error_units(self, _known: LinkState) -> list[float]:
-        """Return for each residual by what it is divided to be a length."""
-        return [1.0] * self._count
-
-    def bound_changes(
-        self, known: LinkState, unknowns: Sequence[float]
-    ) -> Callable[[Sequence[float]], list[list[float]]]:
-        """Return a function that bounds the change of the derivatives by unknowns."""
-        return partial(bound_jacobian_change, self._constraints, unknowns, known)
-
-    def is_meshed(self, off: Sequence[float], part: float) -> bool:
-        """Return whether the residuals of ratios are off by less than a part of their periods."""
-        return is_meshed(self._constraints, off, part)
-
-    def solve_rates(
-        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the unknowns."""
-        return self._solve_motion(GroupMotion(unknowns, known, [0.0] * self._count, velocities))
-
-    def solve_accelerations(
+    def bend(
         self,
         known: LinkState,
         unknowns: Sequence[Any],
@@ -192,22 +126,20 @@ class GroupEquations:
         rates: Sequence[Any],
         changes: LinkState,
     ) -> list[Any]:
-        """Return the accelerations of the unknowns."""
-        still = [0.0] * self._count
-        return self._solve_motion(GroupMotion(unknowns, known, rates, velocities, still, changes))
+        motion = GroupMotion(unknowns, known, rates, velocities, self._still, changes)
+        return differentiate_constraints(self._constraints, motion)
 
-    def _solve_motion(self, motion: GroupMotion) -> list[Any]:
-        """Return the highest derivatives of the unknowns, for a motion that has 0 for them."""
-        drift = differentiate_constraints(self._constraints, motion)
-        # On a tape the matrix is that of rates and of accelerations, and is there only once.
-        jacobian = evaluate_constraints(self._constraints, motion.unknowns, motion.solved)[1]
-        right = [0.0 if is_zero(each) else -each for each in drift]
-        return Elimination(jacobian, self._unit_pivots).solve(right)
+    def bound_changes(
+        self, known: LinkState, unknowns: Sequence[float]
+    ) -> Callable[[Sequence[float]], list[list[float]]]:
+        return partial(bound_jacobian_change, self._constraints, unknowns, known)
+
+    def is_meshed(self, off: Sequence[float], part: float) -> bool:
+        return is_meshed(self._constraints, off, part)
 
     # The links: the angles of the bodies and the slides, and the places of the bodies
 
     def place(self, known: LinkState, unknowns: Sequence[Any], gained: Sequence[Any]) -> LinkState:
-        """Return the links; ``gained`` is added to the angles."""
         angles = map(add, unknowns[0::3], gained[0::3])
         slides = (slide.place(unknowns, known).real for slide in self._slides)
         return LinkState([*angles, *slides], _body_places(unknowns))
@@ -219,7 +151,6 @@ class GroupEquations:
         velocities: LinkState,
         rates: Sequence[Any],
     ) -> LinkState:
-        """Return the rates of the links."""
         return self._list_changes(GroupMotion(unknowns, known, rates, velocities))
 
     def change(
@@ -231,7 +162,6 @@ class GroupEquations:
         changes: LinkState,
         accelerations: Sequence[Any],
     ) -> LinkState:
-        """Return the accelerations of the links."""
         return self._list_changes(
             GroupMotion(unknowns, known, rates, velocities, accelerations, changes)
         )
@@ -242,7 +172,6 @@ class GroupEquations:
         return LinkState([*values[0::3], *slides], _body_places(values))
 
     def list_places(self, _known: LinkState, unknowns: Sequence[float]) -> list[complex]:
-        """Return the directions and places of the bodies."""
         return [*map(unit_vector, unknowns[0::3]), *_body_places(unknowns)]
 
 

@@ -16,14 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations, combinations_with_replacement, islice
-from math import dist, hypot, inf, prod
+from math import dist, hypot, inf
 from operator import add
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import SMALLEST, UndecidedError
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.iterated.elimination import Elimination
-from linkage_ros.kinematics.iterated.group import Solve
+from linkage_ros.kinematics.iterated.group import Equations
 from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import missing_length, Rod
@@ -86,7 +84,7 @@ class KnotRod(NamedTuple):
     rod: Rod
 
 
-class KnotEquations:
+class KnotEquations(Equations):
     """
     As many rods as there are unknown joints among the movers of a tree.
 
@@ -98,36 +96,21 @@ class KnotEquations:
         self._chains = [self._moving_chains(rod) for rod in rods]
         unknown = sorted((one for one in movers if one.unknown >= 0), key=lambda one: one.unknown)
         self.angles = [not isinstance(one.joint, SlidePair) for one in unknown]
-        """For each unknown whether it is an angle."""
-        self.free = range(len(unknown))
-        """The unknowns that are solved for: all."""
+        self.free = self.closing = range(len(unknown))
         self._bends_line = StraightLine(self._list_bends, lambda: None)
-
-    def solve_rates(
-        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
-    ) -> list[float]:
-        """Return the rates of the unknowns: (C − B)·(Ċ − Ḃ) = L·L̇ for each rod."""
-        right = self._missing_rates(known, unknowns, velocities)
-        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
 
     def drift(
         self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
     ) -> list[float]:
-        """Return the derivatives of the residuals by time while the unknowns stand."""
-        return [-rate for rate in self._missing_rates(known, unknowns, velocities)]
-
-    def _missing_rates(
-        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
-    ) -> list[float]:
-        """Return what the unknowns must add to each rod's (C − B)·(Ċ − Ḃ)."""
+        """Return for each rod (C − B)·(Ċ − Ḃ) − L·L̇ while the unknowns stand."""
         state = self._place_links(known, unknowns)
         still = self._add_motions(state, velocities, [0.0] * len(self._rods))
         return [
-            subtract(rod.rod.power(state, velocities), dot(vector, slip))
+            subtract(dot(vector, slip), rod.rod.power(state, velocities))
             for rod, vector, slip in self._slips(state, still)
         ]
 
-    def solve_accelerations(
+    def bend(
         self,
         known: LinkState,
         unknowns: Sequence[float],
@@ -135,11 +118,11 @@ class KnotEquations:
         rates: Sequence[float],
         changes: LinkState,
     ) -> list[float]:
-        """Return the accelerations: (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² = L·L̈ + L̇² for each rod."""
+        """Return for each rod (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² − L·L̈ − L̇² at steady rates."""
         state = self._place_links(known, unknowns)
         moving = self._add_motions(state, velocities, rates)
         before = self._add_changes(state, moving, changes, rates, [0.0] * len(self._rods))
-        right = []
+        found = []
         for rod, vector, slip in self._slips(state, moving):
             one, other = (
                 before.pins[end.pin]
@@ -147,9 +130,9 @@ class KnotEquations:
                 else moving.pins[end.pin].acceleration(before.pins[end.pin], end.arm(state))
                 for end in (rod.start, rod.end)
             )
-            bend = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
-            right.append(subtract(bend, dot(vector, minus(other, one))))
-        return Elimination(self.evaluate(known, unknowns)[1], ()).solve(right)
+            of_rod = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
+            found.append(subtract(dot(vector, minus(other, one)), of_rod))
+        return found
 
     def _place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
         """Return the state with the frames of the links."""
@@ -207,7 +190,6 @@ class KnotEquations:
     def place(
         self, known: LinkState, unknowns: Sequence[float], gained: Sequence[float]
     ) -> LinkState:
-        """Return the links; ``gained`` is added to the unknowns."""
         return self._own_part(map(add, unknowns, gained), self._place_links(known, unknowns))
 
     def move(
@@ -217,7 +199,6 @@ class KnotEquations:
         velocities: LinkState,
         rates: Sequence[float],
     ) -> LinkState:
-        """Return the rates of the joints, and the motions of the links."""
         state = self._place_links(known, unknowns)
         return self._own_part(rates, self._add_motions(state, velocities, rates))
 
@@ -230,7 +211,6 @@ class KnotEquations:
         changes: LinkState,
         accelerations: Sequence[float],
     ) -> LinkState:
-        """Return the accelerations of the joints, and the derivatives of the motions."""
         state = self._place_links(known, unknowns)
         moving = self._add_motions(state, velocities, rates)
         changing = self._add_changes(state, moving, changes, rates, accelerations)
@@ -240,13 +220,11 @@ class KnotEquations:
         return LinkState([*joints], [*islice(state.pins, self._first, None)])
 
     def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:
-        """Return the coordinates of the ends of all rods."""
         state = self._place_links(known, unknowns)
         ends = (end.locate(state) for rod in self._rods for end in (rod.start, rod.end))
         return [coordinate for end in ends for coordinate in end]
 
     def missing_length(self, known: LinkState) -> float | None:
-        """Return by how much a rod has no length; None if all have some."""
         return missing_length([rod.rod for rod in self._rods], known)
 
     @BuiltProperty
@@ -280,23 +258,9 @@ class KnotEquations:
             found += [2.0 * bar - sum(bars[1:], bars[0]) for bar in bars]
         return found
 
-    def errors(self, known: LinkState, unknowns: Sequence[float]) -> list[float]:
-        """Return the residuals."""
-        return self.evaluate(known, unknowns)[0]
-
-    def linearize(self, known: LinkState, unknowns: Sequence[float]) -> tuple[list[float], Solve]:
-        """Return the residuals, and a function that solves with their derivatives."""
-        errors, rows = self.evaluate(known, unknowns)
-        matrix = Elimination(rows, ())
-        divisors = matrix.divisors
-        if divisors and not abs(prod(divisors[1:], start=divisors[0])) > SMALLEST:
-            raise UndecidedError
-        return errors, matrix.solve
-
     def evaluate(
         self, known: LinkState, unknowns: Sequence[float]
     ) -> tuple[list[float], list[list[float]]]:
-        """Return the residuals, and their derivatives by the unknowns."""
         state = self._place_links(known, unknowns)
         errors, rows = [], []
         for rod, chains in zip(self._rods, self._chains, strict=True):
@@ -340,22 +304,12 @@ class KnotEquations:
                 axis, other = joint.seat.turn(axis), joint.parent - self._first
         return found
 
-    def complete(self, values: Sequence[float], _known: LinkState) -> list[float]:
-        """Return all unknowns: those that are solved for."""
-        return [*values]
-
     def error_units(self, known: LinkState) -> list[float]:
-        """Return for each residual by what it is divided to be a length: its rod's length."""
         return [max(rod.rod.length(known), _SHORTEST) for rod in self._rods]
-
-    def is_meshed(self, _off: Sequence[float], _part: float) -> bool:
-        """Return whether no ratio is off by a tooth: there are none."""
-        return True
 
     def bound_changes(
         self, known: LinkState, unknowns: Sequence[float]
     ) -> Callable[[Sequence[float]], list[list[float]]]:
-        """Return a function that bounds the change of the derivatives by unknowns."""
         count = len(unknowns)
         pairs = [*combinations_with_replacement(range(count), 2)]
         found = self._bends_line(known, LinkState([*unknowns], []))
