@@ -30,6 +30,7 @@ from linkage_ros.kinematics.iterated.branch import Branch, Continuation, is_repe
 from linkage_ros.kinematics.iterated.group import (
     compile_later,
     Equations,
+    GroupMotion,
     GroupPose,
     IteratedGroup,
     require_state,
@@ -129,7 +130,9 @@ class BranchGroup(IteratedGroup):
         rates = [float(k == self._followed.number) for k in range(len(self._before.inputs))]
         known, velocities = require_state(self._before.moving_at(self._all_inputs(x), rates))
         errors, rows = self._equations.evaluate(known, pose.coordinates)
-        drift = self._equations.drift(known, pose.coordinates, velocities)
+        still = [0.0] * len(pose.coordinates)
+        motion = GroupMotion(pose.coordinates, known, still, velocities)
+        drift = self._equations.drift(motion)
         return [*errors, *(x for row, d in zip(rows, drift, strict=True) for x in (*row, d))]
 
     def _list_unknowns(self, given: LinkState, values: LinkState) -> list[float]:

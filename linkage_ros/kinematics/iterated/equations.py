@@ -25,6 +25,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import make_vector, remainder, unit_vector
 from linkage_ros.kinematics.iterated.elimination import add, multiply, subtract
+from linkage_ros.kinematics.iterated.group import GroupMotion
 from linkage_ros.kinematics.plane.linkage import Linkage, Ratio, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plane.solved_links import count_turns
 from linkage_ros.kinematics.plane.topology import Joint
@@ -74,28 +75,6 @@ class End(NamedTuple):
         change, *pull = (motion.accelerations[k + i] for i in range(3))
         swirl = multiply(make_vector(-turn * turn, change), arm)
         return place, velocity, add(make_vector(*pull), swirl)
-
-
-class GroupMotion(NamedTuple):
-    """
-    The unknowns and the links solved before them, their rates, and their accelerations if wanted.
-
-    The highest derivatives of the unknowns may be 0: the constraints then tell what these lack.
-    """
-
-    unknowns: Sequence[Any]
-    solved: LinkState
-    rates: Sequence[Any]
-    solved_rates: LinkState
-    accelerations: Sequence[Any] = ()
-    solved_accelerations: LinkState | None = None
-
-    @property
-    def highest(self) -> tuple[Sequence[Any], LinkState]:
-        """Return the highest derivatives by time."""
-        if self.solved_accelerations is None:
-            return self.rates, self.solved_rates
-        return self.accelerations, self.solved_accelerations
 
 
 class BodyDirection(NamedTuple):

@@ -26,6 +26,7 @@ from linkage_ros.kinematics.iterated.elimination import add, multiply, subtract
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput, LineForms
 from linkage_ros.kinematics.iterated.group import (
     Equations,
+    GroupMotion,
     GroupPose,
     IteratedGroup,
     require_state,
@@ -277,19 +278,20 @@ class GridGroup(IteratedGroup):
         states = self._before.moving_at(given.coordinates, rates.coordinates)
         known, velocities = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
-        return self._equations.solve_rates(known, unknowns, velocities)
+        still = [0.0] * len(unknowns)
+        return self._equations.solve_motion(GroupMotion(unknowns, known, still, velocities))
 
     def _list_bends(
         self, given: LinkState, pose: LinkState, rates: LinkState, slopes: Sequence[Any]
     ) -> list[Any]:
         """Return the accelerations of the free unknowns at steady rates of the inputs."""
-        still = [0.0] * len(given.coordinates)
-        states = self._before.changing_at(given.coordinates, rates.coordinates, still)
+        steady = [0.0] * len(given.coordinates)
+        states = self._before.changing_at(given.coordinates, rates.coordinates, steady)
         known, velocities, changes = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
-        return self._free_of(
-            self._equations.solve_accelerations(known, unknowns, velocities, slopes, changes)
-        )
+        still = [0.0] * len(unknowns)
+        motion = GroupMotion(unknowns, known, slopes, velocities, still, changes)
+        return self._free_of(self._equations.solve_motion(motion))
 
     def _list_forms(self, given: LinkState, pose: LinkState) -> list[Any]:
         """Return slopes and bends: rates and accelerations along one input, or along two."""

@@ -38,6 +38,28 @@ class GroupPose(NamedTuple):
     gap: float = 0.0  # If they do not close, in lengths
 
 
+class GroupMotion(NamedTuple):
+    """
+    The unknowns and the links solved before them, their rates, and their accelerations if wanted.
+
+    The highest derivatives of the unknowns may be 0: the constraints then tell what these lack.
+    """
+
+    unknowns: Sequence[Any]
+    solved: LinkState
+    rates: Sequence[Any]
+    solved_rates: LinkState
+    accelerations: Sequence[Any] = ()
+    solved_accelerations: LinkState | None = None
+
+    @property
+    def highest(self) -> tuple[Sequence[Any], LinkState]:
+        """Return the highest derivatives by time."""
+        if self.solved_accelerations is None:
+            return self.rates, self.solved_rates
+        return self.accelerations, self.solved_accelerations
+
+
 class Equations:
     """
     As many equations as unknowns, for numbers and symbols; ``known`` has the steps before.
@@ -60,19 +82,8 @@ class Equations:
         """Return the errors, and their derivatives by the unknowns, as rows."""
         raise NotImplementedError
 
-    def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
-        """Return the derivatives of the errors by time while the unknowns stand."""
-        raise NotImplementedError
-
-    def bend(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        """Return the second derivatives by time while the rates of the unknowns stand."""
+    def drift(self, motion: GroupMotion) -> list[Any]:
+        """Return the highest derivative of the errors, of a motion that has 0 for the unknowns."""
         raise NotImplementedError
 
     def bound_changes(
@@ -101,31 +112,12 @@ class Equations:
         """Return by how much a part has no length; None if all have some."""
         return None
 
-    def solve_rates(
-        self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
-    ) -> list[Any]:
-        """Return the rates of the unknowns."""
-        return self._undo(self.drift(known, unknowns, velocities), known, unknowns)
-
-    def solve_accelerations(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        """Return the accelerations of the unknowns."""
-        bend = self.bend(known, unknowns, velocities, rates, changes)
-        return self._undo(bend, known, unknowns)
-
-    def _undo(
-        self, changes: Sequence[Any], known: LinkState, unknowns: Sequence[Any]
-    ) -> list[Any]:
-        """Return what of the unknowns makes up for changes of the errors."""
+    def solve_motion(self, motion: GroupMotion) -> list[Any]:
+        """Return the highest derivatives of the unknowns, of a motion that has 0 for them."""
+        drift = self.drift(motion)
         # On a tape the matrix is that of rates and of accelerations, and is there only once.
-        matrix = Elimination(self.evaluate(known, unknowns)[1], self.unit_pivots)
-        return matrix.solve([0.0 if is_zero(change) else -change for change in changes])
+        matrix = Elimination(self.evaluate(motion.solved, motion.unknowns)[1], self.unit_pivots)
+        return matrix.solve([0.0 if is_zero(each) else -each for each in drift])
 
     # The closing equations by the free unknowns
 
@@ -169,26 +161,8 @@ class Equations:
         """Return the links; ``gained`` is added to the unknowns."""
         raise NotImplementedError
 
-    def move(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-    ) -> LinkState:
-        """Return the rates of the links."""
-        raise NotImplementedError
-
-    def change(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-        accelerations: Sequence[Any],
-    ) -> LinkState:
-        """Return the accelerations of the links."""
+    def move(self, motion: GroupMotion) -> LinkState:
+        """Return the highest derivative of the links."""
         raise NotImplementedError
 
     def list_places(self, known: LinkState, unknowns: Sequence[float]) -> list[complex]:

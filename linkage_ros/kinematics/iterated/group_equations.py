@@ -37,12 +37,11 @@ from linkage_ros.kinematics.iterated.equations import (
     differentiate_constraints,
     End,
     evaluate_constraints,
-    GroupMotion,
     is_meshed,
     OnLine,
 )
 from linkage_ros.kinematics.iterated.grid import grid_inputs
-from linkage_ros.kinematics.iterated.group import Equations
+from linkage_ros.kinematics.iterated.group import Equations, GroupMotion
 from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.plane.linkage import Linkage
@@ -73,7 +72,6 @@ class GroupEquations(Equations):
         self, constraints: Sequence[Constraint], slides: Iterable[OnLine], bodies: int
     ) -> None:
         self._constraints, self._slides = constraints, tuple(slides)
-        self._still = [0.0] * (3 * bodies)
         self.angles = [not k % 3 for k in range(3 * bodies)]
         self._placed = _place_bodies(constraints, bodies)
         by_pins = {each.end.body for each in self._placed}
@@ -95,7 +93,7 @@ class GroupEquations(Equations):
         ]
 
     def complete(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
-        unknowns: list[Any] = [*self._still]
+        unknowns: list[Any] = [0.0] * len(self.angles)
         for k, value in zip(self.free, values, strict=True):
             unknowns[k] = value
         for _, end, other in self._placed:
@@ -114,19 +112,7 @@ class GroupEquations(Equations):
     ) -> tuple[list[Any], list[list[Any]]]:
         return evaluate_constraints(self._constraints, unknowns, known)
 
-    def drift(self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState) -> list[Any]:
-        motion = GroupMotion(unknowns, known, self._still, velocities)
-        return differentiate_constraints(self._constraints, motion)
-
-    def bend(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-    ) -> list[Any]:
-        motion = GroupMotion(unknowns, known, rates, velocities, self._still, changes)
+    def drift(self, motion: GroupMotion) -> list[Any]:
         return differentiate_constraints(self._constraints, motion)
 
     def bound_changes(
@@ -144,29 +130,7 @@ class GroupEquations(Equations):
         slides = (slide.place(unknowns, known).real for slide in self._slides)
         return LinkState([*angles, *slides], _body_places(unknowns))
 
-    def move(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-    ) -> LinkState:
-        return self._list_changes(GroupMotion(unknowns, known, rates, velocities))
-
-    def change(
-        self,
-        known: LinkState,
-        unknowns: Sequence[Any],
-        velocities: LinkState,
-        rates: Sequence[Any],
-        changes: LinkState,
-        accelerations: Sequence[Any],
-    ) -> LinkState:
-        return self._list_changes(
-            GroupMotion(unknowns, known, rates, velocities, accelerations, changes)
-        )
-
-    def _list_changes(self, motion: GroupMotion) -> LinkState:
+    def move(self, motion: GroupMotion) -> LinkState:
         values, _ = motion.highest
         slides = (slide.measured_change(motion) for slide in self._slides)
         return LinkState([*values[0::3], *slides], _body_places(values))

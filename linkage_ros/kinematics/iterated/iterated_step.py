@@ -29,7 +29,13 @@ from linkage_ros.kinematics.iterated.branch import Branch
 from linkage_ros.kinematics.iterated.branch_group import BranchGroup, FollowedInput
 from linkage_ros.kinematics.iterated.grid import Grid, GridInput
 from linkage_ros.kinematics.iterated.grid_group import GridGroup
-from linkage_ros.kinematics.iterated.group import Equations, find_inputs, GroupPose, require_state
+from linkage_ros.kinematics.iterated.group import (
+    Equations,
+    find_inputs,
+    GroupMotion,
+    GroupPose,
+    require_state,
+)
 from linkage_ros.kinematics.iterated.newton_system import NewtonSystem
 from linkage_ros.kinematics.iterated.steps_before import StepsBefore
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
@@ -196,8 +202,9 @@ class IteratedStep(Step):
     def _list_rates(
         self, known: LinkState, unknowns: Sequence[Any], velocities: LinkState
     ) -> tuple[list[Any], LinkState]:
-        rates = self._equations.solve_rates(known, unknowns, velocities)
-        return rates, self._equations.move(known, unknowns, velocities, rates)
+        motion = GroupMotion(unknowns, known, [0.0] * len(unknowns), velocities)
+        rates = self._equations.solve_motion(motion)
+        return rates, self._equations.move(motion._replace(rates=rates))
 
     def _list_accelerations(
         self,
@@ -207,8 +214,10 @@ class IteratedStep(Step):
         rates: Sequence[Any],
         changes: LinkState,
     ) -> LinkState:
-        given = known, unknowns, velocities, rates, changes
-        return self._equations.change(*given, self._equations.solve_accelerations(*given))
+        still = [0.0] * len(unknowns)
+        motion = GroupMotion(unknowns, known, rates, velocities, still, changes)
+        found = self._equations.solve_motion(motion)
+        return self._equations.move(motion._replace(accelerations=found))
 
     def _trace_examples(self) -> dict[str, Any]:
         """Return the states at the pose as symbols; nothing if it is at a toggle."""

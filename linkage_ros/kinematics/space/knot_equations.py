@@ -14,14 +14,14 @@ places on two links. All functions take numbers or symbols, and decide nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations, combinations_with_replacement, islice
 from math import dist, hypot, inf
 from operator import add
 from typing import NamedTuple
 
 from linkage_ros.kinematics.built_once import BuiltProperty
-from linkage_ros.kinematics.iterated.group import Equations
+from linkage_ros.kinematics.iterated.group import Equations, GroupMotion
 from linkage_ros.kinematics.iterated.straight_line import StraightLine
 from linkage_ros.kinematics.space.joints import LowerPair, SlidePair
 from linkage_ros.kinematics.space.steps import missing_length, Rod
@@ -70,10 +70,24 @@ class RodEnd(NamedTuple):
         pin = state.pins[self.pin]
         return plus(pin, self.place) if self.mover < 0 else pin.place(self.place)
 
-    def arm(self, state: LinkState) -> Vector:
+    def _arm(self, state: LinkState) -> Vector:
         """Return the place from the origin of its link."""
         frame: SpaceFrame = state.pins[self.pin]
         return frame.turn(self.place)
+
+    def velocity(self, state: LinkState, moving: LinkState) -> Vector:
+        """Return the velocity of the place."""
+        found: Vector = moving.pins[self.pin]
+        if self.mover >= 0:
+            found = moving.pins[self.pin].velocity(self._arm(state))
+        return found
+
+    def acceleration(self, state: LinkState, moving: LinkState, changing: LinkState) -> Vector:
+        """Return the acceleration of the place."""
+        found: Vector = changing.pins[self.pin]
+        if self.mover >= 0:
+            found = moving.pins[self.pin].acceleration(found, self._arm(state))
+        return found
 
 
 class KnotRod(NamedTuple):
@@ -99,40 +113,45 @@ class KnotEquations(Equations):
         self.free = self.closing = range(len(unknown))
         self._bends_line = StraightLine(self._list_bends, lambda: None)
 
-    def drift(
-        self, known: LinkState, unknowns: Sequence[float], velocities: LinkState
-    ) -> list[float]:
-        """Return for each rod (C − B)·(Ċ − Ḃ) − L·L̇ while the unknowns stand."""
-        state = self._place_links(known, unknowns)
-        still = self._add_motions(state, velocities, [0.0] * len(self._rods))
-        return [
-            subtract(dot(vector, slip), rod.rod.power(state, velocities))
-            for rod, vector, slip in self._slips(state, still)
-        ]
+    def drift(self, motion: GroupMotion) -> list[float]:
+        """
+        Return for each rod (C − B)·(Ċ − Ḃ) − L·L̇, if the unknowns stand.
 
-    def bend(
-        self,
-        known: LinkState,
-        unknowns: Sequence[float],
-        velocities: LinkState,
-        rates: Sequence[float],
-        changes: LinkState,
-    ) -> list[float]:
-        """Return for each rod (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² − L·L̈ − L̇² at steady rates."""
-        state = self._place_links(known, unknowns)
-        moving = self._add_motions(state, velocities, rates)
-        before = self._add_changes(state, moving, changes, rates, [0.0] * len(self._rods))
+        At steady rates return (C − B)·(C̈ − B̈) + |Ċ − Ḃ|² − L·L̈ − L̇².
+        """
+        changes, velocities = motion.solved_accelerations, motion.solved_rates
+        state, moving, changing = self._carry(motion)
         found = []
-        for rod, vector, slip in self._slips(state, moving):
-            one, other = (
-                before.pins[end.pin]
-                if end.mover < 0
-                else moving.pins[end.pin].acceleration(before.pins[end.pin], end.arm(state))
-                for end in (rod.start, rod.end)
+        for rod in self._rods:
+            vector = minus(rod.end.locate(state), rod.start.locate(state))
+            slip = minus(*(end.velocity(state, moving) for end in (rod.end, rod.start)))
+            if changes is None:
+                found.append(subtract(dot(vector, slip), rod.rod.power(state, velocities)))
+                continue
+            pull = minus(
+                *(end.acceleration(state, moving, changing) for end in (rod.end, rod.start))
             )
             of_rod = subtract(rod.rod.bend(state, velocities, changes), dot(slip, slip))
-            found.append(subtract(dot(vector, minus(other, one)), of_rod))
+            found.append(subtract(dot(vector, pull), of_rod))
         return found
+
+    def _carry(self, motion: GroupMotion) -> tuple[LinkState, LinkState, LinkState]:
+        """Return the state with the links, its rates, and its accelerations if wanted."""
+        known, unknowns, rates = motion.solved, motion.unknowns, motion.rates
+        state, first = self._place_links(known, unknowns), self._first
+        velocities, changes = motion.solved_rates, motion.solved_accelerations
+        moving = LinkState(velocities.coordinates, velocities.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            rate = mover.value(rates, velocities)
+            moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
+        if changes is None:
+            return state, moving, moving
+        changing = LinkState(changes.coordinates, changes.pins[:first])
+        for number, mover in enumerate(self._movers, first):
+            given = mover.value(rates, moving), mover.value(motion.accelerations, changes)
+            frame = state.pins[number]
+            changing.pins.append(mover.joint.change(state, moving, changing, frame, *given))
+        return state, moving, changing
 
     def _place_links(self, known: LinkState, unknowns: Sequence[float]) -> LinkState:
         """Return the state with the frames of the links."""
@@ -143,48 +162,6 @@ class KnotEquations(Equations):
             state.pins.append(mover.joint.child_frame(mover.joint.base(state), value))
         return state
 
-    def _add_motions(
-        self, state: LinkState, velocities: LinkState, rates: Sequence[float]
-    ) -> LinkState:
-        """Return the velocities with the motions of the links."""
-        first = self._first
-        moving = LinkState(velocities.coordinates, velocities.pins[:first])
-        for number, mover in enumerate(self._movers, first):
-            rate = mover.value(rates, velocities)
-            moving.pins.append(mover.joint.motion(state, moving, state.pins[number], rate))
-        return moving
-
-    def _add_changes(
-        self,
-        state: LinkState,
-        moving: LinkState,
-        changes: LinkState,
-        rates: Sequence[float],
-        accelerations: Sequence[float],
-    ) -> LinkState:
-        """Return the accelerations with the derivatives of the motions."""
-        first = self._first
-        changing = LinkState(changes.coordinates, changes.pins[:first])
-        for number, mover in enumerate(self._movers, first):
-            given = mover.value(rates, moving), mover.value(accelerations, changes)
-            frame = state.pins[number]
-            changing.pins.append(mover.joint.change(state, moving, changing, frame, *given))
-        return changing
-
-    def _slips(
-        self, state: LinkState, moving: LinkState
-    ) -> Iterator[tuple[KnotRod, Vector, Vector]]:
-        """Yield each rod, its vector, and the velocity of its end relative to its start."""
-        for rod in self._rods:
-            one, other = (
-                moving.pins[end.pin]
-                if end.mover < 0
-                else moving.pins[end.pin].velocity(end.arm(state))
-                for end in (rod.start, rod.end)
-            )
-            vector = minus(rod.end.locate(state), rod.start.locate(state))
-            yield rod, vector, minus(other, one)
-
     # The links: the unknown joints, and the frames of the links
 
     def place(
@@ -192,29 +169,9 @@ class KnotEquations(Equations):
     ) -> LinkState:
         return self._own_part(map(add, unknowns, gained), self._place_links(known, unknowns))
 
-    def move(
-        self,
-        known: LinkState,
-        unknowns: Sequence[float],
-        velocities: LinkState,
-        rates: Sequence[float],
-    ) -> LinkState:
-        state = self._place_links(known, unknowns)
-        return self._own_part(rates, self._add_motions(state, velocities, rates))
-
-    def change(
-        self,
-        known: LinkState,
-        unknowns: Sequence[float],
-        velocities: LinkState,
-        rates: Sequence[float],
-        changes: LinkState,
-        accelerations: Sequence[float],
-    ) -> LinkState:
-        state = self._place_links(known, unknowns)
-        moving = self._add_motions(state, velocities, rates)
-        changing = self._add_changes(state, moving, changes, rates, accelerations)
-        return self._own_part(accelerations, changing)
+    def move(self, motion: GroupMotion) -> LinkState:
+        *_, moved = self._carry(motion)
+        return self._own_part(motion.highest[0], moved)
 
     def _own_part(self, joints: Iterable[float], state: LinkState) -> LinkState:
         return LinkState([*joints], [*islice(state.pins, self._first, None)])
