@@ -128,7 +128,7 @@ class BranchGroup(IteratedGroup):
         """Return residuals, and the rows of their derivatives."""
         (x,) = given.coordinates
         rates = [float(k == self._followed.number) for k in range(len(self._before.inputs))]
-        known, velocities = require_state(self._before.moving_at(self._all_inputs(x), rates))
+        known, velocities = require_state(self._before.states_at(self._all_inputs(x), rates))
         errors, rows = self._equations.evaluate(known, pose.coordinates)
         still = [0.0] * len(pose.coordinates)
         motion = GroupMotion(pose.coordinates, known, still, velocities)

@@ -275,7 +275,7 @@ class GridGroup(IteratedGroup):
 
     def _list_rates(self, given: LinkState, pose: LinkState, rates: LinkState) -> list[Any]:
         """Return the rates of all unknowns at rates of the inputs."""
-        states = self._before.moving_at(given.coordinates, rates.coordinates)
+        states = self._before.states_at(given.coordinates, rates.coordinates)
         known, velocities = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)
@@ -286,7 +286,7 @@ class GridGroup(IteratedGroup):
     ) -> list[Any]:
         """Return the accelerations of the free unknowns at steady rates of the inputs."""
         steady = [0.0] * len(given.coordinates)
-        states = self._before.changing_at(given.coordinates, rates.coordinates, steady)
+        states = self._before.states_at(given.coordinates, rates.coordinates, steady)
         known, velocities, changes = require_state(states)
         unknowns = self._equations.complete(pose.coordinates, known)
         still = [0.0] * len(unknowns)

@@ -27,43 +27,30 @@ class StepsBefore:
 
     def known_at(self, inputs: Sequence[float]) -> LinkState | None:
         """Return the state of their links, or None."""
-        solved = LinkState([0.0, *inputs], [])
-        for step in self.steps:
-            if not step.close(solved).status.has_pose:
-                return None
-        return solved
+        states = self.states_at(inputs)
+        return None if states is None else states[0]
 
-    def moving_at(
-        self, inputs: Sequence[float], rates: Sequence[float]
-    ) -> tuple[LinkState, LinkState] | None:
-        """Return the state of their links and its rates, or None."""
-        known, speeds = LinkState([0.0, *inputs], []), LinkState([0.0, *rates], [])
-        for step in self.steps:
-            pose = step.close(known)
-            if not pose.status.has_rates:
-                return None
-            step.rates(pose, known, speeds)
-        return known, speeds
+    def states_at(self, *given: Sequence[float]) -> list[LinkState] | None:
+        """
+        Return the state of their links, and its derivatives, or None.
 
-    def changing_at(
-        self, inputs: Sequence[float], rates: Sequence[float], accelerations: Sequence[float]
-    ) -> tuple[LinkState, LinkState, LinkState] | None:
-        """Return the state of their links, its rates and its accelerations, or None."""
-        states = tuple(LinkState([0.0, *each], []) for each in (inputs, rates, accelerations))
-        known, speeds, changes = states
+        The inputs are given, and of their rates and accelerations those that are wanted.
+        """
+        states = [LinkState([0.0, *each], []) for each in given]
         for step in self.steps:
-            pose = step.close(known)
-            if not pose.status.has_rates:
+            pose = step.close(states[0])
+            if not (pose.status.has_pose if len(states) == 1 else pose.status.has_rates):
                 return None
-            found: Any = step.rates(pose, known, speeds)
-            step.accelerations(pose, found, known, speeds, changes)
-        return known, speeds, changes
+            found: Any = step.rates(pose, *states[:2]) if len(states) > 1 else ()
+            if len(states) > 2:
+                step.accelerations(pose, found, *states)
+        return states
 
-    def trace(self) -> tuple[LinkState, LinkState, LinkState] | None:
-        """Return the same at the pose, as symbols; None if they are at a toggle there."""
+    def trace(self) -> list[LinkState] | None:
+        """Return state, rates and accelerations at the pose, as symbols; None at a toggle."""
         tape = Tape()
 
         def add_inputs(name: str) -> list[Any]:
             return [tape.add_input(f'{name}{i}', x) for i, x in enumerate(self.inputs)]
 
-        return self.changing_at(*map(add_inputs, 'qwa'))
+        return self.states_at(*map(add_inputs, 'qwa'))
