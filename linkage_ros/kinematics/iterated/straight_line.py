@@ -129,5 +129,5 @@ def _is_symbol(number: Any) -> bool:
 
 
 def has_symbols(*states: LinkState) -> bool:
-    """Return whether any number of states is a symbol."""
-    return any(map(_is_symbol, list_numbers(states)))
+    """Return whether any number of states is a symbol: then an input, a coordinate, is one."""
+    return any(_is_symbol(number) for state in states for number in state.coordinates)
