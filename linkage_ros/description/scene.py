@@ -249,7 +249,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     }
     if isinstance(linkage, SpaceLinkage):
         joints = {'pin': parts['any_joint'], 'slider': parts['slide']}
-        return {**parts, **joints, 'axis': linkage.axes}
+        return {**parts, **joints, 'axis': ('x', 'y', 'z')}
     points = [point for _, points in carried for point in points]
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
