@@ -14,16 +14,19 @@ The modules that compute them, and `Closure`, import this one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from math import tau
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.errors import list_names, quote
-from linkage_ros.kinematics.plane.linkage import Linkage
+from linkage_ros.kinematics.plane.linkage import Limits, Linkage
 from linkage_ros.kinematics.plane.topology import Structure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step, StepPose
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch import Array
 
 
 class InputRange(NamedTuple):
@@ -132,6 +135,17 @@ class SingularityMargin(NamedTuple):
     group: int = -1
 
 
+Near = Mapping[str, tuple[float, ...]]
+"""For each former input the line that its whole turns are near, as `RevoluteJoint.near`."""
+
+Plan = Callable[['Position', Mapping[str, float], Mapping[str, Limits]], Any]
+"""
+Makes a closure with other inputs, in the assembly of a position.
+
+It takes known values of joints with their whole turns, and limits for inputs that have none.
+"""
+
+
 class LoopClosure(Protocol):
     """
     The part of a `Closure` that ranges, margins, limits and the compiler use.
@@ -168,6 +182,12 @@ class LoopClosure(Protocol):
     def close_unlimited(self, *inputs: float) -> Position: ...
     def velocity(self, position: Position, *rates: float) -> Velocity: ...
     def acceleration(self, position: Position, velocity: Velocity, *a: float) -> Acceleration: ...
+    def jacobian(self, position: Position) -> Array: ...
+    def measuring(self, *names: str) -> Any: ...  # Likewise a closure
+    def find_branch(
+        self, joint: str, number: int | None = None, near: float | None = None
+    ) -> Any: ...  # A `CrankBranch`
+    def plan_exchange(self, names: Sequence[str], near: Near) -> Plan: ...
     def inputs_of(self, state: LinkState) -> tuple[float, ...]: ...
     def named_points(self, position: Position) -> dict[str, Any]: ...
     def closing_errors(self, position: Position) -> list[float]: ...

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from operator import mul
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.errors import escape_unprintable, list_names, quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, input_ranges
@@ -30,6 +30,8 @@ from linkage_ros.kinematics.plane.linkage import RevoluteJoint
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
+    Near,
+    Plan,
     Position,
     SingularInput,
     SingularityMargin,
@@ -41,6 +43,7 @@ from linkage_ros.workbench import find_tool
 
 if TYPE_CHECKING:
     from linkage_ros import ArrayFunctions
+    from linkage_ros.kinematics.analysis.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.batch import Array, Batch
     from linkage_ros.kinematics.compiling import Compiled, OutputSelection, SolverOutline
     from linkage_ros.kinematics.iterated.grid import Grid
@@ -48,6 +51,8 @@ if TYPE_CHECKING:
 
 _FILLED = 2
 """Most inputs of a grid whose cells within limits are made before the first state."""
+
+Own = TypeVar('Own', bound='StepwiseClosure')
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -127,6 +132,7 @@ class StepwiseClosure:
         if self.bounds:
             self.position = limit_status(self.position, self.bounds)  # type: ignore[method-assign]
         self._compiled: list[Compiled] = []
+        self._inverses: dict[str, Inverse] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle the definition: the copy builds the rest anew, to the same bits."""
@@ -256,6 +262,120 @@ class StepwiseClosure:
         for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
             step.accelerations(pose, rate, position.state, velocity.state, state_accelerations)
         return Acceleration(self._joint_rates(a), state_accelerations, self)
+
+    def driven_by(  # noqa: PYI019 (Python 3.10 has no Self)
+        self: Own,
+        *joints: str,
+        branch: int | None = None,
+        near: float | Sequence[float] | None = None,
+    ) -> Own:
+        """
+        Return the linkage with other joints as its inputs.
+
+        The loops are solved in another order, in the same assembly; some links may have to be
+        iterated. The former inputs are published joints, before the others.
+
+        Parameters
+        ----------
+        *joints
+            As many as there are inputs: published joints, inputs that stay, coordinates of points
+            such as ``P.x``, distances of points such as ``A-B``; in the plane angles of links to
+            the ground, such as ``rod.angle``.
+        branch
+            With one input, the number of a branch that has the assembly, as `cranks` returns it.
+            It need not be named if there is only one within the limits, or if the file has a pose.
+        near
+            Instead of the branch a crank on it, in [rad] or [m]. With several inputs, a value of
+            each: the state that has the assembly; without it the pose has it.
+
+        Raises
+        ------
+        DefinitionError
+            If a joint is unknown or does not move, the branch is not certain, or the joints do not
+            move all of the linkage.
+
+        """
+        from linkage_ros.kinematics.analysis.exchanged_inputs import (
+            exchange_inputs,  # local import: only few ask for it
+        )
+
+        at = (near,) if isinstance(near, int | float) else near
+        return exchange_inputs(self, joints, branch, at)
+
+    def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
+        """
+        Return all cranks at which a joint has a value, within the limits.
+
+        Parameters
+        ----------
+        joint
+            As in `driven_by`.
+        value
+            Its value, in [rad] or [m].
+
+        Returns
+        -------
+        cranks : list
+            Pairs of a branch's number and the crank on it, in [rad] or [m].
+
+        Raises
+        ------
+        DefinitionError
+            As `driven_by`.
+
+        """
+        return self._joint_inverse(joint).find_cranks(to_double('value', value))
+
+    def branches(self, joint: str, *, limited: bool = True) -> Sequence[CrankBranch]:
+        """
+        Return the branches of a joint over the single input: on each it moves one way.
+
+        The joint is as in `driven_by`, and so are the errors. If ``limited``, limits of joints cut
+        the branches.
+        """
+        from linkage_ros.kinematics.analysis.crank_branches import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        if limited:
+            return self._joint_inverse(joint).branches
+        return inverse_of(self.measuring(joint), joint, False).branches
+
+    def find_branch(
+        self, joint: str, number: int | None = None, near: float | None = None
+    ) -> CrankBranch:
+        """
+        Return the branch of a number, the one nearest a crank, or the only one of a joint.
+
+        Of several that of the pose is returned, if the file has one.
+        """
+        pose = self.linkage.pose
+        if number is None and near is None and pose is not None:
+            near = pose.inputs[0]
+        return self._joint_inverse(joint).find_branch(number, near)
+
+    def _joint_inverse(self, joint: str) -> Inverse:
+        """Return a joint with its branches over the crank; they are made once."""
+        from linkage_ros.kinematics.analysis.crank_branches import (
+            inverse_of,  # local import: only few ask for it
+        )
+
+        with BUILD_LOCK:
+            if joint not in self._inverses:
+                self._inverses[joint] = inverse_of(self.measuring(joint), joint)
+            return self._inverses[joint]
+
+    def measuring(self: Own, *names: str) -> Own:  # noqa: PYI019 (likewise)
+        """
+        Return the closure with these names among its joints; itself if it has them all.
+
+        Names are as in `driven_by`, and so are the errors. An input has to be named no more.
+        """
+        raise NotImplementedError
+
+    def plan_exchange(self, names: Sequence[str], near: Near) -> Plan:
+        """Return how the linkage is planned with other inputs, joints of this closure."""
+        raise NotImplementedError
 
     def rate_term(self, number: int) -> tuple[int, int, float]:
         """Return i, j, factor of a published joint: its rate is factor·(v[i] − v[j])."""

@@ -138,12 +138,12 @@ def test_several_inputs_are_there_and_back(name, wanted):
         (
             'five_bar',
             'A.x left_crank_joint',
-            'left_crank_joint: do not move all of it: sliders.slot of A.x: is over-constrained',
+            'are not independent in the pose: right_crank_joint stays free',
         ),
         ('gripper', 'left_knuckle_joint', 'left_knuckle_joint: is an input'),
         ('rssr', 'A-B', 'A-B: both points are on rod'),
         ('rssr', 'O.x', 'O.x: is no joint, and describes no point or distance'),
-        ('ankle_motors', 'b1.z m1', 'stay free; drive another joint'),
+        ('ankle_motors', 'b1.z m1', 'm2 stays free; name a joint that moves with m2'),
     ],
 )
 def test_what_cannot_be_an_input_is_one_line(name, wanted, line):

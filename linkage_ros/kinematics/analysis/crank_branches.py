@@ -36,7 +36,7 @@ from linkage_ros.kinematics.analysis.monotonic_pieces import FARTHEST, monotonic
 from linkage_ros.kinematics.analysis.sweep_analysis import InputSweep
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
-from linkage_ros.kinematics.results import LoopClosure, PlanarClosure
+from linkage_ros.kinematics.results import LoopClosure
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
@@ -512,7 +512,7 @@ def _crank_distance(branch: CrankBranch, crank: float) -> float:
     return max(branch.least - crank, crank - branch.most, 0.0)
 
 
-def inverse_of(closure: PlanarClosure, name: str, limited: bool = True) -> Inverse:
+def inverse_of(closure: LoopClosure, name: str, limited: bool = True) -> Inverse:
     """
     Return an output with its branches; limits of joints cut them.
 

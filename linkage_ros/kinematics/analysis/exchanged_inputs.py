@@ -6,23 +6,33 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A linkage with other joints as its inputs: another plan, the same assembly."""
+
+"""
+A linkage with other joints as its inputs: another plan, the same assembly.
+
+Planes and spaces differ in how a linkage with other inputs is written down, which `PlaneExchange`
+does for the plane. All else is here: which state gives the assembly, whether the names move the
+linkage there, and whether what is planned has the joints of the linkage.
+"""
 
 from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import inf, sin, tau
-from typing import TYPE_CHECKING, TypeVar
+from itertools import chain
+from math import inf, isfinite, sin, tau
+from typing import Any, TYPE_CHECKING, TypeVar
 
-from linkage_ros.errors import DefinitionError, did_you_mean, list_names
-from linkage_ros.kinematics.analysis.sweep_analysis import usual_inputs
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, usual_inputs
 from linkage_ros.kinematics.plane.checks import check_linkage
 from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
     Input,
+    Limits,
     Linkage,
+    NO_LIMITS,
     RevoluteJoint,
     SlideJoint,
     Slider,
@@ -31,7 +41,7 @@ from linkage_ros.kinematics.plane.linkage import (
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.analysis.crank_branches import CrankBranch
-    from linkage_ros.kinematics.results import PlanarClosure, Position
+    from linkage_ros.kinematics.results import LoopClosure, Near, PlanarClosure, Position
 
 _SAME = 1e-6
 """Largest difference of joints in one assembly, in [rad] or of the linkage's size."""
@@ -40,95 +50,206 @@ _STARTS = (0.47, 0.31, 0.68)
 _TRIED = (0.02, 0.11, 0.23, 0.37, 0.5, 0.63, 0.77, 0.89, 0.98)
 """Parts of a branch at which the assembly is taken, and at which it is compared."""
 
-Built = TypeVar('Built', bound='PlanarClosure')
+_STILL, _DEPENDENT = 1e-9, 1e-9
+"""The slope of a joint that does not move, and the least of slopes of joints that do, together."""
 
-Rebuild = Callable[[Linkage], Built]
+_ACROSS, _MARGIN = 8, 0.05
+"""States along each former input over which limits of new ones are sought; what they are wider."""
+
+Built = TypeVar('Built', bound='LoopClosure')
 
 
 def exchange_inputs(
-    closure: PlanarClosure, names: Sequence[str], rebuild: Rebuild[Built]
+    closure: Built, names: Sequence[str], branch: int | None, near: Sequence[float] | None
 ) -> Built:
     """
-    Return a closure with these published joints as its inputs, and its inputs as joints.
+    Return a closure with these joints as its inputs, and its inputs as joints.
 
-    The pose at which the linkage is shown gives the assembly; ``rebuild`` makes a closure.
+    With one input the branch of a number has the assembly, or that nearest to a crank; else the
+    state ``near`` has it, or that at which the linkage is shown.
 
-    More or fewer joints than inputs, an unknown joint and a repeated one raise DefinitionError.
+    Names that are unknown, too many or too few, or that do not move all of the linkage raise
+    DefinitionError.
     """
-    count = len(closure.linkage.inputs)
+    count = len(closure.input_names)
     if len(names) != count or len({*names}) != count:
         raise DefinitionError(
-            ', '.join(names), f'{len(names)} for {count} inputs', f'name {count} different joints'
+            ', '.join(names), f'{len(names)} for {count} input{"s" * (count != 1)}',
+            f'name {count} different joint{"s" * (count != 1)}',
+        )  # fmt: skip
+    if near is not None and len(near) != count:
+        raise DefinitionError(
+            'near', f'{len(near)} values', f'give one for each of {count} inputs'
         )
-    at = usual_inputs(closure)
-    zeros = (0.0,) * count
+    measured: Built = closure.measuring(*names)
+    if count == 1:
+        on = closure.find_branch(names[0], branch, None if near is None else near[0])
+        return _exchange_on_branch(measured, names[0], on)
+    if branch is not None:
+        raise DefinitionError(
+            f'branch {branch}', f'there are {count} inputs, and no branches',
+            'leave it out: the pose has the assembly',
+        )  # fmt: skip
+    return _exchange_at(measured, names, near or usual_inputs(closure))
+
+
+def _exchange_at(closure: Built, names: Sequence[str], at: Sequence[float]) -> Built:
+    """Return the closure with several other inputs, in the assembly of a state."""
+    zeros = (0.0,) * len(names)
     near = {name: (value, *zeros) for name, value in zip(closure.input_names, at, strict=True)}
-    exchange = _Exchange(closure, names, near)
     position = closure.close_unlimited(*at)
+    _check_moved(closure, names, position)
+    plan = closure.plan_exchange(names, near)
     try:
-        found = exchange.plan(position, {}, rebuild)
+        found: Built = plan(position, {}, {})
+        if found.grids and (limits := _reached_limits(closure, names)):
+            found = plan(position, {}, limits)
     except DefinitionError as error:
         reason = f'do not move all of it: {error.where}: {error.reason}'
         raise DefinitionError(', '.join(names), reason, 'name other joints') from None
-    if not exchange.meets(found, position, {}):
+    if not _meets(closure, found, position, {}):
         raise DefinitionError(
             ', '.join(names), 'do not close in the assembly of the pose', 'name other joints'
         )
     return found
 
 
-def exchange_input(
-    closure: PlanarClosure, name: str, branch: CrankBranch, rebuild: Rebuild[Built]
-) -> Built:
+def _exchange_on_branch(closure: Built, name: str, branch: CrankBranch) -> Built:
     """
-    Return the closure of a single input with a published joint as its input.
+    Return the closure of a single input with another joint as its input.
 
     The branch of that joint gives the assembly, and the whole turns of the former input. A change
     point that the other plan does not pass raises DefinitionError.
     """
-    (given,) = closure.linkage.inputs
-    exchange = _Exchange(closure, (name,), {given.joint: branch.near_line()})
+    (former,) = closure.input_names
+    plan = closure.plan_exchange((name,), {former: branch.near_line()})
     reason, remedy = 'as the input passes a change point to another assembly', 'name another joint'
     error = DefinitionError(name, reason, remedy)
-    for share in _STARTS:
-        value, crank = branch.state_at(share)
+    for value, crank in map(branch.state_at, _STARTS):
         try:
-            found = exchange.plan(closure.close_unlimited(crank), {name: value}, rebuild)
+            found: Built = plan(closure.close_unlimited(crank), {name: value}, {})
         except DefinitionError as refused:
             error = refused
             continue
-        states = map(branch.state_at, _TRIED)
         if all(
-            exchange.meets(found, closure.close_unlimited(crank), {name: value})
-            for value, crank in states
+            _meets(closure, found, closure.close_unlimited(crank), {name: value})
+            for value, crank in map(branch.state_at, _TRIED)
         ):
             return found
     raise error
 
 
-class _Exchange:
-    """The definition of a linkage with other inputs; ``near`` says how the former ones turn."""
+def _values_at(
+    closure: LoopClosure, position: Position, known: Mapping[str, float]
+) -> dict[str, float]:
+    inputs = zip(closure.input_names, position.inputs, strict=True)
+    return {**position, **dict(inputs), **known}
+
+
+def _meets(
+    closure: LoopClosure, found: LoopClosure, position: Position, known: Mapping[str, float]
+) -> bool:
+    """Return whether a closure has the joints of a position of the linkage."""
+    values = _values_at(closure, position, known)
+    again = found.close_unlimited(*(values[name] for name in found.input_names))
+    return bool(again.joints) and all(
+        abs(sin(0.5 * (again[name] - values[name]))) < _SAME
+        if turning
+        else abs(again[name] - values[name]) < _SAME * closure.scale
+        for name, turning in zip(found.joint_names, found.turning, strict=True)
+    )
+
+
+def _check_moved(closure: LoopClosure, names: Sequence[str], position: Position) -> None:
+    """Refuse names that do not say at a position how the inputs move."""
+    if not position.status.has_rates:
+        return
+    import numpy as np  # local import: one input does without it
+
+    slopes = named_slopes(closure, names, position)
+    for name, row in zip(names, slopes, strict=True):
+        if not np.abs(row).max() > _STILL:
+            raise DefinitionError(name, 'does not move with the inputs', 'name another joint')
+    _, sizes, ways = np.linalg.svd(slopes / np.abs(slopes).max(axis=1, keepdims=True))
+    if not sizes[-1] > _DEPENDENT:
+        free = closure.input_names[int(np.abs(ways[-1]).argmax())]
+        raise DefinitionError(
+            ', '.join(names), f'are not independent in the pose: {free} stays free',
+            f'name a joint that moves with {free}, or draw another pose',
+        )  # fmt: skip
+
+
+def named_slopes(closure: LoopClosure, names: Sequence[str], position: Position) -> Any:
+    """
+    Return the derivatives of inputs and joints by the inputs, (names, inputs).
+
+    Lengths are in sizes of the linkage.
+    """
+    import numpy as np  # local import: as above
+
+    rows = dict(zip(closure.joint_names, closure.jacobian(position), strict=True))
+    rows |= dict(zip(closure.input_names, np.eye(len(closure.input_names)), strict=True))
+    units = [closure.scale if given.slider else 1.0 for given in closure.linkage.inputs]
+    turning = turning_names(closure)
+    return (
+        np.array([rows[name] / (1.0 if turning[name] else closure.scale) for name in names])
+        * units
+    )
+
+
+def turning_names(closure: LoopClosure) -> dict[str, bool]:
+    """Return whether an input or a published joint turns, by its name."""
+    turning = dict(zip(closure.joint_names, closure.turning, strict=True))
+    return turning | {given.joint: not given.slider for given in closure.linkage.inputs}
+
+
+def _reached_limits(closure: LoopClosure, names: Sequence[str]) -> dict[str, Limits]:
+    """
+    Return limits of joints that have none: what the limits of the inputs let them reach.
+
+    None are returned if an input has no limits. They need not be exact: the limits of the former
+    inputs hold too. Between them the cells of links are made that close only together.
+    """
+    limits = [given.limits for given in closure.linkage.inputs]
+    if not all(map(isfinite, chain.from_iterable((one.low, one.high) for one in limits))):
+        return {}
+    reached: dict[str, list[float]] = {name: [] for name in names}
+    for inputs in inputs_on_grid(closure, _ACROSS):
+        position = closure.close_unlimited(*inputs)
+        if position.joints:
+            values = _values_at(closure, position, {})
+            for name in names:
+                reached[name].append(values[name])
+    own, found = closure.linkage.limits, {}
+    for name, reach in reached.items():
+        if reach and not own.get(name, NO_LIMITS).is_bounded:
+            low, high = min(reach), max(reach)
+            wider = _MARGIN * (high - low)
+            found[name] = replace(own.get(name, NO_LIMITS), low=low - wider, high=high + wider)
+    return found
+
+
+class PlaneExchange:
+    """The definition of a planar linkage with other inputs; ``near`` is for the former ones."""
 
     def __init__(
-        self, closure: PlanarClosure, names: Sequence[str], near: Mapping[str, tuple[float, ...]]
+        self,
+        closure: PlanarClosure,
+        names: Sequence[str],
+        near: Near,
+        rebuild: Callable[[Linkage], Any],
     ) -> None:
-        self._closure, self._names = closure, names
+        self._closure, self._names, self._rebuild = closure, names, rebuild
         linkage = closure.linkage
         driven = {given.joint: given for given in linkage.inputs}
         joints = {name: _as_joint(given, near[name]) for name, given in driven.items()}
         joints |= {name: joint for name, joint in linkage.joints.items() if name not in driven}
-        inputs = []
-        for name in names:
-            if name not in joints:
-                remedy = did_you_mean(name, joints, f'name one of {list_names(joints)}')
-                raise DefinitionError(name, 'is neither a published joint nor an input', remedy)
-            inputs.append(driven.get(name) or Input.from_joint(name, joints[name]))
+        inputs = [driven.get(name) or Input.from_joint(name, joints[name]) for name in names]
         # The inputs as joints, and the other joints.
-        self._joints = {name: joint for name, joint in joints.items() if name not in names}
         self._linkage = replace(
             linkage,
             inputs=tuple(inputs),
-            joints=self._joints,
+            joints={name: joint for name, joint in joints.items() if name not in names},
             assembly={},
             pose=None,
             ratios=turn_ratios(linkage.ratios, names),
@@ -137,11 +258,11 @@ class _Exchange:
         self._hold_without_pins()
         check_linkage(self._linkage)
 
-    def plan(
-        self, position: Position, known: Mapping[str, float], rebuild: Rebuild[Built]
-    ) -> Built:
-        """Return the closure in the assembly of a position of the linkage; it is not checked."""
-        linkage, values = self._linkage, self._values_at(position, known)
+    def __call__(
+        self, position: Position, known: Mapping[str, float], limits: Mapping[str, Limits]
+    ) -> Any:
+        """Return the closure in the assembly of a position; see `Plan`."""
+        linkage, values = self._linkage, _values_at(self._closure, position, known)
         if not position.status.has_pose:
             raise DefinitionError('pose', 'the loops are open there', 'draw another pose')
         places, angles = self._closure.points(position), self._closure.link_angles(position)
@@ -164,22 +285,11 @@ class _Exchange:
             points,
             {link: angle for link, angle in angles.items() if link in linkage.links},
         )
-        return rebuild(replace(linkage, pose=drawn))
-
-    def meets(self, found: PlanarClosure, position: Position, known: Mapping[str, float]) -> bool:
-        """Return whether a closure has the joints of a position of the linkage."""
-        values = self._values_at(position, known)
-        again = found.close_unlimited(*(values[name] for name in self._names))
-        return bool(again.joints) and all(
-            abs(sin(0.5 * (again[name] - values[name]))) < _SAME
-            if isinstance(joint, RevoluteJoint)
-            else abs(again[name] - values[name]) < _SAME * self._closure.scale
-            for name, joint in self._joints.items()
+        inputs = tuple(
+            replace(given, limits=limits.get(given.joint, given.limits))
+            for given in linkage.inputs
         )
-
-    def _values_at(self, position: Position, known: Mapping[str, float]) -> dict[str, float]:
-        names = self._closure.input_names
-        return {**position, **dict(zip(names, position.inputs, strict=True)), **known}
+        return self._rebuild(replace(linkage, inputs=inputs, pose=drawn))
 
     def _hold_without_pins(self) -> None:
         """

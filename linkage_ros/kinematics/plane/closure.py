@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 from linkage_ros.errors import quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
 from linkage_ros.kinematics.arithmetic import unit_vector
-from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
-from linkage_ros.kinematics.doubles import to_double
+from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import without_mirrored, zero_length
 from linkage_ros.kinematics.plane.checks import check_linkage
 from linkage_ros.kinematics.plane.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
@@ -27,6 +26,8 @@ from linkage_ros.kinematics.plane.topology import assur_groups, Driven, Dyad, li
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
+    Near,
+    Plan,
     PointMotion,
     Position,
     Velocity,
@@ -36,7 +37,6 @@ from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
     from linkage_ros import LinkagePage
-    from linkage_ros.kinematics.analysis.crank_branches import CrankBranch, Inverse
     from linkage_ros.kinematics.analysis.point_tracker import PointTracker
     from linkage_ros.kinematics.plane.link_frames import LinkFrames
 
@@ -94,7 +94,6 @@ class Closure(StepwiseClosure):
         self.steps = steps
         needed = len(steps)
         self._more_steps = tuple(planner.steps[needed:])
-        self._inverses: dict[str, Inverse] = {}
 
     def view(self) -> LinkagePage:
         """
@@ -110,48 +109,13 @@ class Closure(StepwiseClosure):
 
         return LinkagePage(self)
 
-    def driven_by(
-        self, *joints: str, branch: int | None = None, near: float | None = None
-    ) -> Closure:
-        """
-        Return the linkage with other joints as its inputs.
-
-        The loops are solved in another order, in the same assembly; some links may have to be
-        iterated. The former inputs are published joints, before the others.
-
-        Parameters
-        ----------
-        *joints
-            As many as there are inputs: published joints, inputs that stay, coordinates of points
-            such as ``P.x``, distances of points such as ``A-B``, angles of links to the ground
-            such as ``rod.angle``.
-        branch
-            With one input, the number of a branch that has the assembly, as `cranks` returns it.
-            If there is only one branch within the limits, it need not be named. With several
-            inputs, the pose has the assembly.
-        near
-            Instead of the branch a crank on it, in [rad] or [m].
-
-        Raises
-        ------
-        DefinitionError
-            If a joint is unknown or does not move, several branches are within the limits, or the
-            joints do not move all of the linkage.
-
-        """
+    def plan_exchange(self, names: Sequence[str], near: Near) -> Plan:
+        """Return how the linkage is planned with other inputs, joints of this closure."""
         from linkage_ros.kinematics.analysis.exchanged_inputs import (
-            exchange_input,  # local import: only few ask for it
-            exchange_inputs,  # local import: likewise
+            PlaneExchange,  # local import: only few ask for it
         )
 
-        def rebuild(linkage: Linkage) -> Closure:
-            return Closure(linkage, self.name)
-
-        if len(self.input_names) > 1 or len(joints) != 1:
-            return exchange_inputs(self.measuring(*joints), joints, rebuild)
-        (joint,) = joints
-        on = self.find_branch(joint, branch, near)
-        return exchange_input(self.measuring(joint), joint, on, rebuild)
+        return PlaneExchange(self, names, near, lambda linkage: Closure(linkage, self.name))
 
     def measuring(self, *names: str) -> Closure:
         """
@@ -166,62 +130,6 @@ class Closure(StepwiseClosure):
         )
 
         return Closure(with_measured(self.linkage, names), self.name)
-
-    def cranks(self, joint: str, value: float) -> list[tuple[int, float]]:
-        """
-        Return all cranks at which a joint has a value, within the limits.
-
-        Parameters
-        ----------
-        joint
-            As in `driven_by`.
-        value
-            Its value, in [rad] or [m].
-
-        Returns
-        -------
-        cranks : list
-            Pairs of a branch's number and the crank on it, in [rad] or [m].
-
-        Raises
-        ------
-        DefinitionError
-            As `driven_by`.
-
-        """
-        return self._joint_inverse(joint).find_cranks(to_double('value', value))
-
-    def branches(self, joint: str, *, limited: bool = True) -> Sequence[CrankBranch]:
-        """
-        Return the branches of a joint over the single input: on each it moves one way.
-
-        The joint is as in `driven_by`, and so are the errors. If ``limited``, limits of joints cut
-        the branches.
-        """
-        from linkage_ros.kinematics.analysis.crank_branches import (
-            inverse_of,  # local import: only few ask for it
-        )
-
-        if limited:
-            return self._joint_inverse(joint).branches
-        return inverse_of(self.measuring(joint), joint, False).branches
-
-    def find_branch(
-        self, joint: str, number: int | None = None, near: float | None = None
-    ) -> CrankBranch:
-        """Return the branch of a number, the one nearest a crank, or the only one of a joint."""
-        return self._joint_inverse(joint).find_branch(number, near)
-
-    def _joint_inverse(self, joint: str) -> Inverse:
-        """Return a joint with its branches over the crank; they are made once."""
-        from linkage_ros.kinematics.analysis.crank_branches import (
-            inverse_of,  # local import: only few ask for it
-        )
-
-        with BUILD_LOCK:
-            if joint not in self._inverses:
-                self._inverses[joint] = inverse_of(self.measuring(joint), joint)
-            return self._inverses[joint]
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
         """

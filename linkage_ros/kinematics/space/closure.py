@@ -9,20 +9,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from math import dist, sqrt, tau
+from math import atan2, dist, sqrt, tau
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
-from linkage_ros.kinematics.plane.linkage import SlideJoint, turn_ratios
-from linkage_ros.kinematics.results import Acceleration, Position, Velocity
-from linkage_ros.kinematics.space.carried_points import CarriedPoints
+from linkage_ros.kinematics.plane.linkage import Limits, SlideJoint, turn_ratios
+from linkage_ros.kinematics.results import Acceleration, Near, Plan, Position, Velocity
+from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.free_platforms import carry_platforms, free_platforms
 from linkage_ros.kinematics.space.hinge_balls import plan_balls_of_hinges
 from linkage_ros.kinematics.space.linkage import (
@@ -160,52 +160,56 @@ class SpaceClosure(StepwiseClosure):
         return find_freedom(moved, CarriedPoints(moved, self.scale))
 
     def _redraw(self, linkage: SpaceLinkage, position: Position) -> SpaceLinkage:
-        """Return the planned linkage with the places and axes of a position as its pose."""
+        """Return a linkage of these links with the places of a position as its pose."""
         plan, state = self._plan, position.state
 
-        def redraw(joint: SpatialJoint) -> SpatialJoint:
-            drawn, frame = plan.pose_frames[joint.parent], state.pins[plan.frames[joint.parent]]
+        def carried(link: str, joint: SpatialJoint) -> tuple[Vector, Vector, Vector]:
+            """Return place and axis of a joint, and a vector across, as a link has them."""
+            drawn, frame = plan.pose_frames[link], state.pins[plan.frames[link]]
             at = frame.place(drawn.locate(scale(1.0 / self.scale, joint.at)))
-            axis = frame.turn(drawn.resolve(joint.axis))
-            return replace(joint, at=scale(self.scale, at), axis=axis)
+            along = scale(1.0 / length(joint.axis), joint.axis)
+            across = frame.turn(drawn.resolve(unit_across(along)))
+            return scale(self.scale, at), frame.turn(drawn.resolve(along)), across
+
+        def redraw(name: str, joint: SpatialJoint, *, slides: bool) -> SpatialJoint:
+            at, axis, across = carried(joint.parent, joint)
+            value = joint.value
+            if name in plan.coordinates:
+                value = state.coordinates[plan.coordinates[name]] * (self.scale if slides else 1.0)
+            elif joint.child in plan.frames:
+                moved, _, turned = carried(joint.child, joint)
+                value += (
+                    dot(axis, minus(moved, at))
+                    if slides
+                    else atan2(dot(axis, cross(across, turned)), dot(across, turned))
+                )
+            return replace(joint, at=at, axis=axis, value=value)
 
         return replace(
             linkage,
             points=self._find_places(position.state, linkage.points),
-            hinges={name: redraw(joint) for name, joint in linkage.hinges.items()},
-            slides={name: redraw(joint) for name, joint in linkage.slides.items()},
+            hinges={name: redraw(name, one, slides=False) for name, one in linkage.hinges.items()},
+            slides={name: redraw(name, one, slides=True) for name, one in linkage.slides.items()},
         )
 
-    def driven_by(self, *joints: str) -> SpaceClosure:
-        """
-        Return the linkage with other joints as its inputs, in the assembly of the pose.
-
-        Its former inputs are published joints, before the others.
-
-        Parameters
-        ----------
-        *joints
-            As many as there are inputs: joints, of which inputs may stay; coordinates of points
-            such as ``P.x``; distances of points such as ``A-B``.
-
-        Raises
-        ------
-        DefinitionError
-            If a joint is unknown, or these joints do not move all of the linkage.
-
-        """
+    def plan_exchange(self, names: Sequence[str], _near: Near) -> Plan:
+        """Return how the linkage is planned with other inputs, joints of this closure."""
         linkage = self.linkage
-        if len({*joints}) != len(linkage.driven) or len(joints) != len(linkage.driven):
-            raise DefinitionError(
-                ', '.join(joints), f'{len(joints)} for {len(linkage.driven)} inputs',
-                f'name {len(linkage.driven)} different joints',
-            )  # fmt: skip
-        linkage = self.measuring(*joints).linkage
-        names = dict.fromkeys((*linkage.driven, *linkage.published))
-        published = tuple(name for name in names if name not in joints)
-        ratios = turn_ratios(linkage.ratios, joints)
-        exchanged = replace(linkage, driven=joints, published=published, ratios=ratios)
-        return SpaceClosure(exchanged, self.name)
+        own = dict.fromkeys((*linkage.driven, *linkage.published))
+        exchanged = replace(
+            linkage,
+            driven=tuple(names),
+            published=tuple(name for name in own if name not in names),
+            ratios=turn_ratios(linkage.ratios, names),
+        )
+
+        def plan(
+            position: Position, _known: Mapping[str, float], limits: Mapping[str, Limits]
+        ) -> SpaceClosure:
+            drawn = self._redraw(exchanged, position)
+            return SpaceClosure(drawn.with_limits(limits), self.name)
+
+        return plan
 
     def measuring(self, *names: str) -> SpaceClosure:
         """

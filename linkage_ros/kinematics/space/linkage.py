@@ -123,6 +123,8 @@ class SpaceLinkage(JointedLinkage):
         What was corrected in the pose.
     held
         Values of published joints that are left out of the hinges, since they never change.
+    strut_limits
+        Limits of struts, by name.
 
     """
 
@@ -141,6 +143,7 @@ class SpaceLinkage(JointedLinkage):
     left_out: tuple[str, ...] = ()
     corrections: PoseCorrections = field(default_factory=PoseCorrections)
     held: Mapping[str, float] = field(default_factory=dict)
+    strut_limits: Mapping[str, Limits] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = {name: _as_doubles(place) for name, place in self.points.items()}
@@ -173,6 +176,23 @@ class SpaceLinkage(JointedLinkage):
         hinges, slides = remove_limits(self.hinges, joints), remove_limits(self.slides, joints)
         return replace(self, hinges=hinges, slides=slides)
 
+    def with_limits(self, limits: Mapping[str, Limits]) -> SpaceLinkage:
+        """Return the linkage with other limits of some joints."""
+
+        def limited(joints: Mapping[str, SpatialJoint]) -> dict[str, SpatialJoint]:
+            return {
+                name: replace(joint, limits=limits.get(name, joint.limits))
+                for name, joint in joints.items()
+            }
+
+        of_struts = {name: of for name, of in limits.items() if name in self.struts}
+        return replace(
+            self,
+            hinges=limited(self.hinges),
+            slides=limited(self.slides),
+            strut_limits={**self.strut_limits, **of_struts},
+        )
+
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
         """Return the driven joints, as those of a planar linkage."""
@@ -202,7 +222,7 @@ class SpaceLinkage(JointedLinkage):
 
     def _as_input(self, name: str) -> Input:
         if name in self.struts:
-            return Input(name, slider=name)
+            return Input(name, slider=name, limits=self.strut_limits.get(name, NO_LIMITS))
         joint = self.pair_joints[name]
         slider = name if name in self.slides else ''
         return Input(name, joint.parent, joint.child, slider, joint.limits)
