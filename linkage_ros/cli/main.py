@@ -46,7 +46,7 @@ COMMANDS = {
     'demo': 'run the demo scene and its crank, on a separate ROS graph',
     'simulate': 'run a scene as fast as possible, without ROS, to a bag, CSV or Parquet',
     'echo': 'print the messages of a topic as YAML, or their rate',
-    'relay': 'relay commands of a dependent joint to its crank, as a ROS 2 node',
+    'relay': 'relay commands of other joints to the inputs, as a ROS 2 node',
     'plot': 'draw the joints of a bag over the angle of its crank',
     'info': 'describe a bag: its content, how well its loops closed, where a toggle was nearest',
     'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',

@@ -7,9 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Relay commands of a dependent joint to its crank, as a ROS 2 node.
+Relay commands of other joints than the inputs to the inputs, as a ROS 2 node.
 
-The scene names the joint, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState
+The scene names the joints, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState
 on joint_commands goes to crank_commands, JointTrajectory on joint_trajectory to
 crank_trajectory. It ends by Ctrl-C.
 """
@@ -29,13 +29,20 @@ EXAMPLE = 'linkage relay four_bar --joint rocker_joint --branch 1 --seconds 5'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('scene', metavar='SCENE', help=SCENE_HELP)
-    parser.add_argument('--joint', default='', metavar='NAME', help='the commanded joint')
+    parser.add_argument(
+        '--joint',
+        action='append',
+        default=[],
+        metavar='NAME',
+        help='the commanded joint; repeated, as many as there are inputs',
+    )
     parser.add_argument(
         '--branch',
         type=bounded_number(0, 10_000, int),
         default=0,
         metavar='N',
-        help='its branch, as in linkage check --branches; required if there are several',
+        help='its branch, as in linkage check --branches; required if there are several and no '
+        'pose',
     )
     add_set(parser)
     parser.add_argument(
@@ -54,6 +61,6 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         relay = import_module('linkage_ros.node.relay')
     settings = arguments.set
     if arguments.joint:
-        topic = f'{{joint: {arguments.joint}, branch: {arguments.branch}}}'
+        topic = f'{{joint: [{", ".join(arguments.joint)}], branch: {arguments.branch}}}'
         settings = [f'drive={{topic: {topic}}}', *settings]
     return int(relay.run_relay(stop, arguments.scene, settings, arguments.seconds))

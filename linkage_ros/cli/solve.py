@@ -40,15 +40,15 @@ from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import linkage_content, read_any_closure
-from linkage_ros.errors import LinkageError, list_names
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
-    assur_groups,
     Closure,
     InputSweep,
-    Iterated,
     Position,
+    search_inputs,
     Status,
     StepwiseClosure,
+    turn_to_pose,
 )
 from linkage_ros.resources import named_file
 
@@ -77,8 +77,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME=VALUE',
         help='solve for every input at which a joint, a coordinate P.x, a distance A-B of two '
         'points or the angle LINK.angle of a link has a value; --rate and --acceleration are then '
-        'for it; may be repeated; with several inputs, or in space, name as many as inputs, which '
-        'become the inputs',
+        'for it; may be repeated: with several inputs name as many as inputs, which become the '
+        'inputs',
     )
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default without --at'
@@ -136,7 +136,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     arguments.angles = arguments.angles.of_file(content.units)
     if arguments.joint:
         _check_alone(arguments)
-        if isinstance(closure, Closure) and len(closure.input_names) == 1:
+        if len(closure.input_names) == 1:
             columns, rows = _inverse_table(closure, arguments)
         else:
             columns, rows = _exchanged_table(closure, arguments)
@@ -176,40 +176,52 @@ def _check_alone(arguments: argparse.Namespace) -> None:
 
 
 def _exchanged_table(
-    closure: Any, arguments: argparse.Namespace
+    closure: StepwiseClosure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
-    """Return the row of the state in which as many joints as inputs have the typed values."""
-    names, typed = zip(*arguments.joint, strict=True)
-    inverse = closure.driven_by(*names)
-    groups = assur_groups(inverse.linkage).groups if isinstance(inverse, Closure) else ()
-    links = [link for group in groups if isinstance(group, Iterated) for link in group.links]
-    if links:
-        text = f'{list_names(links)} are solved by iteration, from the pose of the file'
-        print(f'linkage solve: note: with {list_names(names)} as inputs {text}', file=sys.stderr)
-    _check_reached(inverse, arguments)
-    return _forward_table(inverse, argparse.Namespace(**vars(arguments) | {'at': [typed]}))
-
-
-def _check_reached(inverse: StepwiseClosure, arguments: argparse.Namespace) -> None:
-    """Refuse values of joints that are not reached, as those of a single joint in the plane."""
-    typed = [value for _, value in arguments.joint]
-    given = read_inputs(inverse.linkage, typed, '--joint', arguments.angles)
-    position = inverse.position(*given)
-    option = ' '.join(f'--joint {name}={value:g}' for name, value in arguments.joint)
-    if position.status is Status.LIMITED:
-        reason = f'is reached only beyond limits: {inverse.limit_exceeded(position)}'
+    """Return a row for every state that is found in which the joints have the typed values."""
+    names = [name for name, _ in arguments.joint]
+    count = len(closure.input_names)
+    if len(names) != count or len({*names}) != count:
+        reason = f'{len(names)} for {count} inputs'
+        raise LinkageError('--joint', reason, f'name {count} different joints')
+    joints = closure.measuring(*names).linkage.joints
+    values = {
+        name: arguments.angles.to_si(typed, joints[name].unit) for name, typed in arguments.joint
+    }
+    searched = search_inputs(closure, values)
+    within = [
+        each for each in searched.inputs if closure.position(*each).status is not Status.LIMITED
+    ]
+    option = ' '.join(f'--joint {name}={typed:g}' for name, typed in arguments.joint)
+    if searched.inputs and not within:
+        beyond = closure.limit_exceeded(closure.position(*searched.inputs[0]))
+        reason = f'is reached only beyond limits: {beyond}'
         raise LinkageError(option, reason, 'ask for another value, or widen the limits')
-    if position.status.has_pose:
-        return
-    reason = f'is not reached: the loops are {position.status.value}'
-    if position.gap:
-        reason += f' by {arguments.angles.format_length(position.gap, ".3g")}'
-    ranges = _reach_text(inverse, given, arguments.angles)
-    raise LinkageError(option, reason, ranges or 'ask for other values')
+    if not within:
+        reach = []
+        for name, ends in searched.reach.items():
+            turning = joints[name].unit == 'rad'
+            low, high = (arguments.angles.value_text(end, turning) for end in ends)
+            reach.append(f'{name} goes from {low} to {high}')
+        reason = f'is not reached by a search from {searched.starts} states'
+        raise LinkageError(option, reason, ', '.join(reach) or 'draw another pose')
+    columns, rows = [], []
+    for inputs in within:
+        inverse = closure.driven_by(*names, near=inputs)
+        given = turn_to_pose(inverse, [*values.values()])
+        question = _read_question(inverse, arguments, [given])
+        columns = list(_output_columns(inverse, question))
+        rows += [_state_row(inverse, question, given)]
+    _note(f'{len(rows)} found by a search from {searched.starts} states; there may be others')
+    return columns, rows
+
+
+def _note(text: str) -> None:
+    print(f'linkage solve: note: {text}', file=sys.stderr)
 
 
 def _inverse_table(
-    closure: Closure, arguments: argparse.Namespace
+    closure: StepwiseClosure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     """Return a row for every input at which the joint has one of the typed values."""
     name = arguments.joint[0][0]
@@ -233,6 +245,8 @@ def _inverse_table(
             crank = inverse.position(value).joints[0]
             # The branch and its crank come first; the gap is 0.
             rows.append([number, crank, row[1], value, *row[4:]])
+    if not isinstance(closure, Closure):
+        _note(f'cranks are those that a search over {closure.input_names[0]} finds')
     own, status, _, crank_column, *others = columns
     columns = [Column('branch', 'branch'), crank_column, status, own, *others]
     if own in others:  # A point's coordinate, of which --points shows all.
@@ -243,7 +257,7 @@ def _inverse_table(
 
 
 def _unreached_error(
-    closure: Closure, joint: str, value: float, option: str, angles: DisplayUnits
+    closure: StepwiseClosure, joint: str, value: float, option: str, angles: DisplayUnits
 ) -> LinkageError:
     """Return the error for a value of a joint that no input within the limits reaches."""
     free = closure.branches(joint, limited=False)
@@ -265,7 +279,7 @@ def _show_reach(
     for given in typed:
         reach = '' if closure.position(*given).joints else _reach_text(closure, given, angles)
         if reach:
-            print(f'linkage solve: note: {reach}', file=sys.stderr)
+            _note(reach)
             return
 
 

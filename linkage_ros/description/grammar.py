@@ -30,6 +30,7 @@ from linkage_ros.description.parameters import (
     read_parameters,
     Rule,
     Schema,
+    TextOf,
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.units import LENGTHS
@@ -131,6 +132,25 @@ class ListOf(Kind):
 
     def json_schema(self) -> Schema:
         return {'description': self.meaning, 'type': 'array', 'items': self.of.json_schema()}
+
+
+@dataclass(frozen=True, slots=True)
+class NameOrNames(ListOf):
+    """A name, or a list of names."""
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
+        if isinstance(content.mapping.get(key), list):
+            return tuple(content.texts(key))
+        return (content.text(key),)
+
+    def json_schema(self) -> Schema:
+        several = {**ListOf.json_schema(self), 'minItems': 1}
+        return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
+
+
+def name_or_names(meaning: str, of: str) -> Any:
+    """Declare a name or several in a list, read as a tuple; none if absent."""
+    return declare(NameOrNames(meaning, TextOf(of)), ())
 
 
 @dataclass(frozen=True, slots=True)

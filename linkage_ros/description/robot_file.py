@@ -25,7 +25,7 @@ from itertools import chain, combinations, islice
 from math import inf, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.description.grammar import ListOf, Named
+from linkage_ros.description.grammar import ListOf, name_or_names, Named
 from linkage_ros.description.linkage_grammar import FARTHEST, MOST_LINKS
 from linkage_ros.description.parameters import (
     declare,
@@ -45,7 +45,6 @@ from linkage_ros.description.robot_pose import (
     RobotTree,
 )
 from linkage_ros.description.section import Section
-from linkage_ros.description.space_grammar import NameOrNames
 from linkage_ros.description.urdf_file import (
     LOOP_KINDS,
     LoopEnd,
@@ -101,9 +100,7 @@ ROBOT = Keys(
     dict,
     {
         'urdf': text('path of the URDF, relative to the folder of this file'),
-        'input': declare(
-            NameOrNames('The driven joint; several in a list.', TextOf('a joint of the URDF')), ()
-        ),
+        'input': name_or_names('The driven joint; several in a list.', 'a joint of the URDF'),
         'at': declare(
             Named(
                 'Values of joints at which all loops close, where they are not 0, by name.',

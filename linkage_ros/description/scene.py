@@ -156,14 +156,14 @@ class SceneLinkage:
 
     @property
     def sampled_joints(self) -> tuple[str, ...]:
-        """Return the joints that samples for its drive name: the driven ones, or a dependent."""
-        return (self.prefix + self.dependent_joint,) if self.dependent_joint else self.input_names
+        """Return the joints that samples for its drive name: the driven ones, or others."""
+        return tuple(self.prefix + joint for joint in self.instead_of_inputs) or self.input_names
 
     @property
-    def dependent_joint(self) -> str:
-        """Return the dependent joint that samples name instead of the input; '' for none."""
-        joint: str = self.drive[1].dependent_joint
-        return joint
+    def instead_of_inputs(self) -> tuple[str, ...]:
+        """Return the joints that samples name instead of the inputs; none if the inputs."""
+        joints: tuple[str, ...] = self.drive[1].instead_of_inputs
+        return joints
 
 
 @dataclass(frozen=True, slots=True)

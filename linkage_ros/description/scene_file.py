@@ -490,16 +490,14 @@ def _refuse_in_space(
     for name, effect in types.items():
         if effect.is_planar:
             raise effects.error(name, reason, remedy)
-    drives = section_with('drive')
-    topic = drive_section(drives)
-    if drive == 'topic' and 'joint' in topic.section('topic', required=False):
-        raise drives.error('drive.topic.joint', reason, 'name the joint as input of the linkage')
 
 
-def _check_sampled(drives: Section, closure: Closure | SpaceClosure, joint: str) -> None:
+def _check_sampled(
+    drives: Section, closure: Closure | SpaceClosure, joints: Sequence[str]
+) -> None:
     """Refuse samples of what is neither a joint nor measures the linkage."""
     try:
-        closure.measuring(joint)
+        closure.measuring(*joints)
     except DefinitionError as error:
         reason = f'{error.where}: {error.reason}'
         raise drives.error('drive.topic.joint', reason, error.remedy) from None

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from linkage_ros.description.grammar import DIALECT, InsteadOf, ListOf, Named
+from linkage_ros.description.grammar import DIALECT, InsteadOf, ListOf, Named, NameOrNames
 from linkage_ros.description.linkage_grammar import (
     by_name,
     FARTHEST,
@@ -87,20 +87,6 @@ class _TwoPoints(ListOf):
 
     def json_schema(self) -> Schema:
         return {**ListOf.json_schema(self), 'minItems': 2, 'maxItems': 2}
-
-
-@dataclass(frozen=True, slots=True)
-class NameOrNames(ListOf):
-    """A name, or a list of names."""
-
-    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
-        if isinstance(content.mapping.get(key), list):
-            return tuple(content.texts(key))
-        return (content.text(key),)
-
-    def json_schema(self) -> Schema:
-        several = {**ListOf.json_schema(self), 'minItems': 1}
-        return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
 
 
 def _joint(**values: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from linkage_ros.kinematics.analysis.curves import (
     traced_carriers as traced_carriers,
     unwrap_angles as unwrap_angles,
 )
+from linkage_ros.kinematics.analysis.exchanged_inputs import turn_to_pose as turn_to_pose
 from linkage_ros.kinematics.analysis.grashof import (
     CHANGE_POINTS as CHANGE_POINTS,
     four_bar_type as four_bar_type,
@@ -37,6 +38,7 @@ from linkage_ros.kinematics.analysis.ranges import (
     link_lengths as link_lengths,
     sample_inputs as sample_inputs,
 )
+from linkage_ros.kinematics.analysis.searched_inputs import search_inputs as search_inputs
 from linkage_ros.kinematics.analysis.shapes import (
     bar_size as bar_size,
     bounding_corners as bounding_corners,

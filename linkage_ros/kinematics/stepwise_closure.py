@@ -369,7 +369,7 @@ class StepwiseClosure:
         """
         Return the closure with these names among its joints; itself if it has them all.
 
-        Names are as in `driven_by`, and so are the errors. An input has to be named no more.
+        Names are as in `driven_by`, and so are the errors.
         """
         raise NotImplementedError
 

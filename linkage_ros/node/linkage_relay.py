@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""``ros2 run linkage_ros linkage_relay``: commands of a dependent joint to its crank."""
+"""``ros2 run linkage_ros linkage_relay``: commands of other joints than the inputs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def main() -> int:
     except LinkageError as error:
         print(f'linkage_relay: {error}', file=sys.stderr)
         return 2
-    purpose = 'Turns commands of a dependent joint into commands of its crank.'
+    purpose = 'Turns commands of other joints into commands of the inputs.'
     example = '-p scene:=gripper.yaml'
     if parameters.show_help('linkage_relay', purpose, relay.PARAMETERS, example):
         return 0

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-The relay: commands for a dependent joint in, commands for its crank out.
+The relay: commands for other joints than the inputs in, commands for the inputs out.
 
 =====================  ====================================  ======================
 in                     type                                  out
@@ -17,24 +17,25 @@ in                     type                                  out
 =====================  ====================================  ======================
 
 Given positions, velocities and accelerations are converted; efforts are left out. A command
-without a crank position is not sent; nor is a trajectory with such a point.
+that no inputs reach is not sent; nor is a trajectory with such a point. With several inputs a
+message names all of the joints that are commanded instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite, nan
+from math import inf, isfinite
 from threading import Event
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from linkage_ros.description import load_scene, Scene
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics import Closure, CrankBranch, Status
+from linkage_ros.kinematics import Position, Status
 from linkage_ros.node.demo_nodes import run_demo_node
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE
-from linkage_ros.stages.drives import sampled_branch
+from linkage_ros.stages.drives import ExchangedInputs, InputMotion
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -55,24 +56,23 @@ class RefusedError(ValueError):
 
 class CommandRelay:
     """
-    Turns commands for dependent joints of a scene into commands for their cranks.
+    Turns commands for other joints of a scene's linkages into commands for their inputs.
 
-    DefinitionError if no linkage of the scene names such a joint, or if the joint does not
-    determine the crank.
+    DefinitionError if no linkage of the scene names such joints, or if they do not determine its
+    inputs.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._inverses: dict[str, tuple[Closure, CrankBranch, str]] = {}
-        for scene_linkage in scene.linkages:
-            if scene_linkage.dependent_joint:
-                closure, joint = scene_linkage.closure, scene_linkage.dependent_joint
-                branch = sampled_branch(closure, joint, scene_linkage.drive[1].branch)
-                self._inverses[scene_linkage.sampled_joints[0]] = (
-                    closure.driven_by(joint, branch=branch.number),
-                    branch,
-                    scene_linkage.input_names[0],
-                )
-        if not self._inverses:
+        self._lines = [
+            _Line(
+                ExchangedInputs(one.closure, one.instead_of_inputs, one.drive[1].branch),
+                one.sampled_joints,
+                one.input_names,
+            )
+            for one in scene.linkages
+            if one.instead_of_inputs
+        ]
+        if not self._lines:
             raise DefinitionError(
                 'drive.topic.joint', 'names no dependent joint', 'name the one that is commanded'
             )
@@ -80,37 +80,40 @@ class CommandRelay:
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Return the joints whose commands it takes."""
-        return tuple(self._inverses)
+        return tuple(name for line in self._lines for name in line.joints)
 
     def turn_state(self, message: JointState) -> JointState | None:
-        """Return the command for the cranks of the joints that a message names; None if none."""
-        known = [name for name in message.name if name in self._inverses]
-        if not known:
+        """Return the command for the inputs of the joints that a message names; None if none."""
+        names = [name for name in message.name if name in self.joint_names]
+        if not names:
             return None
-        places = [list(message.name).index(name) for name in known]
+        lines = self._lines_of(names)
+        places = [list(message.name).index(name) for name in names]
         rows = [
             [array[place] for place in places] if len(array) == len(message.name) else []
             for array in (message.position, message.velocity)
         ]
-        positions, velocities, _ = self._crank_arrays(known, *rows, [])
-        cranks = [self._inverses[name][-1] for name in known]
+        positions, velocities, _ = _input_arrays(lines, names, *rows, [])
         return JointState(
-            header=message.header, name=cranks, position=positions, velocity=velocities
+            header=message.header,
+            name=[name for line in lines for name in line.inputs],
+            position=positions,
+            velocity=velocities,
         )
 
     def turn_trajectory(self, message: JointTrajectory) -> JointTrajectory:
-        """Return the trajectory of the cranks."""
+        """Return the trajectory of the inputs."""
         names = list(message.joint_names)
-        strange = [name for name in names if name not in self._inverses]
+        strange = [name for name in names if name not in self.joint_names]
         if strange:
             raise RefusedError(
                 f'names {list_names(strange)}; send {list_names(self.joint_names)} only'
             )
-        points = []
+        lines, points = self._lines_of(names), []
         for number, point in enumerate(message.points, 1):
             try:
-                found = self._crank_arrays(
-                    names, point.positions, point.velocities, point.accelerations
+                found = _input_arrays(
+                    lines, names, point.positions, point.velocities, point.accelerations
                 )
             except RefusedError as error:
                 raise RefusedError(f'point {number} of {len(message.points)}: {error}') from None
@@ -122,51 +125,75 @@ class CommandRelay:
                     time_from_start=point.time_from_start,
                 )
             )
-        cranks = [self._inverses[name][-1] for name in names]
-        return JointTrajectory(header=message.header, joint_names=cranks, points=points)
+        inputs = [name for line in lines for name in line.inputs]
+        return JointTrajectory(header=message.header, joint_names=inputs, points=points)
 
-    def _crank_arrays(self, names: Sequence[str], *rows: Sequence[float]) -> list[list[float]]:
-        """Return positions, velocities and accelerations of cranks, as far as they are given."""
-        positions, velocities, accelerations = rows
-        if len(positions) != len(names):
-            raise RefusedError(f'{len(positions)} positions for {len(names)} joints')
-        if not {len(velocities), len(accelerations)} <= {0, len(names)}:
-            raise RefusedError('arrays of unequal length')
-        columns = [
-            self._crank_motion(
-                name,
-                positions[i],
-                velocities[i] if velocities else nan,
-                accelerations[i] if accelerations else nan,
+    def _lines_of(self, names: Sequence[str]) -> list[_Line]:
+        """Return the linkages whose joints a message names, in its order."""
+        named = (line for name in names for line in self._lines if name in line.joints)
+        lines = [*{line.joints: line for line in named}.values()]
+        for line in lines:
+            if missing := [joint for joint in line.joints if joint not in names]:
+                own = list_names(joint for joint in line.joints if joint in names)
+                raise RefusedError(f'names {own} without {list_names(missing)}; send all')
+        return lines
+
+
+def _input_arrays(
+    lines: Sequence[_Line], names: Sequence[str], *rows: Sequence[float]
+) -> list[list[float]]:
+    """Return positions, velocities and accelerations of inputs, as far as they are given."""
+    positions, velocities, accelerations = rows
+    if len(positions) != len(names):
+        raise RefusedError(f'{len(positions)} positions for {len(names)} joints')
+    if not {len(velocities), len(accelerations)} <= {0, len(names)}:
+        raise RefusedError('arrays of unequal length')
+    given = [dict(zip(names, row, strict=False)) for row in rows]
+    motions = [
+        line.motion_at(*([of[name] for name in line.joints if of] for of in given))
+        for line in lines
+    ]
+    return [
+        [value for motion in motions for value in motion[order]] if of else []
+        for order, of in enumerate(given)
+    ]
+
+
+class _Line(NamedTuple):
+    """A linkage with the joints that are commanded instead of its inputs, with prefixes."""
+
+    exchange: ExchangedInputs
+    joints: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+    def motion_at(
+        self, values: list[float], rates: list[float], accelerations: list[float]
+    ) -> InputMotion:
+        """Return the inputs, with rates and accelerations: NaN where those of a joint are."""
+        exchange = self.exchange
+        position = exchange.find_position(values)
+        if position is None or position.status is Status.LIMITED:
+            places = ', '.join(
+                f'{name} at {value:.6g} {given.unit}'
+                for name, value, given in zip(
+                    self.joints, values, exchange.inverse.linkage.inputs, strict=True
+                )
             )
-            for i, name in enumerate(names)
-        ]
-        turned = [list(row) for row in zip(*columns, strict=True)]
-        return [row if given else [] for row, given in zip(turned, rows, strict=True)]
-
-    def _crank_motion(
-        self, joint: str, value: float, rate: float, change: float
-    ) -> tuple[float, float, float]:
-        """Return crank, rate and acceleration, NaN where the joint's is NaN."""
-        inverse, branch, _ = self._inverses[joint]
-        position = inverse.position(value)
-        place = f'{joint} at {value:.6g} {inverse.linkage.inputs[0].unit}'
-        # Beyond a toggle of the crank the joint goes on in another assembly.
-        if not position.status.has_pose or branch.distance_beyond(value):
-            ends = f'it goes from {branch.low:.6g} to {branch.high:.6g}'
-            raise RefusedError(f'{place} is not reached: {ends}')
-        crank = position.joints[0]
+            raise RefusedError(f'{places} is not reached: {self._reason(position)}')
+        motion = exchange.motion_at(position, rates, accelerations)
         if position.status is Status.TOGGLE:
-            if any(isfinite(one) and one for one in (rate, change)):
-                raise RefusedError(f'{place} turns back there: the crank has no rate')
-            return crank, rate, change
-        if not isfinite(rate):
-            return crank, nan, nan
-        velocity = inverse.velocity(position, rate)
-        if not isfinite(change):
-            return crank, velocity.joints[0], nan
-        acceleration = inverse.acceleration(position, velocity, change)
-        return crank, velocity.joints[0], acceleration.joints[0]
+            if any(isfinite(one) and one for one in (*rates, *accelerations)):
+                joints = list_names(self.joints)
+                raise RefusedError(f'{joints} turns back there: the crank has no rate')
+            return InputMotion(motion.inputs, tuple(rates), tuple(accelerations))
+        return motion
+
+    def _reason(self, position: Position | None) -> str:
+        if position is not None:
+            return f'beyond limits: {self.exchange.inverse.limit_exceeded(position)}'
+        if (branch := self.exchange.branch) is not None:
+            return f'it goes from {branch.low:.6g} to {branch.high:.6g}'
+        return 'no inputs lead there in the assembly of the pose'
 
 
 class RelayNode(Node):

@@ -360,11 +360,11 @@ def test_an_actuator_without_a_position_is_refused(programs):
 
 REFUSED = {
     '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': ['gripper'],
-    '2 for 1 inputs; name 1 different joint': [
+    '2 for 1 input; name 1 different joint': [
         'gripper', '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
     'left_fnger_joint: is no joint, and describes no point': [
         'gripper', '--driven-by', 'left_fnger_joint'],
-    '--branch: is for planar linkages of one input': [
+    'branch 1: there are 2 inputs, and no branches; leave it out': [
         'ankle_motors', '--branch', '1', '--driven-by', 'pitch', '--driven-by', 'roll'],
     '--branch: is for --driven-by; name the joint': ['ankle_motors', '--branch', '1'],
     '-o: is for one source; leave out -o or --ros2-control': ['ankle_motors', '-o', 'x.h'],

@@ -21,7 +21,7 @@ from cmath import rect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from math import inf, isfinite, sin, tau
+from math import inf, isfinite, remainder, sin, tau
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.errors import DefinitionError
@@ -50,7 +50,7 @@ _STARTS = (0.47, 0.31, 0.68)
 _TRIED = (0.02, 0.11, 0.23, 0.37, 0.5, 0.63, 0.77, 0.89, 0.98)
 """Parts of a branch at which the assembly is taken, and at which it is compared."""
 
-_STILL, _DEPENDENT = 1e-9, 1e-9
+_STILL, DEPENDENT = 1e-9, 1e-9
 """The slope of a joint that does not move, and the least of slopes of joints that do, together."""
 
 _ACROSS, _MARGIN = 8, 0.05
@@ -98,7 +98,7 @@ def _exchange_at(closure: Built, names: Sequence[str], at: Sequence[float]) -> B
     zeros = (0.0,) * len(names)
     near = {name: (value, *zeros) for name, value in zip(closure.input_names, at, strict=True)}
     position = closure.close_unlimited(*at)
-    _check_moved(closure, names, position)
+    check_moved(closure, names, position)
     plan = closure.plan_exchange(names, near)
     try:
         found: Built = plan(position, {}, {})
@@ -160,18 +160,22 @@ def _meets(
     )
 
 
-def _check_moved(closure: LoopClosure, names: Sequence[str], position: Position) -> None:
+def check_moved(closure: LoopClosure, names: Sequence[str], position: Position) -> None:
     """Refuse names that do not say at a position how the inputs move."""
     if not position.status.has_rates:
         return
     import numpy as np  # local import: one input does without it
 
-    slopes = named_slopes(closure, names, position)
+    # Of lengths in sizes of the linkage.
+    units = [closure.scale if given.slider else 1.0 for given in closure.linkage.inputs]
+    own = [1.0 if turning else closure.scale for turning in closure.turning]
+    scaled = closure.jacobian(position) * units / np.array(own)[:, None]
+    slopes = scaled[[closure.joint_names.index(name) for name in names]]
     for name, row in zip(names, slopes, strict=True):
         if not np.abs(row).max() > _STILL:
             raise DefinitionError(name, 'does not move with the inputs', 'name another joint')
     _, sizes, ways = np.linalg.svd(slopes / np.abs(slopes).max(axis=1, keepdims=True))
-    if not sizes[-1] > _DEPENDENT:
+    if not sizes[-1] > DEPENDENT:
         free = closure.input_names[int(np.abs(ways[-1]).argmax())]
         raise DefinitionError(
             ', '.join(names), f'are not independent in the pose: {free} stays free',
@@ -179,28 +183,21 @@ def _check_moved(closure: LoopClosure, names: Sequence[str], position: Position)
         )  # fmt: skip
 
 
-def named_slopes(closure: LoopClosure, names: Sequence[str], position: Position) -> Any:
+def turn_to_pose(closure: LoopClosure, values: Sequence[float]) -> tuple[float, ...]:
     """
-    Return the derivatives of inputs and joints by the inputs, (names, inputs).
+    Return values of several inputs; angles without limits in the turn that is nearest to the pose.
 
-    Lengths are in sizes of the linkage.
+    Links that close only together are followed from there, and not a turn away.
     """
-    import numpy as np  # local import: as above
-
-    rows = dict(zip(closure.joint_names, closure.jacobian(position), strict=True))
-    rows |= dict(zip(closure.input_names, np.eye(len(closure.input_names)), strict=True))
-    units = [closure.scale if given.slider else 1.0 for given in closure.linkage.inputs]
-    turning = turning_names(closure)
-    return (
-        np.array([rows[name] / (1.0 if turning[name] else closure.scale) for name in names])
-        * units
+    inputs, home = closure.linkage.inputs, closure.linkage.pose.inputs
+    if len(inputs) == 1:
+        return tuple(values)
+    return tuple(
+        value
+        if given.slider or given.limits.is_bounded
+        else value - tau * round((value - at) / tau)
+        for value, given, at in zip(values, inputs, home, strict=True)
     )
-
-
-def turning_names(closure: LoopClosure) -> dict[str, bool]:
-    """Return whether an input or a published joint turns, by its name."""
-    turning = dict(zip(closure.joint_names, closure.turning, strict=True))
-    return turning | {given.joint: not given.slider for given in closure.linkage.inputs}
 
 
 def _reached_limits(closure: LoopClosure, names: Sequence[str]) -> dict[str, Limits]:
@@ -281,7 +278,10 @@ class PlaneExchange:
                     place = places[link, point]
                     points[point] = (place.real, place.imag)
         drawn = AssemblyPose(
-            tuple(_turn_within(values[given.joint], given) for given in linkage.inputs),
+            tuple(
+                _turn_within(values[given.joint], given, turns_known=given.joint in known)
+                for given in linkage.inputs
+            ),
             points,
             {link: angle for link, angle in angles.items() if link in linkage.links},
         )
@@ -327,11 +327,12 @@ def _as_joint(given: Input, near: tuple[float, ...]) -> RevoluteJoint | SlideJoi
     return replace(joint, near=near)
 
 
-def _turn_within(value: float, given: Input) -> float:
-    """Return the value of a new input, with the whole turns that its limits allow."""
+def _turn_within(value: float, given: Input, *, turns_known: bool) -> float:
+    """Return the value of a new input, with the whole turns that its limits allow, or none."""
     low, high = given.limits.low, given.limits.high
+    if given.slider:
+        return min(max(value, low), high)
     if inf in (-low, high):
-        return value
-    if not given.slider:
-        value -= tau * round((value - 0.5 * (low + high)) / tau)
+        return value if turns_known else remainder(value, tau)
+    value -= tau * round((value - 0.5 * (low + high)) / tau)
     return min(max(value, low), high)

@@ -36,13 +36,18 @@ _AXES = ((1.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0))
 
 def with_measured(linkage: Linkage, names: Sequence[str]) -> Linkage:
     """
-    Return a linkage with what names describe as published joints, after its own.
+    Return a linkage with what names describe as published joints, after its own; also inputs.
 
     A name that is neither a joint nor describes what moves raises DefinitionError.
     """
-    driven = {given.joint for given in linkage.inputs}
+    driven = {given.joint: given for given in linkage.inputs}
     for name in names:
-        if name not in linkage.joints and name not in driven:
+        if name in linkage.joints:
+            continue
+        if name in driven:
+            joints = {**linkage.joints, name: driven[name].as_joint()}
+            linkage = replace(linkage, joints=joints)
+        else:
             linkage = _add_measured(linkage, name)
     return linkage
 

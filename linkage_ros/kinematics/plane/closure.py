@@ -118,12 +118,8 @@ class Closure(StepwiseClosure):
         return PlaneExchange(self, names, near, lambda linkage: Closure(linkage, self.name))
 
     def measuring(self, *names: str) -> Closure:
-        """
-        Return the closure with these names among its joints; itself if it has them all.
-
-        Names are as in `driven_by`, and so are the errors.
-        """
-        if {*names} <= {*self.joint_names, *self.input_names}:
+        """Return the closure with these names among its joints; see `StepwiseClosure`."""
+        if {*names} <= {*self.joint_names}:
             return self
         from linkage_ros.kinematics.analysis.measured_points import (
             with_measured,  # local import: only few ask for it

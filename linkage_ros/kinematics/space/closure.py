@@ -212,12 +212,8 @@ class SpaceClosure(StepwiseClosure):
         return plan
 
     def measuring(self, *names: str) -> SpaceClosure:
-        """
-        Return the closure with these names among its joints; itself if it has them all.
-
-        Names are as in `driven_by`, and so are the errors.
-        """
-        if {*names} <= {*self.joint_names, *self.input_names}:
+        """Return the closure with these names among its joints; see `StepwiseClosure`."""
+        if {*names} <= {*self.joint_names}:
             return self
         from linkage_ros.kinematics.space.measured_points import (
             with_measured,  # local import: only few ask for it

@@ -38,7 +38,7 @@ def with_measured(linkage: SpaceLinkage, names: Sequence[str]) -> SpaceLinkage:
         of, _, axis = name.rpartition('.')
         pair = point_pair(name, linkage.points)
         if name in known:
-            if name not in (*linkage.published, *linkage.driven):
+            if name not in linkage.published:
                 linkage = replace(linkage, published=(*linkage.published, name))
         elif of in linkage.points and axis in _AXES:
             linkage = _with_coordinate(linkage, name, of, axis)

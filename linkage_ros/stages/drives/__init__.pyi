@@ -10,10 +10,9 @@ from linkage_ros.stages.drives.bag import BagDrive as BagDrive
 from linkage_ros.stages.drives.chirp import Chirp as Chirp, ChirpDrive as ChirpDrive
 from linkage_ros.stages.drives.compiled_drive import compile_drive as compile_drive
 from linkage_ros.stages.drives.dependent_samples import (
-    crank_of as crank_of,
     DependentSampleReader as DependentSampleReader,
-    joint_of as joint_of,
-    sampled_branch as sampled_branch,
+    ExchangedInputs as ExchangedInputs,
+    InputMotion as InputMotion,
 )
 from linkage_ros.stages.drives.drive import (
     Context as Context,

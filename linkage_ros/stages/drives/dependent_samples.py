@@ -6,83 +6,141 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Samples of a dependent joint, turned into samples of the crank on a branch of that joint."""
+"""
+Samples of other joints than the inputs: the state of the inputs that they ask for.
+
+The linkage is planned again with these joints as its inputs, in the assembly of their branch, or
+of the pose. Where that plan leads on into another assembly, beyond a toggle of the inputs, the
+linkage itself has other joints at the inputs that are found: then there are none.
+"""
 
 from __future__ import annotations
 
-from math import floor, isfinite, isnan, nan
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from math import isfinite, nan, remainder, tau
+from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics import Closure, CrankBranch, Position, turn_to_pose
 from linkage_ros.messages import CrankSample, JointStateReader, Rejection
 from linkage_ros.stages.drives.drive import LARGEST
 
-if TYPE_CHECKING:
-    from linkage_ros.kinematics import CrankBranch
+Values = tuple[float, ...]
+
+_SAME = 1e-6
+"""Farthest that a joint may be from what is asked for, in [rad] or of the linkage's size."""
 
 
-def sampled_branch(closure: Closure, joint: str, number: int) -> CrankBranch:
+class InputMotion(NamedTuple):
+    """Inputs with their rates and accelerations; NaN where they have none, or none are given."""
+
+    inputs: Values
+    rates: Values
+    accelerations: Values
+
+
+class ExchangedInputs:
     """
-    Return the branch of a joint by its number; 0 means the only branch.
+    The inputs of a linkage as functions of as many other joints.
 
-    Raise the errors of `Closure.driven_by`, with the key of the scene.
+    ``branch`` is the number of a branch of a single joint; 0 for that of the pose, or the only
+    one. The errors of `Closure.driven_by` are raised with the key of the scene.
     """
-    if (count := len(closure.linkage.inputs)) > 1:
-        raise DefinitionError(
-            'drive.topic.joint',
-            f'one joint does not determine {count} inputs',
-            'leave it out, and send the inputs; or name other joints as inputs of the linkage',
-        )
-    try:
-        return closure.find_branch(joint, number or None)
-    except DefinitionError as error:
-        key = 'drive.topic.branch' if number else 'drive.topic.joint'
-        raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None
 
+    def __init__(self, closure: Closure, joints: Sequence[str], branch: int) -> None:
+        try:
+            self.branch: CrankBranch | None = None
+            if len(closure.input_names) == 1 == len(joints):
+                self.branch = closure.find_branch(joints[0], branch or None)
+                branch = self.branch.number
+            self.inverse = closure.driven_by(*joints, branch=branch or None)
+            self._measured = closure.measuring(*joints)
+        except DefinitionError as error:
+            key = 'drive.topic.branch' if branch else 'drive.topic.joint'
+            raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None
+        self._names = closure.input_names
+        self._rows = [self._measured.joint_names.index(name) for name in joints]
+        self._turns = [self._measured.turning[row] for row in self._rows]
 
-def crank_of(branch: CrankBranch, value: float, rate: float) -> tuple[float, float]:
-    """Return the crank and its rate for a value of the joint that is reached, and its rate."""
-    crank, slope = branch.find_crank(value)
-    if abs(slope) < branch.flat:
-        return crank, nan
-    return crank, rate / (branch.evaluate(crank)[1] if isfinite(slope) else slope)
+    def find_position(self, values: Sequence[float]) -> Position | None:
+        """Return the position of the exchanged linkage at values; None if there is none."""
+        position = self.inverse.position(*turn_to_pose(self.inverse, values))
+        return position if position.status.has_pose and self._is_own(position) else None
 
+    def _is_own(self, position: Position) -> bool:
+        """Return whether the linkage itself has these joints at the inputs that are found."""
+        found = self._measured.close_unlimited(*self._inputs_of(position))
+        for row, value, turns in zip(self._rows, position.inputs, self._turns, strict=True):
+            if not found.joints:
+                return False
+            off = found.joints[row] - value
+            off = remainder(off, tau) if turns else off / self._measured.scale
+            if not abs(off) < _SAME:
+                return False
+        return True
 
-def joint_of(branch: CrankBranch, crank: float, rate: float) -> tuple[float, float]:
-    """Return the joint and its rate for a crank and its rate; at rest at the end of the branch."""
-    turns = floor((crank - branch.least) / branch.period) if branch.period else 0
-    crank -= turns * branch.period
-    within = min(max(crank, branch.least), branch.most)
-    value, slope = branch.evaluate(within)
-    value += turns * (branch.rise if branch.rises else -branch.rise)
-    return value, rate * slope if within == crank else 0.0
+    def _inputs_of(self, position: Position) -> Values:
+        given = dict(zip(self.inverse.input_names, position.inputs, strict=True))
+        return tuple(given[name] if name in given else position[name] for name in self._names)
+
+    def motion_at(
+        self, position: Position, rates: Sequence[float], accelerations: Sequence[float] = ()
+    ) -> InputMotion:
+        """Return the inputs at a position with rates and accelerations of the joints."""
+        none = (nan,) * len(self._names)
+        found = InputMotion(self._inputs_of(position), none, none)
+        if not (position.status.has_rates and rates and all(map(isfinite, rates))):
+            return found
+        velocity = self.inverse.velocity(position, *rates)
+        known = dict(zip(self.inverse.input_names, rates, strict=True))
+        known |= dict(zip(self.inverse.joint_names, velocity.joints, strict=True))
+        found = found._replace(rates=tuple(known[name] for name in self._names))
+        if not (accelerations and all(map(isfinite, accelerations))):
+            return found
+        acceleration = self.inverse.acceleration(position, velocity, *accelerations)
+        known = dict(zip(self.inverse.input_names, accelerations, strict=True))
+        known |= dict(zip(self.inverse.joint_names, acceleration.joints, strict=True))
+        return found._replace(accelerations=tuple(known[name] for name in self._names))
+
+    def joints_at(self, inputs: Sequence[float], rates: Sequence[float]) -> tuple[Values, Values]:
+        """Return the joints and their rates at inputs; beyond the branch, those at its end."""
+        branch = self.branch
+        if branch is not None:
+            turns = branch.period and branch.period * ((inputs[0] - branch.least) // branch.period)
+            within = min(max(inputs[0] - turns, branch.least), branch.most)
+            rates = rates if within == inputs[0] - turns else (0.0,)
+            inputs = (within + turns,)
+        position = self._measured.close_unlimited(*inputs)
+        values = tuple(position.joints[row] for row in self._rows)
+        if not position.status.has_rates:
+            return values, (0.0,) * len(values)
+        velocity = self._measured.velocity(position, *rates)
+        return values, tuple(velocity.joints[row] for row in self._rows)
 
 
 class DependentSampleReader:
     """
-    Reads samples of a dependent joint from serialized messages, and returns the crank's samples.
+    Reads samples of dependent joints from serialized messages, and returns those of the inputs.
 
-    Where the joint turns back, the crank has no rate: it is absent, NaN.
+    A message names all of the joints. Where they turn back the inputs have no rates: NaN.
     """
 
-    __slots__ = ('_branch', '_read')
+    __slots__ = ('_exchange', '_read')
 
-    def __init__(self, branch: CrankBranch, joint: str) -> None:
-        self._branch = branch
-        self._read = JointStateReader([joint]).read
+    def __init__(self, exchange: ExchangedInputs, joints: Sequence[str]) -> None:
+        self._exchange = exchange
+        self._read = JointStateReader(joints).read
 
     def read(self, data: bytes) -> CrankSample | Rejection:
-        """Return the sample of the crank, or the reason for its rejection."""
+        """Return the sample of the inputs, or the reason for its rejection."""
         sample = self._read(data)
         if isinstance(sample, Rejection):
             return sample
-        stamp, (value,), rates, _ = sample
-        if not -LARGEST <= value <= LARGEST:
+        stamp, values, rates, _ = sample
+        if not all(-LARGEST <= value <= LARGEST for value in values):
             return sample  # The drive says why not.
-        if self._branch.distance_beyond(value):
+        position = self._exchange.find_position(values)
+        if position is None:
             return Rejection.NO_CRANK
-        crank, rate = crank_of(self._branch, value, rates[0] if rates else nan)
-        if isnan(crank):
-            return Rejection.NO_CRANK
-        return CrankSample(stamp, (crank,), (rate,) if rates else None)
+        motion = self._exchange.motion_at(position, rates or ())
+        return CrankSample(stamp, motion.inputs, motion.rates if rates else None)

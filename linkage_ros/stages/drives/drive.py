@@ -278,9 +278,9 @@ class Drive(ABC):
     keeps_state: ClassVar[bool] = True
 
     @property
-    def dependent_joint(self) -> str:
-        """Return the dependent joint that samples name instead of the input; '' for none."""
-        return ''
+    def instead_of_inputs(self) -> tuple[str, ...]:
+        """Return the joints that samples name instead of the inputs; none if the inputs."""
+        return ()
 
     @property
     def moves_by_rates(self) -> bool:

@@ -33,7 +33,7 @@ from itertools import chain
 from math import expm1, isfinite, nan, remainder, tau
 from typing import Any
 
-from linkage_ros.description import choice, flag, number, text, whole_number
+from linkage_ros.description import choice, flag, name_or_names, number, whole_number
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Input, where
 from linkage_ros.messages import CrankSample, input_reader, NANOSECONDS, Rejection
@@ -85,15 +85,15 @@ class TopicDrive(Drive):
     cutoff: float = number(
         'of the low-pass behind the differences; 0: none', 0.0, unit='Hz', least=0.0, most=1e6
     )
-    joint: str = text(
-        'what the samples name instead of the input, whose crank is computed: a dependent joint, '
-        'a coordinate P.x, a distance A-B of two points, the angle LINK.angle of a link; absent, '
-        'they name the input',
-        '',
+    joint: tuple[str, ...] = name_or_names(
+        'what the samples name instead of the inputs, which are computed: a dependent joint, a '
+        'coordinate P.x, a distance A-B of two points, in the plane the angle LINK.angle of a '
+        'link; as many in a list as there are inputs; absent, they name the inputs',
+        'a joint',
     )
     branch: int = whole_number(
-        'branch of that joint on which the crank is, as linkage check --branches lists them; 0: '
-        'the only one',
+        'with one input, branch of that joint on which the crank is, as linkage check --branches '
+        'lists them; 0: that of the pose, or the only one',
         0,
         least=0,
         most=10_000,
@@ -104,8 +104,8 @@ class TopicDrive(Drive):
     keeps_state = False
 
     @property
-    def dependent_joint(self) -> str:
-        """Return the dependent joint that samples name instead of the input; '' for none."""
+    def instead_of_inputs(self) -> tuple[str, ...]:
+        """Return the joints that samples name instead of the inputs; none if the inputs."""
         return self.joint
 
     @property
@@ -136,16 +136,17 @@ class TopicDrive(Drive):
         """
         Build the reader of the messages.
 
-        Raise `DefinitionError` if the joint does not determine the crank.
+        Raise `DefinitionError` if the joints do not determine the inputs.
         """
         if self.joint:
             from linkage_ros.stages.drives.dependent_samples import (  # local import: seldom named
                 DependentSampleReader,
-                sampled_branch,
+                ExchangedInputs,
             )
 
-            branch = sampled_branch(context.closure, self.joint, self.branch)
-            return DependentSampleReader(branch, context.prefix + self.joint).read
+            exchange = ExchangedInputs(context.closure, self.joint, self.branch)
+            names = [context.prefix + joint for joint in self.joint]
+            return DependentSampleReader(exchange, names).read
         return input_reader(context.inputs_in_messages)
 
 

@@ -19,7 +19,6 @@ package with a transmission, whose actuators are the inputs.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 import os
 from pathlib import Path
 import re
@@ -34,7 +33,6 @@ from linkage_ros.description import (
     write_folder,
 )
 from linkage_ros.errors import DefinitionError, LinkageError, list_names, quote
-from linkage_ros.kinematics import Closure
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.ros2_control import commanded_joints, write_package
 from linkage_ros.tools.models.source_code import (
@@ -123,7 +121,7 @@ def _write_source(arguments: argparse.Namespace, closure: Any, file: Path) -> in
     language = LANGUAGES[output.suffix.lower()]
     in_c = output.suffix.lower() in ('.c', '.h')
     if arguments.driven_by:
-        closure = _driven_closure(closure, arguments.driven_by, arguments.branch)
+        closure = closure.driven_by(*arguments.driven_by, branch=arguments.branch)
     closure, joints = _requested_joints(closure, arguments.joints)
     subject = Subject(
         closure,
@@ -155,22 +153,13 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
             folder, 'exists already', 'name another, or add --force to write into it'
         )
     commanded = commanded_joints(closure, arguments.driven_by)
-    inverse = _driven_closure(closure, commanded, arguments.branch)
+    inverse = closure.driven_by(*commanded, branch=arguments.branch)
     closure, joints = _requested_joints(closure, arguments.joints)
     closure = closure.measuring(*commanded)
     joints = tuple(dict.fromkeys((*commanded, *joints)))
     write_folder(folder, write_package(closure, inverse, name, file.name, joints))
     print(folder)
     return 0
-
-
-def _driven_closure(closure: Any, joints: Sequence[str], branch: int | None) -> Any:
-    """Return the linkage with other joints as its inputs."""
-    if branch is None:
-        return closure.driven_by(*joints)
-    if len(closure.input_names) > 1 or not isinstance(closure, Closure):
-        raise LinkageError('--branch', 'is for planar linkages of one input', 'leave it out')
-    return closure.driven_by(*joints, branch=branch)
 
 
 def _source_name(file: Path, typed: str | None) -> str:

@@ -221,7 +221,7 @@ def _offer_time(motion: LinkageMotion, seconds: float) -> Spread:
     zeros = (0.0,) * len(names)
     message = JointStateWriter(names).write(BEGIN, zeros, zeros, zeros)
     _, use = motion.scene_linkage.drive
-    if not use.is_measured or motion.scene_linkage.dependent_joint:
+    if not use.is_measured or motion.scene_linkage.instead_of_inputs:
         return Spread(0.0, 0.0, 0.0)
     read = use.reader(motion.context)
     drive = sample_inputs(use, True, motion.closure.linkage.inputs)

@@ -40,7 +40,7 @@ def _samples_and_ticks(
 ) -> Iterator[tuple[int, bytes]]:
     """Yield ticks, each with a sample; the last one again and again after the end of a bag."""
     driven = [each for each in motions if each.scene_linkage.drive[1].is_measured]
-    if any(each.scene_linkage.dependent_joint for each in driven):
+    if any(each.scene_linkage.instead_of_inputs for each in driven):
         yield from turn_crank(scene, Pipeline(scene))
         return
     write = JointStateWriter(

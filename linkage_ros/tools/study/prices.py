@@ -32,7 +32,7 @@ from linkage_ros.description import parse_scene, Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import Closure, InputSweep, usual_inputs
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.stages.drives import sampled_branch
+from linkage_ros.stages.drives import ExchangedInputs
 from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.study.budget import Knob, Price
 from linkage_ros.tools.study.measuring import Progress, Spread, spread_of, thread_clock
@@ -112,14 +112,17 @@ def turn_crank(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
 
 def _input_paths(linkage: LinkagePipeline) -> list[Path]:
     """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
-    closure, joint = linkage.closure, linkage.scene_linkage.dependent_joint
-    if not joint:
+    closure, scene_linkage = linkage.closure, linkage.scene_linkage
+    joints = scene_linkage.instead_of_inputs
+    if not joints:
         widest = InputSweep(closure).widest_range
         if len(closure.linkage.inputs) == 1 and (widest is None or widest.is_whole):
             speed = tau * _CRANK_RATE
             return [lambda seconds: (speed * seconds, speed)]
         return swinging_inputs(closure, _CRANK_RATE)
-    branch = sampled_branch(closure, joint, linkage.scene_linkage.drive[1].branch)
+    exchange = ExchangedInputs(closure, joints, scene_linkage.drive[1].branch)
+    if (branch := exchange.branch) is None:
+        return swinging_inputs(exchange.inverse, _CRANK_RATE)
     middle, width = 0.5 * (branch.low + branch.high), branch.high - branch.low
     return [_oscillation_path(middle, _PART * width, tau * _CRANK_RATE)]
 

@@ -59,7 +59,7 @@ from linkage_ros.node import (
 )
 from linkage_ros.replay import read_change
 from linkage_ros.signals import bounded_end
-from linkage_ros.stages.drives import DependentSampleReader, joint_of, sampled_branch
+from linkage_ros.stages.drives import DependentSampleReader, ExchangedInputs
 from linkage_ros.tools.view.followed_run import diagnostics_content, FollowedRun, read_run
 from linkage_ros.tools.view.hand_crank import HandCrank, HELD
 from linkage_ros.tools.view.live import KINDS
@@ -75,7 +75,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics import CrankBranch
+    pass
 
 Floats = Sequence[float]
 
@@ -594,32 +594,31 @@ def _read_flag(content: Mapping[str, Any]) -> bool:
     return on
 
 
-def _branch_of(scene_linkage: SceneLinkage) -> CrankBranch:
-    """Return the branch on which a dependent joint moves a crank."""
-    return sampled_branch(
-        scene_linkage.closure, scene_linkage.dependent_joint, scene_linkage.drive[1].branch
-    )
+def _exchange_of(scene_linkage: SceneLinkage) -> ExchangedInputs:
+    """Return how the joints that its samples name move the inputs."""
+    joints, branch = scene_linkage.instead_of_inputs, scene_linkage.drive[1].branch
+    return ExchangedInputs(scene_linkage.closure, joints, branch)
 
 
 def _crank_reader(scene_linkage: SceneLinkage) -> Callable[[bytes], CrankSample | Rejection]:
     """Return the reader of its inputs, as samples or published joints name them."""
-    if not scene_linkage.dependent_joint:
+    if not scene_linkage.instead_of_inputs:
         return input_reader(scene_linkage.input_names)
-    return DependentSampleReader(_branch_of(scene_linkage), scene_linkage.sampled_joints[0]).read
+    exchange = _exchange_of(scene_linkage)
+    return DependentSampleReader(exchange, scene_linkage.sampled_joints).read
 
 
 def _crank_writer(scene_linkage: SceneLinkage) -> Callable[[int, Floats, Floats], bytes]:
-    """Return the writer of samples as its drive takes them: of inputs, or of a dependent joint."""
+    """Return the writer of samples as its drive takes them: of inputs, or of other joints."""
     write = JointStateWriter(scene_linkage.sampled_joints).write
-    if not scene_linkage.dependent_joint:
+    if not scene_linkage.instead_of_inputs:
         return write
-    branch = _branch_of(scene_linkage)
+    exchange = _exchange_of(scene_linkage)
 
-    def write_joint(stamp: int, cranks: Floats, rates: Floats) -> bytes:
-        value, rate = joint_of(branch, cranks[0], rates[0])
-        return write(stamp, (value,), (rate,))
+    def write_joints(stamp: int, cranks: Floats, rates: Floats) -> bytes:
+        return write(stamp, *exchange.joints_at(cranks, rates))
 
-    return write_joint
+    return write_joints
 
 
 def _choices_text(names: Sequence[str] | Mapping[str, Any]) -> str:

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, list_names
-from linkage_ros.kinematics import Status
+from linkage_ros.kinematics import Input, RevoluteJoint, SlideJoint, Status
 from linkage_ros.messages import (
     JOINT_STATE_TYPE,
     JointStateWriter,
@@ -90,11 +90,10 @@ class _Sender:
         self._fields = _INPUT_FIELDS[drive]
         self._count = len(scene_linkage.sampled_joints)
         self._write = JointStateWriter(scene_linkage.sampled_joints).write
-        parts = (
-            [scene_linkage.closure.measuring(dependent).linkage.joints[dependent]]
-            if (dependent := scene_linkage.dependent_joint)
-            else (scene_linkage.linkage.inputs)
-        )
+        parts: Sequence[Input | RevoluteJoint | SlideJoint] = scene_linkage.linkage.inputs
+        if others := scene_linkage.instead_of_inputs:
+            joints = scene_linkage.closure.measuring(*others).linkage.joints
+            parts = [joints[joint] for joint in others]
         inputs = [given.joint for given in scene_linkage.linkage.inputs]
         self.variables = []
         for field in self._fields:

@@ -226,7 +226,7 @@ class Language(ABC):
                 'input',
                 f'{len(grid.home)} inputs move links that close only together, and within their '
                 'limits are too many cells',
-                'give these inputs limits, or narrower ones',
+                'give the inputs of the file limits, or narrower ones',
             )
         return sorted(cells.items())
 

@@ -23,7 +23,7 @@ from linkage_ros.description import Scene
 from linkage_ros.errors import BagError
 from linkage_ros.messages import Rejection
 from linkage_ros.replay import read_change, turn_fault
-from linkage_ros.stages.drives import crank_of, sampled_branch
+from linkage_ros.stages.drives import ExchangedInputs
 from linkage_ros.tick import LinkagePipeline, Pipeline
 from linkage_ros.tools.view.report.blocks import MessageRows
 from linkage_ros.tools.view.report.decimation import Flags, Numbers, Times
@@ -44,9 +44,9 @@ class CrankHistory:
         self._columns = list(columns)
         of = linkage.scene_linkage.drive[1]
         self._carried = bool(of.carry_forward)
-        self._branch = None
+        self._exchange = None
         if of.joint:
-            self._branch = sampled_branch(linkage.closure, of.joint, of.branch)
+            self._exchange = ExchangedInputs(linkage.closure, of.joint, of.branch)
         width = len(columns)
         self._number = np.array([-1])
         self._stamp = np.zeros(1, np.int64)
@@ -60,10 +60,11 @@ class CrankHistory:
         """
         angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
         own: Flags = good & ~np.isnan(angles).any(axis=1)
-        if self._branch is not None:
-            pairs = zip(angles[own, 0].tolist(), rates[own, 0].tolist(), strict=True)
-            cranks = [crank_of(self._branch, *pair) for pair in pairs]
-            angles[own, 0], rates[own, 0] = np.array(cranks).reshape(-1, 2).T
+        if self._exchange is not None:
+            pairs = zip(angles[own].tolist(), rates[own].tolist(), strict=True)
+            for row, (values, of) in zip(np.flatnonzero(own).tolist(), pairs, strict=True):
+                motion = self._exchange.motion_at(self._exchange.inverse.position(*values), of)
+                angles[row], rates[row] = motion.inputs, motion.rates
         # The last sample of the block before precedes the first message of this one.
         self._number = np.concatenate([[-1], numbers[own]])
         self._stamp = np.concatenate([self._stamp[-1:], stamps[own]])
