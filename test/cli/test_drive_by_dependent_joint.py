@@ -123,9 +123,44 @@ def test_samples_may_name_a_coordinate_a_distance_or_an_angle(joint: str) -> Non
 
 
 @pytest.mark.parametrize(
+    ('name', 'joints', 'start'),
+    [
+        ('five_bar', ('O1-P', 'O2-P'), (1.1, 1.2)),
+        ('five_bar', ('left_forearm.angle', 'P.x'), (1.07, 1.09)),
+        ('ankle', ('m1', 'c2.z'), (0.1, -0.05)),
+        ('ankle_motors', ('pitch', 'roll'), (0.2, -0.1)),
+        ('delta', ('a1', 'c2.y', 'z'), (0.1, 0.2, 0.3)),
+        ('rssr', ('rocker_joint',), (6.1,)),
+        ('wishbone', ('wheel.z', 'rack'), (0.02, 0.01)),
+    ],
+)
+def test_samples_name_as_many_joints_as_inputs_in_plane_and_space(
+    name: str, joints: tuple[str, ...], start: tuple[float, ...]
+) -> None:
+    """The inputs, and their rates, are those of the linkage that has these joints."""
+    closure = load(name).measuring(*joints)
+    position = closure.position(*start)
+    rates = closure.velocity(position, *([0.3] * len(start)))
+    drive = f'drive={{topic: {{joint: [{", ".join(joints)}]}}}}'
+    pipeline = Pipeline(load_scene(name, settings=[drive, 'effects.velocity={}', 'rate=0']))
+    write = JointStateWriter(joints).write
+    values, speeds = ([found[joint] for joint in joints] for found in (position, rates))
+    assert pipeline.offer(write(SECOND, values, speeds), SECOND) is None
+    crank = pipeline.tick(SECOND).states[0].crank
+    assert crank.angles == pytest.approx(start, abs=1e-11)
+    assert crank.rates == pytest.approx([0.3] * len(start), abs=1e-9)
+    if lengths := [index for index, joint in enumerate(joints) if '.' in joint or '-' in joint]:
+        far = [value + 50.0 * (index == lengths[-1]) for index, value in enumerate(values)]
+        assert pipeline.offer(write(SECOND, far, speeds), SECOND) is Rejection.NO_CRANK
+    alone = JointStateWriter(joints[:1]).write(SECOND, values[:1], speeds[:1])
+    assert pipeline.offer(alone, SECOND) is (Rejection.MISSING if len(joints) > 1 else None)
+
+
+@pytest.mark.parametrize(
     ('drive', 'line'),
     [
         ('{joint: rockr_joint}', "did you mean 'rocker_joint'?"),
+        ('{joint: [rocker_joint, P.x]}', 'drive.topic.joint: rocker_joint, P.x: 2 for 1 input'),
         ('{joint: rocker_joint}', 'drive.topic.joint: rocker_joint: several cranks reach a value'),
         (
             '{joint: rocker_joint, branch: 4}',

@@ -8,6 +8,7 @@
 
 """Any joint of a linkage with one input is the input: the crank, its rates, and all branches."""
 
+from cmath import rect
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -35,6 +36,7 @@ from linkage_ros.kinematics import (
     InputRange,
     is_iterated,
     Linkage,
+    RevoluteJoint,
     SlideJoint,
     Slider,
     Status,
@@ -414,9 +416,74 @@ def test_exchanged_input_has_the_crank_of_its_branch_with_its_whole_turns(name):
             assert abs(off) <= limit * U * allowed, (joint, share)
 
 
-def test_joint_whose_own_plan_cannot_pass_a_change_point_is_refused():
-    with pytest.raises(DefinitionError, match='rod_joint: as the input passes a change point'):
-        load('parallelogram').driven_by('rod_joint')
+def test_rod_of_a_parallelogram_leads_it_through_its_change_points():
+    """The rod keeps its direction: crank and follower turn against it, and together."""
+    inverse = load('parallelogram').driven_by('rod_joint')
+    for rod in (0.0, -pi, *(0.37 * k for k in range(-20, 21))):
+        position = inverse.position(rod)
+        velocity = inverse.velocity(position, 0.7)
+        acceleration = inverse.acceleration(position, velocity, -0.2)
+        assert position['crank_joint'] == pytest.approx(-rod, abs=1e-14)
+        assert remainder(position['follower_joint'] + rod, tau) == pytest.approx(0.0, abs=1e-14)
+        assert velocity.joints == pytest.approx((-0.7, -0.7), abs=1e-14)
+        assert acceleration.joints == pytest.approx((0.2, 0.2), abs=1e-14)
+
+
+@pytest.mark.parametrize('turned', [('coupler', 'crank'), ('crank', 'coupler')])
+def test_four_bars_are_driven_by_the_angle_of_their_coupler_on_their_crank(turned):
+    """By the loop itself: a·e^{iθ} + b·e^{i(θ ± x)} = d + c·e^{iψ}, with its derivatives."""
+    child, parent = turned
+    way = 1.0 if child == 'coupler' else -1.0
+    rng, cases = random.Random(child), 0
+    for _ in range(STATES):
+        a, b, c, d = (rng.uniform(0.3, 1.0) for _ in range(4))
+        links = {
+            'ground': {'O2': (0.0, 0.0), 'O4': (d, 0.0)},
+            'crank': {'O2': (0.0, 0.0), 'A': (a, 0.0)},
+            'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
+            'rocker': {'O4': (0.0, 0.0), 'B': (c, 0.0)},
+        }
+        closure = Closure(
+            Linkage(
+                links=links,
+                inputs=(Input('x', parent, child),),
+                assembly={'B': rng.choice(['left', 'right'])},
+                joints={
+                    'crank': RevoluteJoint('ground', 'crank'),
+                    'rocker': RevoluteJoint('ground', 'rocker'),
+                },
+                sliders={},
+            )
+        )
+        x = rng.uniform(-pi, pi)
+        position = closure.position(x)
+        diagonal = abs(a + b * rect(1.0, x))
+        assert position.status is (Status.CLOSED if abs(c - d) < diagonal < c + d else Status.OPEN)
+        if not position.joints:
+            continue
+        velocity = closure.velocity(position, 0.7)
+        acceleration = closure.acceleration(position, velocity, -0.3)
+        arms = [
+            (a, position['crank'], velocity['crank'], acceleration['crank']),
+            (
+                b,
+                position['crank'] + way * x,
+                velocity['crank'] + way * 0.7,
+                acceleration['crank'] - way * 0.3,
+            ),
+            (-c, position['rocker'], velocity['rocker'], acceleration['rocker']),
+        ]
+        scale = 1.0 + sum(rate * rate + abs(change) for _, _, rate, change in arms)
+        unit = [(size * rect(1.0, angle), rate, change) for size, angle, rate, change in arms]
+        assert abs(sum(arm for arm, _, _ in unit) - d) < 1e-15 * scale
+        assert abs(sum(arm * rate for arm, rate, _ in unit)) < 1e-14 * scale
+        bend = sum(arm * (1j * change - rate * rate) for arm, rate, change in unit)
+        assert abs(bend) < 1e-13 * scale
+        # B lies on the side of O2→O4 that the assembly names.
+        side = closure.points(position)['rocker', 'B'].imag
+        assert (side > 0.0) == (closure.linkage.assembly['B'] == 'left')
+        cases += 1
+    assert cases > STATES // 3
 
 
 def test_follower_is_an_input_and_what_it_followed_follows_it():

@@ -61,13 +61,10 @@ def test_input_has_its_value_wherever_the_crank_goes_on_its_branch(name, wanted)
     """The crank that a value asks for brings the linkage's own points there."""
     closure = load(name)
     rng = random.Random(f'{name} {wanted}')
-    if name == 'rssr':
-        cases = [(closure.driven_by(wanted), [rng.uniform(-0.2, 0.2) for _ in range(STATES)])]
-    else:
-        cases = []
-        for branch in closure.branches(wanted)[:2]:
-            cranks = [branch.state_at(rng.uniform(0.15, 0.85))[1] for _ in range(STATES)]
-            cases.append((closure.driven_by(wanted, branch=branch.number), cranks))
+    cases = []
+    for branch in closure.branches(wanted)[:2]:
+        cranks = [branch.state_at(rng.uniform(0.15, 0.85))[1] for _ in range(STATES)]
+        cases.append((closure.driven_by(wanted, branch=branch.number), cranks))
     for driven, cranks in cases:
         for crank in cranks:
             value = value_of(closure, closure.position(crank), wanted)
@@ -143,6 +140,8 @@ def test_several_inputs_are_there_and_back(name, wanted):
         ('gripper', 'left_knuckle_joint', 'left_knuckle_joint: is an input'),
         ('rssr', 'A-B', 'A-B: both points are on rod'),
         ('rssr', 'O.x', 'O.x: is no joint, and describes no point or distance'),
+        ('rssr', 'rocker.angle', 'has no one angle; name a hinge, as rocker_joint'),
+        ('five_bar', 'P.x A.x O1-P', '3 for 2 inputs; name 2 different joints'),
         ('ankle_motors', 'b1.z m1', 'm2 stays free; name a joint that moves with m2'),
     ],
 )

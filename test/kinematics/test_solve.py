@@ -465,6 +465,11 @@ def test_no_state_at_all_is_solved_too(name):
     assert all(array.shape == (joints, 0) for array in batch[1:])
 
 
+def test_single_state_without_a_cell_is_solved_as_any_other():
+    batch = load('ankle_motors').solve(np.array([[3.5, -0.5]]), rates=[1.0, 0.0], derivatives=1)
+    assert batch.status.tolist() == [CODES[load('ankle_motors').position(3.5, -0.5).status]]
+
+
 def test_rates_are_numbers_or_arrays_and_1_if_not_given():
     closure, _ = case_of('four_bar')
     phi = np.linspace(0.0, 6.0, 40)

@@ -23,6 +23,40 @@ from .test_programs import program
 KEYS = ('drive={topic: {joint: rocker_joint, branch: 1}}',)
 
 
+@pytest.mark.parametrize(
+    ('name', 'joints', 'start'),
+    [
+        ('five_bar', ('P.x', 'P.y'), (1.1, 1.2)),
+        ('ankle_motors', ('pitch', 'roll'), (0.2, -0.1)),
+        ('delta', ('x', 'y', 'z'), (0.1, 0.2, 0.3)),
+        ('rssr', ('B.x',), (6.1,)),
+        ('gripper', ('left_pad-right_pad',), (0.4,)),
+    ],
+)
+def test_commands_of_joints_in_plane_and_space_become_those_of_all_inputs(name, joints, start):
+    settings = (f'drive={{topic: {{joint: [{", ".join(joints)}]}}}}',)
+    relay = CommandRelay(load_scene(name, settings=settings))
+    closure = load(name).measuring(*joints)
+    position = closure.position(*start)
+    velocity = closure.velocity(position, *([0.3] * len(start)))
+    acceleration = closure.acceleration(position, velocity, *([-0.2] * len(start)))
+    rows = [[found[joint] for joint in joints] for found in (position, velocity, acceleration)]
+    one = JointTrajectoryPoint(positions=rows[0], velocities=rows[1], accelerations=rows[2])
+    found = relay.turn_trajectory(JointTrajectory(joint_names=joints, points=[one]))
+    assert tuple(found.joint_names) == closure.input_names
+    (turned,) = found.points
+    assert [*turned.positions] == pytest.approx(start, abs=1e-11)
+    assert [*turned.velocities] == pytest.approx([0.3] * len(start), abs=1e-9)
+    assert [*turned.accelerations] == pytest.approx([-0.2] * len(start), abs=1e-8)
+    with pytest.raises(RefusedError, match='is not reached: '):
+        relay.turn_state(JointState(name=joints, position=[9.0] * len(joints)))
+    if len(joints) > 1:
+        with pytest.raises(
+            RefusedError, match=f'names {joints[0]} without .*{joints[-1]}; send all'
+        ):
+            relay.turn_state(JointState(name=joints[:1], position=rows[0][:1]))
+
+
 @pytest.fixture(scope='module')
 def relay():
     return CommandRelay(load_scene('four_bar', settings=KEYS))

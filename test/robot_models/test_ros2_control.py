@@ -52,6 +52,10 @@ CASES = {
     'ankle': Case('ankle_motors', (), (0.0, 0.0), 0.4),
     'delta': Case('delta', ('x', 'y', 'z'), (0.0, 0.0, 0.0), 0.2),
     'RSSR': Case('rssr', ('rocker_joint',), (-1.2,), 0.8),
+    'opening': Case('gripper', ('left_pad-right_pad',), (0.35,), 0.3),
+    'height': Case('rssr', ('B.z',), (1.2,), 0.3, ('--branch', '1')),
+    'one crank stays': Case('five_bar', ('left_crank_joint', 'O1-P'), (1.05, 1.05), 0.2),
+    'two heights': Case('ankle_motors', ('c1.z', 'c2.z'), (0.0, 0.0), 0.3),
 }
 
 

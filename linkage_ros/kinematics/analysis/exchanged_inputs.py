@@ -20,12 +20,12 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
-from math import inf, isfinite, remainder, sin, tau
+from itertools import product
+from math import inf, remainder, sin, tau
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, usual_inputs
+from linkage_ros.kinematics.analysis.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.plane.checks import check_linkage
 from linkage_ros.kinematics.plane.linkage import (
     AssemblyPose,
@@ -38,6 +38,7 @@ from linkage_ros.kinematics.plane.linkage import (
     Slider,
     turn_ratios,
 )
+from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.analysis.crank_branches import CrankBranch
@@ -53,8 +54,8 @@ _TRIED = (0.02, 0.11, 0.23, 0.37, 0.5, 0.63, 0.77, 0.89, 0.98)
 _STILL, DEPENDENT = 1e-9, 1e-9
 """The slope of a joint that does not move, and the least of slopes of joints that do, together."""
 
-_ACROSS, _MARGIN = 8, 0.05
-"""States along each former input over which limits of new ones are sought; what they are wider."""
+_STEP, _MOST_MET = 0.1, 1000
+"""Steps of a lattice of inputs, in [rad] or of the linkage's size; and most of its states."""
 
 Built = TypeVar('Built', bound='LoopClosure')
 
@@ -102,7 +103,7 @@ def _exchange_at(closure: Built, names: Sequence[str], at: Sequence[float]) -> B
     plan = closure.plan_exchange(names, near)
     try:
         found: Built = plan(position, {}, {})
-        if found.grids and (limits := _reached_limits(closure, names)):
+        if found.grids and (limits := _reached_limits(closure, names, at)):
             found = plan(position, {}, limits)
     except DefinitionError as error:
         reason = f'do not move all of it: {error.where}: {error.reason}'
@@ -200,29 +201,46 @@ def turn_to_pose(closure: LoopClosure, values: Sequence[float]) -> tuple[float, 
     )
 
 
-def _reached_limits(closure: LoopClosure, names: Sequence[str]) -> dict[str, Limits]:
+def _reached_limits(
+    closure: LoopClosure, names: Sequence[str], at: Sequence[float]
+) -> dict[str, Limits]:
     """
-    Return limits of joints that have none: what the limits of the inputs let them reach.
+    Return limits of joints that have none: what those of the linkage let them reach from a state.
 
-    None are returned if an input has no limits. They need not be exact: the limits of the former
-    inputs hold too. Between them the cells of links are made that close only together.
+    They are sought on a lattice, from neighbour to neighbour, and include the first states beyond.
+    None are returned if they are too many. They need not be exact, since the limits of the linkage
+    hold too: between them the cells of links are made that close only together.
     """
-    limits = [given.limits for given in closure.linkage.inputs]
-    if not all(map(isfinite, chain.from_iterable((one.low, one.high) for one in limits))):
-        return {}
-    reached: dict[str, list[float]] = {name: [] for name in names}
-    for inputs in inputs_on_grid(closure, _ACROSS):
-        position = closure.close_unlimited(*inputs)
+    own = closure.linkage.limits
+    rows = {
+        name: closure.joint_names.index(name)
+        for name in names
+        if not own.get(name, NO_LIMITS).is_bounded
+    }
+    steps = [_STEP * (closure.scale if given.slider else 1.0) for given in closure.linkage.inputs]
+    waiting = [(0,) * len(steps)]
+    met, reached = {*waiting}, []
+    while waiting:
+        place = waiting.pop()
+        position = closure.position(
+            *(x + k * by for x, k, by in zip(at, place, steps, strict=True))
+        )
         if position.joints:
-            values = _values_at(closure, position, {})
-            for name in names:
-                reached[name].append(values[name])
-    own, found = closure.linkage.limits, {}
-    for name, reach in reached.items():
-        if reach and not own.get(name, NO_LIMITS).is_bounded:
-            low, high = min(reach), max(reach)
-            wider = _MARGIN * (high - low)
-            found[name] = replace(own.get(name, NO_LIMITS), low=low - wider, high=high + wider)
+            reached.append(position.joints)
+        if not position.joints or position.status is Status.LIMITED:
+            continue
+        for k, way in product(range(len(steps)), (-1, 1)):
+            beside = (*place[:k], place[k] + way, *place[k + 1 :])
+            if beside not in met:
+                met.add(beside)
+                waiting.append(beside)
+        if len(met) > _MOST_MET:
+            return {}
+    found = {}
+    for name, row in rows.items():
+        values = [joints[row] for joints in reached]
+        limits = own.get(name, NO_LIMITS)
+        found[name] = replace(limits, low=min(values), high=max(values))
     return found
 
 

@@ -283,6 +283,13 @@ def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelect
     """
     paths = Compiled(closure, derivatives, wanted, within_limits=False).paths
     if not paths:
+        pose = closure.linkage.pose
+        if pose is not None and closure.close_unlimited(*pose.inputs).status is Status.CLOSED:
+            raise DefinitionError(
+                'pose',
+                'is too near a singularity of links that close only together to be compiled',
+                'draw another pose, or name other inputs',
+            )
         raise DefinitionError(
             'pose',
             'no state is found at which the linkage is closed',

@@ -30,6 +30,7 @@ from linkage_ros.kinematics.plane.dyads.rrr import (
     DrivenRRRDyad,
     DyadSide,
     FoldingRRRDyad,
+    InvertedRRRDyad,
     RRRDyad,
 )
 from linkage_ros.kinematics.plane.dyads.two_sided import TwoSided
@@ -362,6 +363,8 @@ class SolutionPlan(SolvedLinks):
         self.attach_to_pin(link, first)
 
     def _add_driven_rrr(self, dyad: Dyad) -> None:
+        if self._add_inverted_rrr(dyad):
+            return
         closing = dyad.inner.name
         first, second = dyad.outer
         sides = [
@@ -378,6 +381,45 @@ class SolutionPlan(SolvedLinks):
         for i, outer in enumerate(dyad.outer):
             self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
             self.attach_to_pin(outer.link, outer)
+
+    def _add_inverted_rrr(self, dyad: Dyad) -> bool:
+        """Add a dyad whose outer pins lie on one link, and one of whose sides an input bends."""
+        ends = [*zip(dyad.outer, (dyad.inner.link, dyad.inner.to), (1, -1), strict=True)]
+        bent = [one for one in ends if one[0].link != one[1]]
+        if len(bent) != 1 or dyad.outer[0].to != dyad.outer[1].to:
+            return False
+        ((first, end, order),) = bent
+        ((second, other, _),) = (one for one in ends if one[0].link == one[1])
+        transform, *more = self._link_transforms(end, first.link)
+        if more or transform.turn < 0:
+            return False
+        closing = dyad.inner.name
+        # From P to A and to B, from B to D, and from A to D on the link that carries both.
+        to_first = self.points[first.link][first.name] - transform.origin
+        to_closing = self.points[end][closing] - transform.inner
+        to_second = self.pin_vector(other, closing, second.name)
+        between = self.pin_vector(first.to, first.name, second.name)
+        a, b, c, d = map(abs, (to_closing, to_second, between, to_first))
+        if not (a and d):
+            return False
+        if self._drawn_in_space:
+            a, b, c, d = four_bar_lengths(a, b, c, d)
+        offset = transform.sign * phase(to_closing * to_first.conjugate())
+        crosses = self._change_points(dyad, (a, b, c, d))
+        diagonal = crank_diagonal(a, b, c, d, (transform.turn, 0), offset, True, crosses)
+        kind: type[RRRDyad] = FoldingRRRDyad if FoldingRRRDyad.passes_fold(diagonal) else RRRDyad
+        base = self.angles[first.to].vector_angle(between)
+        flip = order * int(transform.sign)
+        step = InvertedRRRDyad(
+            kind(diagonal, b, c, 1), base.coordinate, transform.turn, transform.sign, flip
+        )
+        self._add_two_sided(dyad, step)
+        k = self.new_coordinates(2)
+        self.angles[first.link] = _link_angle(k, base, to_first)
+        self.angles[other] = _link_angle(k + 1, base, to_second)
+        self.attach_to_pin(first.link, first)
+        self.attach_to_pin(other, second)
+        return True
 
     def _add_geared(self, group: GearedLinks) -> None:
         waiting = list(self._structure.joints_of(group))

@@ -44,6 +44,14 @@ def with_measured(linkage: SpaceLinkage, names: Sequence[str]) -> SpaceLinkage:
             linkage = _with_coordinate(linkage, name, of, axis)
         elif pair is not None:
             linkage = _with_distance(linkage, name, pair)
+        elif axis == 'angle' and of in linkage.link_names:
+            own = [
+                one for one, joint in linkage.hinges.items() if of in (joint.parent, joint.child)
+            ]
+            raise DefinitionError(
+                name, 'a link in space turns about more than one axis, and has no one angle',
+                f'name a hinge, as {list_names(own or linkage.hinges)}',
+            )  # fmt: skip
         else:
             remedy = f'name one of {list_names(known)}, or P.x, A-B'
             raise DefinitionError(

@@ -521,3 +521,91 @@ class DrivenRRRDyad(TwoSided):
             unit_vector(triangle.first - phase(one)),
             unit_vector(triangle.second - phase(other)),
         )
+
+
+class InvertedRRRPose(NamedTuple):
+    """The triangle in the frame of the driving link, and the coordinates that it closes from."""
+
+    status: Status
+    gap: float
+    triangle: RRRPose
+    within: LinkState
+
+
+class InvertedRRRDyad(TwoSided):
+    """
+    A four-bar whose input is the angle between its coupler and a crank: its kinematic inversion.
+
+    Both outer pins A and D are on one link, and A is on the first of two links that the input
+    turns against each other at P. In the frame of that first link the input is the angle of a
+    crank PB, and AD is the coupler: `RRRDyad` over a `CrankDiagonal` from B to A closes it, and
+    passes its change points. With the directions δ₁ of B→D and δ₂ of A→D there, measured from
+    P→A, and ψ of A→D on its own link, P→A has the direction ψ − δ₂, and B→D the direction
+    ψ + δ₁ − δ₂. If the input turns the other way, all is mirrored.
+
+    ``base`` is the coordinate of the link that carries A and D, ``given`` that of the input.
+    ``mirror`` is −1 if the input is the angle of the first link against the second; ``flip`` is
+    the sign of the triangle where this dyad has the sign +1.
+    """
+
+    __slots__ = ('_base', '_dyad', '_flip', '_given', '_mirror')
+
+    def __init__(self, dyad: RRRDyad, base: int, given: int, mirror: float, flip: int) -> None:
+        self._dyad = dyad
+        self._base, self._given = base, given
+        self._mirror, self._flip = mirror, flip
+        super().__init__(dyad.sign * flip)
+
+    def with_sign(self, sign: int) -> InvertedRRRDyad:
+        """Return the same dyad in the assembly of a sign."""
+        dyad: RRRDyad = self._dyad.with_sign(sign * self._flip)
+        return InvertedRRRDyad(dyad, self._base, self._given, self._mirror, self._flip)
+
+    def close(self, solved: LinkState) -> InvertedRRRPose:
+        """Append the directions of P→A and of B→D."""
+        within = LinkState(solved.coordinates[: self._given + 1], [])
+        pose = self._dyad.close(within)
+        if pose.status.has_pose:
+            self._append(solved.coordinates, within.coordinates)
+        return InvertedRRRPose(pose.status, pose.gap, pose, within)
+
+    def rates(
+        self, pose: InvertedRRRPose, _solved: LinkState, velocities: LinkState
+    ) -> tuple[DiagonalRate, LinkState]:
+        """Append the rates of both."""
+        within = LinkState(velocities.coordinates[: self._given + 1], [])
+        rate = self._dyad.rates(pose.triangle, pose.within, within)
+        self._append(velocities.coordinates, within.coordinates)
+        return rate, within
+
+    def accelerations(
+        self,
+        pose: InvertedRRRPose,
+        rates: tuple[DiagonalRate, LinkState],
+        _solved: LinkState,
+        _velocities: LinkState,
+        accelerations: LinkState,
+    ) -> None:
+        """Append the accelerations of both."""
+        rate, velocities = rates
+        within = LinkState(accelerations.coordinates[: self._given + 1], [])
+        self._dyad.accelerations(pose.triangle, rate, pose.within, velocities, within)
+        self._append(accelerations.coordinates, within.coordinates)
+
+    def _append(self, into: list[float], within: list[float]) -> None:
+        base, (first, second) = into[self._base], within[-2:]
+        into.append(base - self._mirror * second)
+        into.append(base + self._mirror * (first - second))
+
+    @property
+    def span(self) -> AnyDiagonal:
+        """Return its diagonal."""
+        return self._dyad.diagonal
+
+    def side_of(self, pose: InvertedRRRPose) -> float:
+        """Return a number with the sign of the assembly; 0 where it is singular."""
+        return self._flip * pose.triangle.cross
+
+    def transmission_angle(self, pose: InvertedRRRPose) -> float:
+        """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""
+        return acute_angle(pose.triangle.first - pose.triangle.diagonal.direction)

@@ -63,7 +63,8 @@ def write_package(
 
     """
     forward = Subject(closure, name, file, 0, tuple(joints), jacobian=True)
-    back = Subject(inverse, f'{name}_inverse', file, 0, closure.input_names)
+    inputs = closure.input_names  # An actuator that is commanded as a joint, too, stays an input.
+    back = Subject(inverse.measuring(*inputs), f'{name}_inverse', file, 0, inputs)
     words = {'PACKAGE': name, 'VERSION': __version__, 'FILE': comment_text(file)}
     files = {}
     for source, path in _COPIED.items():
