@@ -21,7 +21,7 @@ from cmath import rect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from math import inf, remainder, sin, tau
+from math import inf, sin, tau
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from linkage_ros.errors import DefinitionError
@@ -284,22 +284,19 @@ class PlaneExchange:
         points: dict[str, tuple[float, float]] = {}
         for link, on_link in linkage.links.items():
             if link in self._carriers:
-                parent, pin = self._carriers[link]
+                parent, pin, block = self._carriers[link]
                 arm = places[pin] - places[parent, next(iter(linkage.links[parent]))]
                 way = rect(1.0, angles[parent])
                 along = (arm * way.conjugate()).real * way
                 place = places[parent, next(iter(linkage.links[parent]))] + along
                 points[link] = (place.real, place.imag)
-                angles[link] = angles[parent]
+                angles[link] = angles[block] = angles[parent]
             for point in on_link:
                 if (link, point) in places:
                     place = places[link, point]
                     points[point] = (place.real, place.imag)
         drawn = AssemblyPose(
-            tuple(
-                _turn_within(values[given.joint], given, turns_known=given.joint in known)
-                for given in linkage.inputs
-            ),
+            tuple(_turn_within(values[given.joint], given) for given in linkage.inputs),
             points,
             {link: angle for link, angle in angles.items() if link in linkage.links},
         )
@@ -317,7 +314,7 @@ class PlaneExchange:
         child, and the angle of the parent.
         """
         linkage = self._linkage
-        self._carriers: dict[str, tuple[str, tuple[str, str]]] = {}
+        self._carriers: dict[str, tuple[str, tuple[str, str], str]] = {}
         inputs, links, sliders = [], dict(linkage.links), dict(linkage.sliders)
         for given in linkage.inputs:
             parent, child = (linkage.links.get(end, {}) for end in (given.parent, given.child))
@@ -329,7 +326,7 @@ class PlaneExchange:
                 along = Slider(carrier, given.parent, through, (1.0, 0.0), carrier)
                 sliders[carrier] = along
                 sliders[block] = Slider(pin, carrier, carrier, (0.0, 1.0), block)
-                self._carriers[carrier] = given.parent, (given.child, pin)
+                self._carriers[carrier] = given.parent, (given.child, pin), block
                 held = replace(given, parent=block)
             inputs.append(held)
         self._linkage = replace(linkage, inputs=tuple(inputs), links=links, sliders=sliders)
@@ -345,12 +342,11 @@ def _as_joint(given: Input, near: tuple[float, ...]) -> RevoluteJoint | SlideJoi
     return replace(joint, near=near)
 
 
-def _turn_within(value: float, given: Input, *, turns_known: bool) -> float:
-    """Return the value of a new input, with the whole turns that its limits allow, or none."""
+def _turn_within(value: float, given: Input) -> float:
+    """Return the value of a new input, with the whole turns that its limits allow."""
     low, high = given.limits.low, given.limits.high
-    if given.slider:
-        return min(max(value, low), high)
     if inf in (-low, high):
-        return value if turns_known else remainder(value, tau)
-    value -= tau * round((value - 0.5 * (low + high)) / tau)
+        return value
+    if not given.slider:
+        value -= tau * round((value - 0.5 * (low + high)) / tau)
     return min(max(value, low), high)
