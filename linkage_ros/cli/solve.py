@@ -183,7 +183,7 @@ def _exchanged_table(
     count = len(closure.input_names)
     if len(names) != count or len({*names}) != count:
         reason = f'{len(names)} for {count} inputs'
-        raise LinkageError('--joint', reason, f'name {count} different joints')
+        raise LinkageError(', '.join(names), reason, f'name {count} different joints')
     joints = closure.measuring(*names).linkage.joints
     values = {
         name: arguments.angles.to_si(typed, joints[name].unit) for name, typed in arguments.joint

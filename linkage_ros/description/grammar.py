@@ -147,6 +147,9 @@ class NameOrNames(ListOf):
         several = {**ListOf.json_schema(self), 'minItems': 1}
         return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
 
+    def values_text(self) -> str:
+        return 'a name, or several in a list'
+
 
 def name_or_names(meaning: str, of: str) -> Any:
     """Declare a name or several in a list, read as a tuple; none if absent."""

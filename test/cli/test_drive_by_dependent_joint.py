@@ -130,7 +130,7 @@ def test_samples_may_name_a_coordinate_a_distance_or_an_angle(joint: str) -> Non
         ('ankle', ('m1', 'c2.z'), (0.1, -0.05)),
         ('ankle_motors', ('pitch', 'roll'), (0.2, -0.1)),
         ('delta', ('a1', 'c2.y', 'z'), (0.1, 0.2, 0.3)),
-        ('rssr', ('rocker_joint',), (6.1,)),
+        ('rssr', ('rocker_joint',), (-0.2,)),
         ('wishbone', ('wheel.z', 'rack'), (0.02, 0.01)),
     ],
 )

@@ -29,7 +29,7 @@ KEYS = ('drive={topic: {joint: rocker_joint, branch: 1}}',)
         ('five_bar', ('P.x', 'P.y'), (1.1, 1.2)),
         ('ankle_motors', ('pitch', 'roll'), (0.2, -0.1)),
         ('delta', ('x', 'y', 'z'), (0.1, 0.2, 0.3)),
-        ('rssr', ('B.x',), (6.1,)),
+        ('rssr', ('B.x',), (-0.2,)),
         ('gripper', ('left_pad-right_pad',), (0.4,)),
     ],
 )

@@ -183,6 +183,8 @@ class SpaceClosure(StepwiseClosure):
                     if slides
                     else atan2(dot(axis, cross(across, turned)), dot(across, turned))
                 )
+            if not (slides or joint.limits.is_bounded):
+                value -= tau * round((value - joint.value) / tau)
             return replace(joint, at=at, axis=axis, value=value)
 
         return replace(
