@@ -21,6 +21,7 @@ from linkage_ros.messages import (
     JOINT_TRAJECTORY,
     JointStateWriter,
     JointTrajectoryWriter,
+    JointWrenchWriter,
     MalformedError,
     Marker,
     MARKER_ARRAY,
@@ -28,7 +29,6 @@ from linkage_ros.messages import (
     MULTI_DOF_JOINT_STATE,
     pack_message,
     parse_message,
-    PlanarWrenchWriter,
 )
 from linkage_ros.tools.view.report import DIAGNOSTIC_ARRAY
 import numpy as np
@@ -161,7 +161,7 @@ MESSAGES = {
     ),
     'sensor_msgs/msg/MultiDOFJointState': Message(
         wrenches(),
-        lambda names, *rest: PlanarWrenchWriter(names).write(*rest),
+        lambda names, *rest: JointWrenchWriter(names, planar=True).write(*rest),
         multi_dof_joint_state,
         [
             (['a'], NS, [(1.0, 2.0, 3.0)]),

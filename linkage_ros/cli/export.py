@@ -41,6 +41,7 @@ from linkage_ros.description import (
 from linkage_ros.errors import BagError, did_you_mean, escape_unprintable, LinkageError, list_names
 from linkage_ros.messages import (
     FORCE_X,
+    IN_SPACE,
     JOINT_STATE_TYPE,
     Key,
     MessageContent,
@@ -121,7 +122,8 @@ def survey_columns(
     bag is damaged, or that new joint names keep coming.
     """
     columns: dict[Key, None] = {}
-    known: set[tuple[Key, ...]] = set()
+    # For each layout of a message its numbers of a joint in space, which have a column if not 0.
+    known: dict[tuple[Key, ...], list[tuple[int, Key]]] = {}
     counts: Counter[str] = Counter()
     left_out: Counter[tuple[str, str]] = Counter()
     rows = 0
@@ -130,14 +132,18 @@ def survey_columns(
         for topic, values in tick.messages.items():
             counts[topic] += 1
             if values.keys not in known:
-                known.add(values.keys)
-                columns |= dict.fromkeys(values.keys)
+                keys = enumerate(values.keys)
+                known[values.keys] = [one for one in keys if one[1][1] in IN_SPACE]
+                columns |= dict.fromkeys(key for key in values.keys if key[1] not in IN_SPACE)
                 if max(len(columns), len(known)) > _MOST_COLUMNS:
                     raise BagError(
                         source.bag.path,
                         f'its joints take more than {_MOST_COLUMNS} columns',
                         'name one topic with --topic',
                     )
+            for index, key in known[values.keys]:
+                if values.numbers[index]:
+                    columns[key] = None
     return ExportResult(_sort_columns(columns, order), rows, counts, left_out)
 
 
@@ -160,7 +166,7 @@ def rows_of(
 ) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
     places = {key: 4 + index for index, key in enumerate(keys)}
-    placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
+    placed: dict[tuple[Key, ...], tuple[int | None, ...]] = {}
     blank: Row = [None] * len(keys)
     begin: int | None = None
     for published, logged, messages in _read_ticks(source, Counter(), report_progress):
@@ -171,10 +177,10 @@ def rows_of(
         for values in messages.values():
             columns = placed.get(values.keys)
             if columns is None:
-                columns = placed[values.keys] = tuple(places[key] for key in values.keys)
+                columns = placed[values.keys] = tuple(map(places.get, values.keys))
             # ~/motion repeats the joint state; it counts only where the joint state was dropped.
             for column, number in zip(columns, values.numbers, strict=True):
-                if row[column] is None:
+                if column is not None and row[column] is None:
                     row[column] = number
         yield row
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 import sys
 from threading import Event
 from typing import Any
@@ -83,7 +84,7 @@ EXAMPLE = 'linkage scene worn_press --set rate=500'
 
 def scene_tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     """Yield the tables of a scene that has been built."""
-    yield facts_table(title, _scene_facts(scene))
+    yield facts_table(title, chain(_scene_facts(scene), _force_facts(pipeline)))
     for lines in _group_alike(pipeline.linkages):
         names = _shorten_list(
             [line.scene_linkage.name for line in lines if line.scene_linkage.name]
@@ -109,6 +110,13 @@ def _scene_facts(scene: Scene) -> Iterator[tuple[str, str]]:
         f'{record.directory}/{record.name or f"{scene.name}, and the time"}' if record else 'no'
     )
     yield 'recorded', recorded
+
+
+def _force_facts(pipeline: Pipeline) -> Iterator[tuple[str, str]]:
+    """Yield what is not certain of the forces in joints."""
+    for line in pipeline.linkages:
+        if 'pin_forces' in line.wanted.effects and line.context.reactions.uncertain:
+            yield 'not certain', line.context.reactions.uncertain
 
 
 def _group_alike(linkages: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:

@@ -47,6 +47,7 @@ KINDS = {
     'input': 'driven joint',
     'any_joint': 'driven or published joint',
     'pin': 'pin or slider',
+    'bearing': 'pin, in space hinge or ball',
     'link': 'moving link',
     'body': 'link or the ground',
     'point': 'point: LINK.POINT',

@@ -248,8 +248,15 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
         'point': tuple(f'{link}.{point}' for link, points in carried for point in points),
     }
     if isinstance(linkage, SpaceLinkage):
+        carried_points = [point for _, points in carried for point in points]
+        balls = [point for point in linkage.points if carried_points.count(point) > 1]
         joints = {'pin': parts['any_joint'], 'slider': parts['slide']}
-        return {**parts, **joints, 'axis': ('x', 'y', 'z')}
+        return {
+            **parts,
+            **joints,
+            'bearing': (*linkage.pair_joints, *balls),
+            'axis': ('x', 'y', 'z'),
+        }
     points = [point for _, points in carried for point in points]
     # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
@@ -258,6 +265,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
         **parts,
         'axis': ('x', 'y'),
         'pin': (*pins, *linkage.sliders),
+        'bearing': (*pins, *linkage.sliders),
         'slider': tuple(linkage.sliders),
     }
 

@@ -116,6 +116,8 @@ def _read_linkage(content: Section, publish_inputs: bool) -> SpaceLinkage:
         traced=values.get('traced', ()),
     )
     weighed = values.get('masses', {})
+    if not {point for carried in links.values() for point in carried} <= {*points}:
+        return linkage  # Which cannot be closed: its points are checked first
     check_weighed(linkage.link_names, weighed)
     masses = {
         link: _mass_of(content, link, given, [points[name] for name in links.get(link, ())])

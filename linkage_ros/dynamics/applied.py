@@ -25,6 +25,7 @@ from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.bodies import PLANE, Vectors
+from linkage_ros.dynamics.joint_forms import Direction
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import (
     AppliedLoads,
@@ -56,14 +57,11 @@ _SAMPLES = 90
 class JointCoordinate(NamedTuple):
     """A joint, driven or published."""
 
+    name: str
     # Its number among the driven joints, or among the published ones.
     number: int
     driven: bool
     is_revolute: bool  # Whether it is an angle
-    slider: str  # The slider whose slide it is; '' for an angle
-    # The links whose angle it is; '' for a slide.
-    child: str
-    parent: str
     # Its rate is factor·(v[one] − v[other]) of the closure's coordinates.
     one: int
     other: int
@@ -89,13 +87,10 @@ def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
     for index, given in enumerate(linkage.inputs):
         if given.joint == name:
             unit = closure.scale if given.slider else 1.0
-            names = (given.slider, '', '') if given.slider else ('', given.child, given.parent)
-            return JointCoordinate(index, True, not given.slider, *names, 1 + index, 0, unit)
+            return JointCoordinate(name, index, True, not given.slider, 1 + index, 0, unit)
     joint, place = linkage.joints[name], list(linkage.joints).index(name)
-    term = closure.rate_term(place)
-    if isinstance(joint, RevoluteJoint):
-        return JointCoordinate(place, False, True, '', joint.child, joint.parent, *term)
-    return JointCoordinate(place, False, False, joint.slider, '', '', *term)
+    turns = isinstance(joint, RevoluteJoint)
+    return JointCoordinate(name, place, False, turns, *closure.rate_term(place))
 
 
 class LoadedPoint(NamedTuple):
@@ -111,6 +106,18 @@ class LoadedPoint(NamedTuple):
     def lever(self, _velocity: Velocity, position: Position, moved: Sequence[Any]) -> float:
         """Return the velocity of the point along the direction, in [m/s]."""
         return self.dot(moved[self.tracked_index], self.direction(position))
+
+
+class LinkTurn(NamedTuple):
+    """A link under a torque about an axis."""
+
+    link: str
+    rate: Callable[[Velocity, Position], float]  # About the axis, in [rad/s]
+    axis: Direction  # A unit vector in the frame of the ground
+
+    def lever(self, velocity: Velocity, position: Position, _moved: Sequence[Any]) -> float:
+        """Return the rate of the link about the axis, in [rad/s]."""
+        return self.rate(velocity, position)
 
 
 class LoadedParts(Protocol):
@@ -156,9 +163,8 @@ class PlanarParts:
         return [self.direction(link, axis, frame) for axis in (1 + 0j, 1j)]
 
     def turns(self, link: str, _frame: str) -> Sequence[Loaded]:
-        # A link turns as a joint between it and the ground.
-        names, coordinate = ('', link, GROUND), self._closure.angles[link].coordinate
-        return [JointCoordinate(0, False, True, *names, coordinate, 0, 1.0)]
+        coordinate = self._closure.angles[link].coordinate
+        return [LinkTurn(link, lambda velocity, _: velocity.state.coordinates[coordinate], 0)]
 
 
 def _parts_of(closure: Any, applied: AppliedLoads) -> LoadedParts:
@@ -494,6 +500,10 @@ class AppliedForces:
         for at, force in self.acting_loads(position, velocity, given):
             work += force * at.lever(virtual, position, moved)
         return work
+
+    def places(self, position: Position) -> list[Any]:
+        """Return the places of the loaded points, by `LoadedPoint.tracked_index`."""
+        return self._tracker.places(position) if self._tracker.indices else []
 
     def _point_velocities(self, position: Position, velocity: Velocity) -> list[Any]:
         """Return the velocities of the loaded points."""

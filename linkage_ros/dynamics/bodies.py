@@ -25,7 +25,14 @@ from operator import add, mul, sub
 from typing import Any, NamedTuple
 
 from linkage_ros.dynamics.loads import Loads
-from linkage_ros.kinematics import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics import (
+    Acceleration,
+    Closure,
+    cross_product,
+    make_vector,
+    Position,
+    Velocity,
+)
 
 
 class Vectors(NamedTuple):
@@ -41,6 +48,13 @@ class Vectors(NamedTuple):
     momentum: Callable[[Any, Any], Any]  # K·s of K and s
     moment: Callable[[Any, Any, Any], Any]  # Derivative of K·s, of K, s and ṡ
     turn_dot: Callable[[Any, Any], float]  # Product of a turn and a moment, or a momentum
+    cross: Callable[[Any, Any], Any]  # The moment of a force, of its lever and the force
+    carry: Callable[[Any, Any], Any]  # How a small turn moves the end of a lever
+    coordinates: Callable[[Any], tuple[float, ...]]  # Of a vector
+    turn_coordinates: Callable[[Any], tuple[float, ...]]  # Of a turn or a moment
+    turn_from: Callable[[Sequence[float]], Any]  # The turn or moment of some coordinates
+    # For each axis, the moment of a unit of force along it, of its lever; None of 0.
+    unit_moments: tuple[Callable[[Any], tuple[float | None, ...]], ...]
 
 
 def _dot(one: complex, other: complex) -> float:
@@ -49,7 +63,7 @@ def _dot(one: complex, other: complex) -> float:
 
 PLANE = Vectors(
     zero=0j,
-    from_numbers=lambda numbers: complex(*numbers),
+    from_numbers=lambda numbers: make_vector(*numbers),
     plus=add,
     minus=sub,
     scale=mul,
@@ -58,6 +72,12 @@ PLANE = Vectors(
     momentum=mul,
     moment=lambda gyration, _, change: gyration * change,
     turn_dot=mul,
+    cross=cross_product,
+    carry=lambda turn, lever: 1j * turn * lever,
+    coordinates=lambda vector: (vector.real, vector.imag),
+    turn_coordinates=lambda turn: (turn,),
+    turn_from=lambda numbers: numbers[0],
+    unit_moments=(lambda lever: (-lever.imag,), lambda lever: (lever.real,)),
 )
 """Operations in the plane: vectors are complex numbers, turns are numbers."""
 
@@ -83,6 +103,9 @@ class BodyModel(NamedTuple):
     springs: tuple[tuple[int, int], ...]  # Indices of the ends of each spring
     turn_rates: Callable[[Position, Velocity], list[Any]]
     turn_changes: Callable[[Position, Velocity, Acceleration], list[Any]]
+    links: tuple[str, ...]  # The link of each body
+    # Moments that work on the turns of the bodies, in the frame of the ground
+    moments_in_ground: Callable[[Position, list[Any]], list[Any]]
 
 
 def planar_bodies(closure: Closure, loads: Loads) -> BodyModel:
@@ -110,7 +133,10 @@ def planar_bodies(closure: Closure, loads: Loads) -> BodyModel:
         return [a[turn] for turn in turns]
 
     springs = tuple((next(at), next(at)) for _ in loads.springs)
-    return BodyModel(PLANE, tracker, bodies, springs, turn_rates, turn_changes)
+    return BodyModel(
+        PLANE, tracker, bodies, springs, turn_rates, turn_changes,
+        tuple(heavy), lambda _, moments: moments,
+    )  # fmt: skip
 
 
 def spring_length(

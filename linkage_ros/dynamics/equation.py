@@ -117,7 +117,8 @@ class FrictionJoint(NamedTuple):
     A joint with friction.
 
     Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
-    ``joint`` is its index among the joints of the structure. ``law`` is the law of the friction
+    ``joint`` is its index among the joints of the structure, in space among hinges, slides and
+    struts. ``law`` is the law of the friction
     that falls with the rate, if it has any.
     """
 
@@ -156,11 +157,14 @@ class Mechanics:
                 f'the linkage has {len(linkage.inputs)} inputs, and friction could hold either',
                 'leave it out',
             )
-        self._model = model = _bodies_of(closure, self.loads)
+        self.model = model = _bodies_of(closure, self.loads)
+        """The bodies, and the ends of the springs."""
         self._points, self._bodies = model.points, model.bodies
         gravity = self.loads.gravity
-        self._gravity = model.vectors.from_numbers(gravity) if any(gravity) else model.vectors.zero
-        self._springs = tuple(zip(self.loads.springs, model.springs, strict=True))
+        self.gravity = model.vectors.from_numbers(gravity) if any(gravity) else model.vectors.zero
+        """The acceleration of gravity, as a vector of the model."""
+        self.springs = tuple(zip(self.loads.springs, model.springs, strict=True))
+        """The springs, each with its ends among the points of the model."""
         self.friction_joints = tuple(self._find_friction_joints())
         """The joints that have friction."""
         self.applied = _make_applied(closure, self.loads)
@@ -188,12 +192,12 @@ class Mechanics:
             return None
         velocity = self.closure.velocity(position, 1.0)
         acceleration = self.closure.acceleration(position, velocity, 0.0)
-        points, vectors = self._points, self._model.vectors
+        points, vectors = self._points, self.model.vectors
         places = points.places(position)
         velocities = points.velocities(position, velocity, places)
         accelerations = points.accelerations(position, velocity, acceleration, places)
-        turns = self._model.turn_rates(position, velocity)
-        changes = self._model.turn_changes(position, velocity, acceleration)
+        turns = self.model.turn_rates(position, velocity)
+        changes = self.model.turn_changes(position, velocity, acceleration)
         v = velocity.state.coordinates
         inertia, half_slope, momentum = self.loads.drive_inertia, 0.0, vectors.zero
         for (mass, gyration, point), turn, change in zip(
@@ -205,10 +209,10 @@ class Mechanics:
             inertia += vectors.dot(moved, speed) + vectors.turn_dot(whirled, turn)
             half_slope += vectors.dot(moved, pull)
             half_slope += vectors.turn_dot(whirled, change)
-        slope = -vectors.dot(self._gravity, momentum)
+        slope = -vectors.dot(self.gravity, momentum)
         viscous = coulomb = 0.0
         slips: tuple[float, ...] = ()
-        for spring, ends in self._springs:
+        for spring, ends in self.springs:
             length, growth = spring_length(vectors, places, velocities, ends)
             slope += spring.stiffness * (length - spring.free_length) * growth
             viscous += spring.damping * growth * growth
@@ -284,18 +288,18 @@ class Mechanics:
         """
         if not position.status.has_rates:
             return None
-        closure, points, vectors = self.closure, self._points, self._model.vectors
+        closure, points, vectors = self.closure, self._points, self.model.vectors
         count = len(self._units)
         places = points.places(position)
         alone = [closure.velocity(position, *_unit_rates(count, i)) for i in range(count)]
         moved = [points.velocities(position, way, places) for way in alone]
-        turned = [self._model.turn_rates(position, way) for way in alone]
+        turned = [self.model.turn_rates(position, way) for way in alone]
         velocity = closure.velocity(position, *rates)
         still = closure.acceleration(position, velocity, *[0.0] * count)
         velocities = points.velocities(position, velocity, places)
         accelerations = points.accelerations(position, velocity, still, places)
-        turns = self._model.turn_rates(position, velocity)
-        changes = self._model.turn_changes(position, velocity, still)
+        turns = self.model.turn_rates(position, velocity)
+        changes = self.model.turn_changes(position, velocity, still)
         forces = self._inertia_forces(accelerations, turns, changes)
         v = velocity.state.coordinates
         matrix: tuple[float, ...] = ()
@@ -314,7 +318,7 @@ class Mechanics:
             for body, (force, moment), turn in zip(self._bodies, forces, turned[i], strict=True):
                 needed += vectors.dot(force, moved[i][body.point])
                 needed += vectors.turn_dot(moment, turn)
-            for spring, ends in self._springs:
+            for spring, ends in self.springs:
                 pull = spring.tension(*spring_length(vectors, places, velocities, ends))
                 needed += pull * spring_length(vectors, places, moved[i], ends)[1]
             w = way.state.coordinates
@@ -372,10 +376,10 @@ class Mechanics:
         self, accelerations: list[Any], turns: list[Any], changes: list[Any]
     ) -> list[tuple[Any, Any]]:
         """Return the force and the moment that each body needs, against its weight too."""
-        vectors = self._model.vectors
+        vectors = self.model.vectors
         return [
             (
-                vectors.scale(mass, vectors.minus(accelerations[point], self._gravity)),
+                vectors.scale(mass, vectors.minus(accelerations[point], self.gravity)),
                 vectors.moment(gyration, turn, change),
             )
             for (mass, gyration, point), turn, change in zip(
@@ -400,12 +404,12 @@ class Mechanics:
 
     def potential_energy(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
-        vectors, places = self._model.vectors, self._points.places(position)
+        vectors, places = self.model.vectors, self._points.places(position)
         moment = vectors.zero
         for mass, _, point in self._bodies:
             moment = vectors.plus(moment, vectors.scale(mass, places[point]))
-        energy = -vectors.dot(self._gravity, moment)
-        for spring, (start, end) in self._springs:
+        energy = -vectors.dot(self.gravity, moment)
+        for spring, (start, end) in self.springs:
             length = vectors.length(vectors.minus(places[end], places[start]))
             stretch = length - spring.free_length
             energy += 0.5 * spring.stiffness * stretch * stretch
@@ -413,9 +417,9 @@ class Mechanics:
 
     def kinetic_energy(self, position: Position, velocity: Velocity) -> float:
         """Return the kinetic energy, with the drive's inertia, in [J]."""
-        vectors, places = self._model.vectors, self._points.places(position)
+        vectors, places = self.model.vectors, self._points.places(position)
         velocities = self._points.velocities(position, velocity, places)
-        turns = self._model.turn_rates(position, velocity)
+        turns = self.model.turn_rates(position, velocity)
         v, twice = velocity.state.coordinates, 0.0
         for (mass, gyration, point), turn in zip(self._bodies, turns, strict=True):
             speed = velocities[point]
@@ -448,16 +452,16 @@ class Mechanics:
         input forward; Coulomb friction is 0 in a joint at rest. The position is closed and not a
         toggle. ``given`` is as in `linkage_ros.dynamics.applied.AppliedForces.given_after`.
         """
-        points, vectors, count = self._points, self._model.vectors, len(self._units)
+        points, vectors, count = self._points, self.model.vectors, len(self._units)
         places = points.places(position)
         velocities = points.velocities(position, velocity, places)
         accelerations = points.accelerations(position, velocity, acceleration, places)
-        turns = self._model.turn_rates(position, velocity)
-        changes = self._model.turn_changes(position, velocity, acceleration)
+        turns = self.model.turn_rates(position, velocity)
+        changes = self.model.turn_changes(position, velocity, acceleration)
         v, a = velocity.state.coordinates, acceleration.state.coordinates
         pulls = [
             spring.tension(*spring_length(vectors, places, velocities, ends))
-            for spring, ends in self._springs
+            for spring, ends in self.springs
         ]
         drags = [joint_friction(rubbing, v) for rubbing in self.friction_joints]
         forces = self._inertia_forces(accelerations, turns, changes)
@@ -466,12 +470,12 @@ class Mechanics:
             virtual = self.closure.velocity(position, *_unit_rates(count, i))
             w = virtual.state.coordinates
             moved = points.velocities(position, virtual, places)
-            turned = self._model.turn_rates(position, virtual)
+            turned = self.model.turn_rates(position, virtual)
             effort = self.loads.drive_inertia * a[1 + i] * unit
             for body, (force, moment), way in zip(self._bodies, forces, turned, strict=True):
                 effort += vectors.dot(force, moved[body.point])
                 effort += vectors.turn_dot(moment, way)
-            for pull, (_, ends) in zip(pulls, self._springs, strict=True):
+            for pull, (_, ends) in zip(pulls, self.springs, strict=True):
                 effort += pull * spring_length(vectors, places, moved, ends)[1]
             for drag, rubbing in zip(drags, self.friction_joints, strict=True):
                 effort += drag * rubbing.slip_rate(w)
@@ -521,10 +525,11 @@ class Mechanics:
         closure: Any = self.closure
         joints = self.friction.joints
         if not isinstance(closure, Closure):
-            for index, (name, friction) in enumerate(joints.items()):
+            places = [*closure.linkage.pair_joints, *closure.linkage.struts]
+            for name, friction in joints.items():
                 slides = name not in closure.linkage.hinges
                 coordinate = closure.joint_coordinates[name]
-                yield index, friction, coordinate, 0, closure.scale if slides else 1.0
+                yield places.index(name), friction, coordinate, 0, closure.scale if slides else 1.0
             return
         for index, joint in enumerate(closure.structure.joints if joints else ()):
             if joint.name not in joints:

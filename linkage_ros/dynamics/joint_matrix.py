@@ -15,87 +15,135 @@ the last bits of its solutions differ from machine to machine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from math import isfinite, sin
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics import Closure, cross_product, Elimination, GROUND, unit_vector
+from linkage_ros.dynamics.bodies import Vectors
+from linkage_ros.dynamics.joint_forms import Action, JointForms
+from linkage_ros.kinematics import Elimination, GROUND, Position
 from linkage_ros.kinematics.compiling import compile_line
 
+Column = Sequence[tuple[Action, float]]
+"""What an unknown of 1 does: actions, each with a factor."""
 
-class PinSide(NamedTuple):
-    """A link of a joint: its first row, the index of its pivot among the places, its sign."""
+
+class Side(NamedTuple):
+    """A link of an action: its first row, the index of its pivot among the places, its sign."""
 
     row: int
     pivot: int
     sign: float
 
 
-class ForceLine(NamedTuple):
-    """
-    The line of a slider.
-
-    ``unit``, turned by a coordinate of the closure, is its direction in the frame of the ground.
-    """
-
-    coordinate: int
-    unit: complex
-
-    def direction(self, coordinates: Sequence[float]) -> complex:
-        """Return the direction in the frame of the ground, a unit vector."""
-        return unit_vector(coordinates[self.coordinate]) * self.unit
-
-
 class JointMatrix:
     """
-    The square matrix of what a unit of each joint's force and drive's effort does to each link.
+    The matrix of what a unit of each unknown does to each link.
 
-    Three rows for each link that moves: both components of force and the moment about its pivot.
-    Two columns for each joint: the components of force of a pin, or the force of a slider across
-    its line and its moment. One column for each drive. A force f at p is (f, (p − c) × f) on one
-    link and the opposite on the other. Moments are divided by the closure's scale, so that all
-    entries are of one size.
+    The unknowns are the forces and moments of each joint, the effort of each drive, the force
+    between the wheels of each ratio, and what holds the spin of rods. Each link that moves has a
+    row for each component of force, and of moment about its pivot: in the plane three, in space
+    six. A force f at p is (f, (p − c) × f) on one link and the opposite on the other. Moments are
+    divided by the closure's scale, so that all entries are of one size.
 
     The transposed matrix gives what small displacements of the links open in each joint, since a
     joint's force does no work: a row is the displacement between the points of the two links.
 
-    ``pivots`` has, for each link that moves, the index of the reference point of its moments
-    among the places given to `varying_at`; ``places`` has the index of the place of each joint of
-    the structure; of a slider, of its point.
+    ``places`` has for each joint the index of its place among those given to `varying_at`; the
+    pivot of a link is the place of its first joint: about a far point, moments lose digits.
     """
 
-    def __init__(self, closure: Closure, pivots: Mapping[str, int], places: Sequence[int]) -> None:
-        linkage, joints = closure.linkage, closure.structure.joints
+    def __init__(
+        self,
+        forms: JointForms,
+        vectors: Vectors,
+        places: Sequence[int],
+        scale: float,
+        columns: Sequence[Column],
+    ) -> None:
+        self._vectors, self._places, self._scale = vectors, places, scale
+        self.force_rows = len(vectors.coordinates(vectors.zero))
+        self.moment_rows = len(vectors.unit_moments[0](vectors.zero))
+        each = self.force_rows + self.moment_rows
         # For each link that moves its first row.
-        self.rows = {link: 3 * i for i, link in enumerate(pivots)}
-        self.size = 3 * len(pivots)
-        self._scale, self._pivots, self._places = closure.scale, pivots, places
-        # For each joint its links that move, ``joint.link`` with the sign +1 first.
-        self.sides = tuple(self._joint_sides(joint.link, joint.to) for joint in joints)
-        self.lines: dict[int, ForceLine] = {}  # For each slider, by the number of its joint
-        self._rows = [[0.0] * self.size for _ in range(self.size)]
+        self.rows = {link: each * i for i, link in enumerate(forms.links)}
+        self.size = each * len(self.rows)
+        # For each link the index of the place about which its moments are.
+        self.pivots: dict[str, int] = {}
+        for joint, place in zip(forms.joints, places, strict=True):
+            self.pivots = {joint.link: place, joint.to: place} | self.pivots
+        self.columns = columns
+        self.kept = tuple(range(len(columns)))
+        """The columns that are solved for; the unknowns of the others are 0."""
+        self._rows = [[0.0] * len(columns) for _ in range(self.size)]
         self._where: list[tuple[int, int]] = []  # Entries that vary, by row and column
-        # Of each unit force its joint, its direction, and whether the joint's line turns it.
-        self._forces: list[tuple[int, complex, bool]] = []
-        for number, joint in enumerate(joints):
-            if joint.kind == 'R':
-                self._add_force(2 * number, number, 1.0)
-                self._add_force(2 * number + 1, number, 1j)
-                continue
-            along = closure.angles[joint.to]
-            direction = complex(*linkage.sliders[joint.name].direction)
-            self.lines[number] = ForceLine(
-                along.coordinate, along.unit * direction / abs(direction)
+        self._varying: list[tuple[Action, list[tuple[Side, float]]]] = []
+        for number, column in enumerate(columns):
+            for action, factor in column:
+                sides = [(side, side.sign * factor) for side in self.sides(action)]
+                self._varying.append((action, sides))
+                for side, signed in sides:
+                    self._add_entries(number, action, side, signed)
+
+    def _add_entries(self, column: int, action: Action, side: Side, factor: float) -> None:
+        """Add the constant entries of an action on a link, and where the others are."""
+        moments = range(side.row, side.row + self.force_rows + self.moment_rows)[self.force_rows :]
+        way, force = action.direction, action.joint >= 0
+        first = side.row if force else moments.start
+        levers: Sequence[Any] = moments
+        if isinstance(way, int):
+            self._rows[first + way][column] += factor
+            lever = self._vectors.from_numbers([1.0] * self.force_rows)
+            parts = self._vectors.unit_moments[way](lever) if force else ()
+            levers = [row for row, part in zip(moments, parts, strict=False) if part is not None]
+        else:
+            last = first + (self.force_rows if force else len(moments))
+            self._where += [(row, column) for row in range(first, last)]
+        if force and self._places[action.joint] != side.pivot:
+            self._where += [(row, column) for row in levers]
+
+    def varying_at(self, position: Position, places: Sequence[Any]) -> list[float]:
+        """Return the numbers of the matrix that vary; the places are in the ground, in [m]."""
+        values: list[float] = []
+        vectors = self._vectors
+        for action, sides in self._varying:
+            way = action.direction
+            turned = None if isinstance(way, int) else way(position)
+            for side, factor in sides:
+                if turned is not None:
+                    named = vectors.coordinates if action.joint >= 0 else vectors.turn_coordinates
+                    values += [factor * part for part in named(turned)]
+                if action.joint < 0 or (place := self._places[action.joint]) == side.pivot:
+                    continue
+                lever = vectors.minus(places[place], places[side.pivot])
+                if isinstance(way, int):
+                    moment = [
+                        part for part in vectors.unit_moments[way](lever) if part is not None
+                    ]
+                else:
+                    moment = [*vectors.turn_coordinates(vectors.cross(lever, turned))]
+                values += [factor / self._scale * part for part in moment]
+        return values
+
+    def rows_at(self, values: Sequence[Any]) -> list[list[Any]]:
+        """Return the rows of the matrix by the numbers of `varying_at`."""
+        rows = [[*row] for row in self._rows]
+        for (row, column), value in zip(self._where, values, strict=True):
+            before = rows[row][column]
+            # Wheels of a ratio on one link act on it together.
+            rows[row][column] = (
+                value if type(before) is float and before == 0.0 else before + value
             )
-            self._add_force(2 * number, number, 1j)
-            self._add_moment(2 * number + 1, self.sides[number])
-        sliders = {joints[number].name: number for number in self.lines}
-        for column, given in enumerate(linkage.inputs, 2 * len(joints)):
-            if given.slider:
-                self._add_force(column, sliders[given.slider], 1.0)
-            else:
-                self._add_moment(column, self._joint_sides(given.child, given.parent))
+        return rows
+
+    def sides(self, action: Action) -> tuple[Side, ...]:
+        """Return the links of an action that move, ``action.link`` with the sign +1 first."""
+        return tuple(
+            Side(self.rows[name], self.pivots[name], sign)
+            for name, sign in ((action.link, 1.0), (action.to, -1.0))
+            if name != GROUND
+        )
 
     def compile_solver(
         self,
@@ -113,13 +161,14 @@ class JointMatrix:
         count = len(self._where)
 
         def solve(*numbers: Any) -> list[Any]:
-            rows = [[*row] for row in self._rows]
-            for (row, column), value in zip(self._where, numbers[:count], strict=True):
-                rows[row][column] = value
+            rows = [[row[k] for k in self.kept] for row in self.rows_at(numbers[:count])]
             elimination = Elimination([*zip(*rows, strict=True)] if transposed else rows, ())
             if any(divisor == 0.0 for divisor in elimination.divisors):
                 return []
-            found = [elimination.solve(side) for side in split_numbers(numbers[count:], self.size)]
+            found = [
+                self._with_others(elimination.solve(side))
+                for side in split_numbers(numbers[count:], self.size)
+            ]
             return [*chain(*found)] if select is None else select(found)
 
         line = compile_function(solve, count + number * self.size)
@@ -130,51 +179,14 @@ class JointMatrix:
 
         return find_solution
 
-    def varying_at(self, coordinates: Sequence[float], places: Sequence[complex]) -> list[float]:
-        """
-        Return the numbers of the matrix that vary.
-
-        The coordinates are the closure's, the places in the frame of the ground, in [m].
-        """
-        values: list[float] = []
-        for number, unit, turns in self._forces:
-            place = self._places[number]
-            force = unit * self.lines[number].direction(coordinates) if turns else unit
-            for _, pivot, sign in self.sides[number]:
-                if turns:
-                    values += (sign * force.real, sign * force.imag)
-                if place != pivot:
-                    lever = places[place] - places[pivot]
-                    if turns:
-                        moment = cross_product(lever, force)
-                    else:
-                        moment = lever.real if unit == 1j else -lever.imag
-                    values.append(sign / self._scale * moment)
-        return values
-
-    def _add_force(self, column: int, number: int, unit: complex) -> None:
-        """Add the column of a unit force in a joint; that of a slider is turned by its line."""
-        turns = number in self.lines
-        self._forces.append((number, unit, turns))
-        for row, pivot, sign in self.sides[number]:
-            if turns:
-                self._where += ((row, column), (row + 1, column))
-            else:
-                self._rows[row + (unit == 1j)][column] = sign
-            if self._places[number] != pivot:
-                self._where.append((row + 2, column))
-
-    def _add_moment(self, column: int, sides: Sequence[PinSide]) -> None:
-        """Add the column of a unit moment."""
-        for row, _, sign in sides:
-            self._rows[row + 2][column] = sign
-
-    def _joint_sides(self, link: str, to: str) -> tuple[PinSide, ...]:
-        return tuple(
-            PinSide(self.rows[name], self._pivots[name], sign)
-            for name, sign in ((link, 1.0), (to, -1.0))
-            if name != GROUND
-        )
+    def _with_others(self, solution: list[Any]) -> list[Any]:
+        """Return a solution with the unknowns that are not solved for."""
+        if len(self.kept) == len(self.columns):
+            return solution
+        unknowns: list[Any] = [0.0] * len(self.columns)
+        for column, value in zip(self.kept, solution, strict=True):
+            unknowns[column] = value
+        return unknowns
 
 
 def split_numbers(numbers: Sequence[Any], size: int) -> list[list[Any]]:

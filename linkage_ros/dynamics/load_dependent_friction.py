@@ -40,7 +40,7 @@ _STAYS = 4e-15
 """Change at which a friction stays, as a fraction of what it is made of."""
 
 Unknown = tuple[int, bool, float]
-"""Of a joint: its first unknown in the linear system, whether it is a pin, and its factor."""
+"""Of a joint: its first unknown, whether the next one presses too, and its factor."""
 
 
 class FrictionSolver:
@@ -75,9 +75,9 @@ class FrictionSolver:
 
     def _joint_forces(self, solutions: Sequence[Sequence[Any]]) -> list[Any]:
         forces: list[Any] = []
-        for first, pin, _ in self._unknowns:
+        for first, both, _ in self._unknowns:
             for one in solutions:
-                forces += (one[first], one[first + 1] if pin else 0.0)
+                forces += (one[first], one[first + 1] if both else 0.0)
         return forces
 
     def solve_pressed(self, *numbers: float) -> list[float] | None:
@@ -89,7 +89,7 @@ class FrictionSolver:
         flat = self._solve_sides(*numbers)
         if flat is None:
             return None
-        free, *units = split_numbers(flat, self._matrix.size)
+        free, *units = split_numbers(flat, len(self._matrix.columns))
         nothing = [0.0] * len(free)
         forces = self._joint_forces([free, nothing, *units])
         found = self.solve_frictions(forces, [0.0] * self._count, 0.0)

@@ -348,15 +348,24 @@ def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None
             raise DefinitionError(
                 f'{key}.radius', f'{quote(name)} is a slider, which has none', 'leave it out'
             )
-        if name in pins and bool(joint.coefficient) != bool(joint.radius):
-            given, missing = (
-                ('coefficient', 'radius') if joint.coefficient else ('radius', 'coefficient')
-            )
-            raise DefinitionError(
-                f'{key}.{given}',
-                f'friction by the force in a pin needs both, and {missing} is missing',
-                f'write {missing} too',
-            )
+        if name in pins:
+            _check_radius(name, joint)
+    _check_holds(friction)
+
+
+def _check_radius(name: str, joint: JointFriction) -> None:
+    if bool(joint.coefficient) != bool(joint.radius):
+        given, missing = (
+            ('coefficient', 'radius') if joint.coefficient else ('radius', 'coefficient')
+        )
+        raise DefinitionError(
+            f'effects.friction.joints.{name}.{given}',
+            f'friction by the force in a pin needs both, and {missing} is missing',
+            f'write {missing} too',
+        )
+
+
+def _check_holds(friction: Friction) -> None:
     if friction.holds and friction.load_dependent_joint:
         raise DefinitionError(
             'effects.friction.holds',
@@ -368,7 +377,7 @@ def _check_friction(linkage: Linkage | SpaceLinkage, friction: Friction) -> None
 
 
 def _check_friction_in_space(linkage: SpaceLinkage, friction: Friction) -> None:
-    """Refuse friction of what is no joint, and friction by a force, which nothing computes."""
+    """Refuse friction of what is no joint, and friction by a force that a joint does not bear."""
     known = (*linkage.driven, *(name for name in linkage.published if name not in linkage.driven))
     for name, joint in friction.joints.items():
         key = f'effects.friction.joints.{name}'
@@ -376,12 +385,19 @@ def _check_friction_in_space(linkage: SpaceLinkage, friction: Friction) -> None:
             raise DefinitionError(
                 key, f'{quote(name)} is neither an input nor a published joint', _one_of(known)
             )
-        if joint.coefficient or joint.radius:
+        if name in linkage.hinges:
+            _check_radius(name, joint)
+        elif joint.radius:
             raise DefinitionError(
-                f'{key}.{"coefficient" if joint.coefficient else "radius"}',
-                'friction by the force in a joint is for planar linkages',
+                f'{key}.radius', f'{quote(name)} slides, and has none', 'leave it out'
+            )
+        elif joint.coefficient and name in linkage.struts:
+            raise DefinitionError(
+                f'{key}.coefficient',
+                f'{quote(name)} is a strut, which bears no force across its line',
                 'write coulomb or viscous instead',
             )
+    _check_holds(friction)
 
 
 def _one_of(names: Iterable[str]) -> str:

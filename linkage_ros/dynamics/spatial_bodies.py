@@ -66,6 +66,12 @@ def _moment(gyration: Rows | float, turn: Vector, change: Vector) -> Vector:
 SPACE = Vectors(
     ZERO, tuple, plus, minus, scale, dot, length,
     momentum=_momentum, moment=_moment, turn_dot=dot,
+    cross=cross, carry=cross, coordinates=tuple, turn_coordinates=tuple, turn_from=tuple,
+    unit_moments=(
+        lambda lever: (None, lever[2], -lever[1]),
+        lambda lever: (-lever[2], None, lever[0]),
+        lambda lever: (lever[1], -lever[0], None),
+    ),
 )  # fmt: skip
 """Operations in space: vectors and turns are tuples."""
 
@@ -99,7 +105,10 @@ def spatial_bodies(closure: SpaceClosure, loads: Loads) -> BodyModel:
         for (link, body), axes in zip(heavy.items(), tracker.axes, strict=True)
     )
     springs = tuple((next(at), next(at)) for _ in loads.springs)
-    return BodyModel(SPACE, tracker, bodies, springs, tracker.turn_rates, tracker.turn_changes)
+    return BodyModel(
+        SPACE, tracker, bodies, springs, tracker.turn_rates, tracker.turn_changes,
+        tuple(heavy), tracker.moments_in_ground,
+    )  # fmt: skip
 
 
 def _rod_gyration(closure: SpaceClosure, link: str, body: SpatialMass) -> float:

@@ -16,23 +16,12 @@ with it, and a torque on it, are refused.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
+from linkage_ros.dynamics.applied import LinkTurn
 from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.dynamics.spatial_bodies import SPACE
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import dot, GROUND_FRAME, Position, SpaceClosure, Vector, Velocity
-
-
-class LinkTurn(NamedTuple):
-    """A link, turned about an axis."""
-
-    spin: Callable[[Velocity], Vector]  # Of the link, in the frame of the ground
-    axis: Callable[[Position], Vector]  # A unit vector in the frame of the ground
-
-    def lever(self, velocity: Velocity, position: Position, _moved: Sequence[Vector]) -> float:
-        """Return the rate of the link about the axis, in [rad/s]."""
-        return dot(self.spin(velocity), self.axis(position))
+from linkage_ros.kinematics import dot, GROUND_FRAME, Position, SpaceClosure, Vector
 
 
 class SpatialParts:
@@ -74,4 +63,8 @@ class SpatialParts:
 
     def turns(self, link: str, frame: str) -> Sequence[LinkTurn]:
         spin = self._closure.spin_of(link)
-        return [LinkTurn(spin, axis) for axis in self.axes(link, frame)]
+
+        def turn(axis: Callable[[Position], Vector]) -> LinkTurn:
+            return LinkTurn(link, lambda v, position: dot(spin(v), axis(position)), axis)
+
+        return [turn(axis) for axis in self.axes(link, frame)]

@@ -185,11 +185,15 @@ from linkage_ros.kinematics.results import (
     SingularityMargin as SingularityMargin,
     Velocity as Velocity,
 )
-from linkage_ros.kinematics.space.carried_points import CarriedPoints as CarriedPoints
+from linkage_ros.kinematics.space.carried_points import (
+    CarriedPoints as CarriedPoints,
+    unit_across as unit_across,
+)
 from linkage_ros.kinematics.space.closure import (
     SpaceClosure as SpaceClosure,
 )
 from linkage_ros.kinematics.space.freedom import (
+    balls_of as balls_of,
     find_freedom as find_freedom,
     Freedom as Freedom,
 )

@@ -12,14 +12,14 @@ Read three types of messages about joints, by joint and quantity, and write two 
 A message is parsed only if its layout differs from the previous one's; otherwise one call unpacks
 it. A ``sensor_msgs/msg/JointState`` is read completely. A ``trajectory_msgs/msg/JointTrajectory``
 must have one point, as in ``~/motion``: the state at an instant. A
-``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``; the planar
-components are read: forces in x and y, moment about z. These are the messages of
-common_interfaces that have fields for accelerations, and for the wrenches of several joints.
+``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``. These are
+the messages of common_interfaces that have fields for accelerations, and for the wrenches of
+several joints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -44,16 +44,20 @@ WRENCHES = 'sensor_msgs/msg/MultiDOFJointState'
 
 POSITION, RATE, ACCELERATION, EFFORT = 'position', 'rate', 'acceleration', 'effort'
 FORCE_X, FORCE_Y, TORQUE = 'force x', 'force y', 'torque'
-QUANTITIES = (POSITION, RATE, ACCELERATION, EFFORT, FORCE_X, FORCE_Y, TORQUE)
+FORCE_Z, TORQUE_X, TORQUE_Y = 'force z', 'torque x', 'torque y'
+_WRENCH = (FORCE_X, FORCE_Y, FORCE_Z, TORQUE_X, TORQUE_Y, TORQUE)
+QUANTITIES = (POSITION, RATE, ACCELERATION, EFFORT, *_WRENCH)
+
+IN_SPACE = frozenset({FORCE_Z, TORQUE_X, TORQUE_Y})
+"""Quantities that are 0 in the joints of a planar linkage."""
 
 UNITS = {
     POSITION: ('rad', 'm'),
     RATE: ('rad/s', 'm/s'),
     ACCELERATION: ('rad/s²', 'm/s²'),
     EFFORT: ('N·m', 'N'),
-    FORCE_X: ('N', 'N'),
-    FORCE_Y: ('N', 'N'),
-    TORQUE: ('N·m', 'N·m'),
+    **dict.fromkeys(_WRENCH[:3], ('N', 'N')),
+    **dict.fromkeys(_WRENCH[3:], ('N·m', 'N·m')),
 }
 """Unit of each quantity for a revolute joint, and for a sliding one."""
 
@@ -193,7 +197,7 @@ def _parse_wrenches(data: bytes) -> _Parsed | str:
         return POSES
     if wrenches.length not in (0, len(names)):
         return UNEQUAL
-    return names, [(wrenches, names, [(0, FORCE_X), (1, FORCE_Y), (5, TORQUE)])], 6
+    return names, [(wrenches, names, [*enumerate(_WRENCH)])], 6
 
 
 def _parse_other(_: bytes) -> str:
@@ -232,23 +236,28 @@ class JointTrajectoryWriter(ArrayWriter):
         super().__init__(JOINT_TRAJECTORY, {'joint_names': names}, arrays, 'points')
 
 
-class PlanarWrenchWriter:
-    """Writes a MultiDOFJointState with wrenches only, for a fixed list of joints."""
+class JointWrenchWriter:
+    """
+    Writes a MultiDOFJointState with wrenches only, for a fixed list of joints.
+
+    In the plane a wrench has the force in x and y and the torque about z, in space six numbers.
+    """
 
     __slots__ = ('_constants', '_pack')
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], *, planar: bool) -> None:
         values = {'joint_names': names, 'wrench': [(0.0,) * 6] * len(names)}
         message = pack_message(MULTI_DOF_JOINT_STATE, values)
         wrenches = parse_message(message, MULTI_DOF_JOINT_STATE)['wrench']
-        # Force z and torque x, y of a wrench are zeros between the changing numbers.
+        # Force z and torque x, y of a planar wrench are zeros between the changing numbers.
+        numbers = 'dd24xd' if planar else '6d'
         self._pack, self._constants = compile_packing(
-            message, [(wrenches.first, 'dd24xd' * len(names))]
+            message, [(wrenches.first, numbers * len(names))]
         )
 
-    def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
+    def write(self, stamp: int, wrenches: Iterable[tuple[float, ...]]) -> bytes:
         """
-        Return a message with a wrench for each joint: force in x, y [N], torque about z [N·m].
+        Return a message with a wrench for each joint, in [N] and [N·m].
 
         ``stamp`` is the time of the state, in [ns].
         """

@@ -53,7 +53,7 @@ class CompiledTick(NamedTuple):
     rates: list[str]
     accelerations: list[str]
     efforts: list[str]
-    reactions: list[str]  # All reaction values in sequence, as expressions; likewise
+    reactions: list[list[str]]  # The values of each reaction, as expressions; likewise
 
 
 def compile_tick(interpreted: InterpretedTick) -> Callable[[int], Tick] | None:
@@ -245,7 +245,9 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         lines += _unwrap_lines(linkage.running.places, joints, leave)
     crank, given = 'crank' if exerts else f'({_CRANK_FIELDS})', '()' if loads is None else 'given'
     reading = joints, rates, accelerations, efforts
-    return CompiledTick(lines, bound, crank, given, *reading, reactions)
+    each = max(1, len(reactions) // len(linkage.context.reactions.joints)) if reactions else 1
+    wrenches = [reactions[k : k + each] for k in range(0, len(reactions), each)]
+    return CompiledTick(lines, bound, crank, given, *reading, wrenches)
 
 
 def _mechanism_lines(compiled_linkage: Compiled, leave: str) -> tuple[Lines, list[list[str]]]:
@@ -336,8 +338,7 @@ def _values_text(compiled: CompiledTick) -> str:
 
 
 def _tail_text(compiled: CompiledTick) -> str:
-    numbers = iter(compiled.reactions)
-    reactions = [_tuple_text(three) for three in zip(numbers, numbers, numbers, strict=True)]
+    reactions = [_tuple_text(numbers) for numbers in compiled.reactions]
     return f'reading, {_tuple_text(reactions)}, {compiled.given}'
 
 

@@ -17,7 +17,7 @@ from linkage_ros.stages.drives import CrankState
 from linkage_ros.stages.effects import MechanismState, SensorReading
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import Reaction
+    from linkage_ros.dynamics import JointReaction
     from linkage_ros.kinematics import Position
 
 Solution: TypeAlias = 'tuple[Position | None, MechanismState | None]'
@@ -42,7 +42,7 @@ class LinkageState:
         complete: Callable[[CrankState, tuple[float, ...]], Solution],
         crank: CrankState | None,
         reading: SensorReading | None,
-        reactions: tuple[Reaction, ...] = (),
+        reactions: tuple[JointReaction, ...] = (),
         given: tuple[float, ...] = (),
         solution: Solution | None = None,
     ) -> None:
@@ -70,7 +70,7 @@ class LinkageState:
         return self._solve()[1]
 
     @property
-    def reactions(self) -> tuple[Reaction, ...]:
+    def reactions(self) -> tuple[JointReaction, ...]:
         """Return the forces in pins and sliders; empty where there are none or none are needed."""
         if self.is_compiled:
             return self._reactions

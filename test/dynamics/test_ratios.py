@@ -10,6 +10,7 @@
 
 from dataclasses import replace
 from math import cos
+from typing import Any
 
 from linkage_ros.dynamics import (
     AppliedLoads,
@@ -20,13 +21,12 @@ from linkage_ros.dynamics import (
     Mechanics,
     Reactions,
 )
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Input, Linkage, Mass, Ratio, RevoluteJoint
 from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
 from scipy.integrate import solve_ivp
 
-from .loaded import BEGIN
+from .loaded import BEGIN, shipped
 from ..kinematics.test_ratios import rack_and_pinion
 
 RADIUS, RATIO = 0.03, -2.5
@@ -115,8 +115,48 @@ def test_torque_swings_geared_pendulums(method: str) -> None:
         assert state.rates[0] == pytest.approx(rate, abs=1e-5)
 
 
-def test_forces_in_pins_are_refused_in_one_line() -> None:
-    """The force between the teeth is not known."""
-    with pytest.raises(DefinitionError, match='rack_slide') as caught:
-        Reactions(Mechanics(pinion_and_rack()))
-    assert '\n' not in str(caught.value)
+def test_what_teeth_press_on_bearings_is_not_certain() -> None:
+    """No file says the radii of the wheels; what they need of the drive is certain."""
+    mechanics = Mechanics(pinion_and_rack(), Loads(gravity=(-9.81, 0.0)))
+    reactions = Reactions(mechanics)
+    assert reactions.published == ()
+    assert reactions.uncertain.startswith('force in O, way; moment in way: teeth and belts press')
+    motion = motion_of(mechanics.closure, 0.7, 3.0, -2.0)
+    assert reactions.drive_efforts(*motion) == pytest.approx(mechanics.drive_efforts(*motion))
+    assert reactions.solve(*motion) == ((0.0, 0.0, 0.0),) * 2
+
+
+def motion_of(closure: Closure, angle: float, rate: float, change: float) -> tuple[Any, Any, Any]:
+    position = closure.position(angle)
+    velocity = closure.velocity(position, rate)
+    return position, velocity, closure.acceleration(position, velocity, change)
+
+
+def test_forces_behind_a_gear_are_those_without_it() -> None:
+    """A wheel that turns a crank by −1/2: all joints but the bearings of both bear the same."""
+    linkage = shipped('four_bar')
+    (given,) = linkage.inputs
+    wheel = {'O': (-0.1, 0.0)}
+    geared = replace(
+        linkage,
+        links={
+            **linkage.links,
+            'ground': {**linkage.links['ground'], **wheel},
+            'wheel': {'O': (0.0, 0.0)},
+        },
+        inputs=(Input('wheel_joint', 'ground', 'wheel'),),
+        joints={given.joint: given.as_joint(), **linkage.joints},
+        masses={**linkage.masses, 'wheel': Mass(0.2, (0.0, 0.0), 1e-4)},
+        ratios={given.joint: Ratio('wheel_joint', -0.5)},
+    )
+    loads = Loads(gravity=(0.3, -9.81))
+    plain, behind = (Reactions(Mechanics(Closure(each), loads)) for each in (linkage, geared))
+    found = behind.solve(*motion_of(Closure(geared), -2.0, -14.0, 60.0))
+    right = plain.solve(*motion_of(Closure(linkage), 1.0, 7.0, -30.0))
+    assert found is not None
+    assert right is not None
+    expected = dict(zip(plain.names, right, strict=True))
+    published = {behind.names[number]: found[number] for number in behind.published}
+    assert {*published} == {*expected} - {'O2'}
+    for name, reaction in published.items():
+        assert reaction == pytest.approx(expected[name], rel=1e-11, abs=1e-13)

@@ -8,7 +8,7 @@
 
 """Forces in pins that were recorded are plotted, and what is zero throughout is not."""
 
-from linkage_ros.messages import MessageValues, PlanarWrenchWriter, WRENCHES
+from linkage_ros.messages import JointWrenchWriter, MessageValues, WRENCHES
 from linkage_ros.resources import shipped_path
 from linkage_ros.tools.view.report import (
     LATER_PINS,
@@ -46,7 +46,7 @@ def test_the_magnitude_of_each_recorded_force_is_plotted(press):
     messages = [reader.read(each.data) for each in press.messages() if each.topic == FORCES]
     assert len(messages) == 200
     assert messages[0].names == PINS
-    wrenches = np.array([each.numbers for each in messages]).reshape(-1, len(PINS), 3)
+    wrenches = np.array([each.numbers for each in messages]).reshape(-1, len(PINS), 6)
     found = read(press)
     for place, name in enumerate(PINS):
         _, told = curve(found, name, 'force')
@@ -91,7 +91,7 @@ linkages:
 
 
 def test_moments_have_a_curve_where_there_are_any():
-    write = PlanarWrenchWriter(['pin', 'slider']).write
+    write = JointWrenchWriter(['pin', 'slider'], planar=True).write
     curves = collected(*((time, write(BEGIN, [(3.0, 4.0, 0.0), (0.0, 1.0, -2.0)]))
                          for time in range(5))).build_curves()  # fmt: skip
     assert [(column.name, column.quantity, column.unit) for column in curves.columns] == [
@@ -101,7 +101,9 @@ def test_moments_have_a_curve_where_there_are_any():
 
 
 def test_messages_of_two_linkages_at_one_time_are_one_row():
-    left, right = (PlanarWrenchWriter([name]).write(BEGIN, [(1.0, 0.0, 0.0)]) for name in 'ab')
+    left, right = (
+        JointWrenchWriter([name], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)]) for name in 'ab'
+    )
     forces = PinForces(FORCES, Window())
     forces.add(np.array([5, 9, 3, 5]), [left, left, right, right])
     curves = forces.build_curves()
@@ -110,8 +112,8 @@ def test_messages_of_two_linkages_at_one_time_are_one_row():
 
 
 def test_other_messages_are_counted_and_left_out():
-    good = PlanarWrenchWriter(['a']).write(BEGIN, [(1.0, 0.0, 0.0)])
-    other = PlanarWrenchWriter(['b']).write(BEGIN, [(1.0, 0.0, 0.0)])
+    good = JointWrenchWriter(['a'], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)])
+    other = JointWrenchWriter(['b'], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)])
     forces = collected((1, b'no message'), (2, good), (3, other))
     assert forces.left_out == {'malformed message': 1, LATER_PINS: 1}
     assert forces.build_curves().rows == 2

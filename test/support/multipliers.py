@@ -57,11 +57,15 @@ class AbsoluteMotion:
         }
         self.size = 6 * len(self.moving)
         self.velocity = self.spin = None
-        rows = [row for name in linkage.pair_joints for row in self._joint(name)]
+        rows, self.owners = [], []
+        for name, joint in linkage.pair_joints.items():
+            rows += self._joint(name)
+            self.owners += [(joint.child, joint.parent)] * (len(rows) - len(self.owners))
         for point in linkage.points:
             carriers = [link for link, points in linkage.links.items() if point in points]
             for other in carriers[1:]:
                 rows += self._meet(carriers[0], other, self.place(other, linkage.points[point]))
+                self.owners += [(other, carriers[0])] * 3
         for name, ratio in linkage.ratios.items():
             own, of = self._rate(name), self._rate(ratio.of)
             rows.append((own[0] - ratio.ratio * of[0], lambda own=own, of=of, k=ratio.ratio:
@@ -194,6 +198,27 @@ class AbsoluteMotion:
 
         ``loads`` are forces and moments on links: link, place now, force, moment.
         """
+        return self._multipliers(gravity, loads)[-len(self.linkage.driven) :]
+
+    def wrenches(self, gravity=(0.0, 0.0, 0.0), loads=()):
+        """
+        Return the force, and the moment about the origin, that two links exert on each other.
+
+        They are by the names of the two, and act on the first one: through all joints between
+        them, without drives and ratios.
+        """
+        multipliers = self._multipliers(gravity, loads)
+        found = {}
+        for (one, other), row, size in zip(self.owners, self.equations, multipliers, strict=False):
+            link, to = sorted((one, other), key=lambda name: (name == 'ground', name))
+            first = 6 * self.moving.index(link)
+            force, moment = (size * row[first + k : first + k + 3] for k in (0, 3))
+            moment = moment + np.cross(self.frames[link][1], force)
+            before = found.get((link, to), np.zeros((2, 3)))
+            found[link, to] = before + np.array([force, moment])
+        return found
+
+    def _multipliers(self, gravity, loads):
         needed = np.zeros(self.size)
         for link, body in self.linkage.masses.items():
             place = self.place(link, body.center)
@@ -209,8 +234,7 @@ class AbsoluteMotion:
         multipliers, *_ = np.linalg.lstsq(self.equations.T, needed, rcond=1e-11)
         off = np.abs(self.equations.T @ multipliers - needed).max()
         assert off < 1e-7 * (1.0 + np.abs(needed).max()), 'the joints do not hold the links'
-        first = len(multipliers) - len(self.linkage.driven)
-        return multipliers[first:]
+        return multipliers
 
     def joint_loads(self, name, effort):
         """Yield the loads of an effort on a joint: on its child and, reversed, on its parent."""

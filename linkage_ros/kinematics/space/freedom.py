@@ -109,11 +109,8 @@ class _MotionEquations:
     def _ball_rows(self) -> Iterator[Array]:
         """Yield the rows of the balls between two links; count all equations as needed ones."""
         carried, balls = self._carried, defaultdict[tuple[str, str], list[Array]](list)
-        for point in dict.fromkeys(carried.same[point] for point in self._linkage.points):
-            first, *others = carried.carriers[point] or ('',)
-            for link in others:
-                if not _is_on_hinge(self._linkage, carried, point, {first, link}):
-                    balls[first, link].append(_velocity_rows(carried.places[point]))
+        for point, first, link in balls_of(self._linkage, carried):
+            balls[first, link].append(_velocity_rows(carried.places[point]))
         for (first, link), rows in balls.items():
             self.needed += 3 * len(rows)
             # However many balls two links share: as many rows as a motion has numbers.
@@ -196,6 +193,25 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
             f'no step finds {list_names(unknown or plan.lost)}',
             'let each hang on hinges and slides that lead to the ground, or drive other joints',
         )
+
+
+def balls_of(linkage: SpaceLinkage, carried: CarriedPoints) -> Iterator[tuple[str, str, str]]:
+    """
+    Yield each ball: its point, the first link that carries it, and another one.
+
+    Links that hinges through the point join, as in a universal joint, share no ball.
+    """
+    for point in dict.fromkeys(carried.same[point] for point in linkage.points):
+        left = [*carried.carriers[point]]
+        first = left[0] if left else ''
+        while left:
+            joined = [left.pop(0)]
+            if joined[0] != first:
+                yield point, first, joined[0]
+            for link in joined:
+                found = [one for one in left if _is_on_hinge(linkage, carried, point, {link, one})]
+                joined += found
+                left = [one for one in left if one not in found]
 
 
 def _is_on_hinge(

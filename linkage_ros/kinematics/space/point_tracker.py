@@ -26,6 +26,7 @@ from math import dist
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.space.vectors import (
+    cross,
     dot,
     GROUND_FRAME,
     length,
@@ -171,6 +172,21 @@ class SpatialTracker:
             if isinstance(turn, int)
             else self._apart(*(end.acceleration(*states) for end in turn))
             for turn in self._turns
+        ]
+
+    def moments_in_ground(self, position: Position, moments: Sequence[Vector]) -> list[Vector]:
+        """
+        Return moments that work on the turn of each link, in the frame of the ground.
+
+        What works on the turn of a rod that may spin are forces at its ends, one against the
+        other: theirs is a couple.
+        """
+        pins = position.state.pins
+        return [
+            pins[turn].turn(moment)
+            if isinstance(turn, int)
+            else cross(self._apart(*(end.place(pins) for end in turn)), moment)
+            for turn, moment in zip(self._turns, moments, strict=True)
         ]
 
     def _apart(self, start: Vector, end: Vector) -> Vector:

@@ -11,10 +11,10 @@ Compliance and clearance: the displacement of the published joints under the for
 
 `compliance`: links stretch under the axial force that they carry.
 
-A link between two pins P and Q is a bar of axial stiffness k = E·A/L: under the axial force N,
-positive in tension, it is longer by N/k (Hooke's law; S. P. Timoshenko, Strength of Materials, ch.
-I). With u the unit vector from P to Q, and F the force on the link in each of its pins, inertia
-included::
+A link between two pins P and Q, in space two balls or hinges, is a bar of axial stiffness k =
+E·A/L: under the axial force N, positive in tension, it is longer by N/k (Hooke's law; S. P.
+Timoshenko, Strength of Materials, ch. I). With u the unit vector from P to Q, and F the force on
+the link in each of its pins, inertia included::
 
     N = ½·(F_Q − F_P)·u
 
@@ -22,7 +22,8 @@ So each end bears half of the loads between the pins: weight, inertia and spring
 computed for the rigid linkage. The displacement of the published joints is computed to first
 order, with fixed inputs: valid for stretches that are small against the links, with an error of
 the order of their square. The model is quasi-static: the stretch adds no vibration, and the rates
-belong to the rigid linkage.
+belong to the rigid linkage. In space the bar of a hinge begins where its axis is nearest to the
+other end.
 
 `clearance`: a pin is smaller than its hole, and the force presses it to one side of the hole.
 
@@ -35,7 +36,9 @@ hole or pin of ``link`` is displaced from the centre at ``to`` by::
 
     δ = −c·F/|F|              F: the force that ``to`` exerts on ``link``
 
-so a link that hangs in its pin hangs lower by c. In a pin of three links or more, each link is
+so a link that hangs in its pin hangs lower by c. In a ball F is the whole force; in a hinge it is
+the part across the axis, and the play along the axis and the tilt of the pin in its hole are left
+out. In a pin of three links or more, each link is
 displaced in this way from the first one that ``links`` names on the pin.
 
 The force is computed for the linkage without play. The displacement of the published joints is
@@ -47,14 +50,14 @@ the linkage is not displaced.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import hypot
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.description import each_part, Number
 from linkage_ros.errors import DefinitionError, list_names
-from linkage_ros.kinematics import call, Joint, make_vector, unit_vector
+from linkage_ros.kinematics import call, Position
 from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.effect import MechanismEffect
 from linkage_ros.stages.effects.stage import MechanismState, Stage, with_deflection
@@ -78,32 +81,31 @@ class ComplianceEffect(MechanismEffect):
 
     needs = ('pin_forces',)
     needs_forces = True
-    is_planar = True
     is_compiled = True
     sample = '{links: {coupler: 1.0e+7}}'
 
     def stage(self, context: Context) -> Stage:
         """Build the stage; raise `DefinitionError` if a link has not exactly two pins."""
+        forces = context.reactions
+        forces.check_deflections('compliance')
         bars = tuple(_make_bar(context, link, k) for link, k in self.links.items())
-        rigid = (0j,) * len(context.closure.structure.joints)
-        shift_of = context.reactions.joint_deflections
+        vectors, count = context.mechanics.model.vectors, len(forces.joints)
+        shift_of = forces.joint_deflections
 
         def compliance(motion: MechanismState) -> MechanismState:
             position, reactions = motion.position, motion.reactions
             if not reactions:
                 return motion
-            x = position.state.coordinates
-            offsets = list(rigid)
-            for coordinate, axis, halves, far, softness in bars:
-                along = unit_vector(x[coordinate]) * axis
+            offsets = [vectors.zero] * count
+            for direction, halves, far, softness in bars:
+                along = direction(position)
                 tension = 0.0
                 for joint, half in halves:
-                    fx, fy, _ = reactions[joint]
-                    tension += half * (fx * along.real + fy * along.imag)
-                stretch = tension * softness * along
+                    tension += half * vectors.dot(forces.force_of(reactions[joint]), along)
+                stretch = vectors.scale(tension * softness, along)
                 # The rigid position of the far pin is short of its real position.
                 for joint, sign in far:
-                    offsets[joint] -= sign * stretch
+                    offsets[joint] = vectors.minus(offsets[joint], vectors.scale(sign, stretch))
             moved = shift_of(position, offsets)
             return motion if moved is None else with_deflection(motion, moved)
 
@@ -113,8 +115,7 @@ class ComplianceEffect(MechanismEffect):
 class _Bar(NamedTuple):
     """A link between two pins, near and far."""
 
-    coordinate: int  # Index of the closure's coordinate that turns it
-    axis: complex  # Unit vector from the near pin to the far one where that coordinate is 0
+    direction: Callable[[Position], Any]  # A unit vector from the near pin to the far one
     # Joints by index, with the factor of their axial force in the tension.
     halves: tuple[tuple[int, float], ...]
     # Joints of the far pin by index; 1 where the link is the joint's ``link``, −1 where ``to``.
@@ -128,21 +129,21 @@ class ClearanceEffect(MechanismEffect):
 
     pins: Mapping[str, float] = each_part(
         'radial play of each pin: half the difference of the diameters of hole and pin',
-        'pin',
+        'bearing',
         Number('radial play', 'm', least=0.0, most=1e6),
         required=True,
     )
 
     needs = ('pin_forces',)
     needs_forces = True
-    is_planar = True
     is_compiled = True
     sample = '{pins: {B: 1.0e-4}}'
 
     def stage(self, context: Context) -> Stage:
         """Build the stage; raise `DefinitionError` if a slider is named."""
-        joints = context.closure.structure.joints
-        pins = {joint.name for joint in joints if joint.kind == 'R'}
+        forces = context.reactions
+        forces.check_deflections('clearance')
+        pins = {joint.name for joint in forces.joints if not joint.slides}
         for name in self.pins:
             if name not in pins:
                 raise DefinitionError(
@@ -152,56 +153,54 @@ class ClearanceEffect(MechanismEffect):
                 )
         plays = tuple(
             (index, self.pins[joint.name])
-            for index, joint in enumerate(joints)
-            if joint.kind == 'R' and joint.name in self.pins
+            for index, joint in enumerate(forces.joints)
+            if not joint.slides and joint.name in self.pins
         )
-        centred = (0j,) * len(joints)
-        shift_of = context.reactions.joint_deflections
+        vectors, count = context.mechanics.model.vectors, len(forces.joints)
+        shift_of = forces.joint_deflections
 
         def clearance(motion: MechanismState) -> MechanismState:
             reactions = motion.reactions
             if not reactions:
                 return motion
-            sizes = [call(hypot, fx, fy) for fx, fy, _ in reactions]
+            position = motion.position
+            pressed = [
+                vectors.coordinates(forces.pressing_force(index, reactions[index], position))
+                for index in range(count)
+            ]
+            sizes = [call(hypot, *force) for force in pressed]
             smallest = _SMALLEST * call(max, *sizes)
-            offsets = list(centred)
+            offsets = [vectors.zero] * count
             for joint, play in plays:
                 size = sizes[joint]
                 if size > smallest:
-                    fx, fy, _ = reactions[joint]
-                    offsets[joint] = make_vector(-play * (fx / size), -play * (fy / size))
-            moved = shift_of(motion.position, offsets)
+                    offsets[joint] = vectors.from_numbers(
+                        [-play * (part / size) for part in pressed[joint]]
+                    )
+            moved = shift_of(position, offsets)
             return motion if moved is None else with_deflection(motion, moved)
 
         return clearance
 
 
 def _make_bar(context: Context, link: str, stiffness: float) -> _Bar:
-    closure = context.closure
+    forces = context.reactions
     ends: dict[str, list[tuple[int, float]]] = {}
-    for index, joint in enumerate(closure.structure.joints):
+    for index, joint in enumerate(forces.joints):
         if link in (joint.link, joint.to):
-            _check_joint(link, joint)
+            if joint.slides:
+                raise _bar_error(link, f'has the slider {joint.name!r}')
             ends.setdefault(joint.name, []).append((index, 1.0 if joint.link == link else -1.0))
     if len(ends) != 2:
         raise _bar_error(link, f'has the pins {list_names(ends)}')
-    near, far = ends
-    points = closure.linkage.links[link]
-    between = complex(*points[far]) - complex(*points[near])
-    angle = closure.angles[link]
+    near, far = ends.values()
     return _Bar(
-        angle.coordinate,
-        angle.unit * between / abs(between),
-        tuple((number, -0.5 * sign) for number, sign in ends[near])
-        + tuple((number, 0.5 * sign) for number, sign in ends[far]),
-        tuple(ends[far]),
+        forces.bar_direction(link, near[0][0], far[0][0]),
+        tuple((number, -0.5 * sign) for number, sign in near)
+        + tuple((number, 0.5 * sign) for number, sign in far),
+        tuple(far),
         1.0 / stiffness,
     )
-
-
-def _check_joint(link: str, joint: Joint) -> None:
-    if joint.kind != 'R':
-        raise _bar_error(link, f'has the slider {joint.name!r}')
 
 
 def _bar_error(link: str, reason: str) -> DefinitionError:

@@ -28,14 +28,18 @@ the effort of that drive is for its own inertia only: drive_inertia·φ̈, with 
 
 At a toggle neither rates nor efforts exist.
 
-`pin_forces`: forces between the links of a linkage in their pins and sliders.
+`pin_forces`: forces between the links of a linkage in their joints.
 
 They are computed for the rigid linkage, by Newton's and Euler's equations of every link; see
-`linkage_ros.dynamics.reactions`. One message holds all forces of an instant, hence the type
-``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` per pin: these would
-be separate topics, to be matched by stamp, each with a frame that no node broadcasts. ``wrench``
-holds for each of ``joint_names`` the force (x, y) and the moment about z, in the frame of the
-ground; ``transforms`` and ``twist`` are empty. At a toggle no forces exist, and there is no
+`linkage_ros.dynamics.reactions`. In an over-constrained linkage, and where wheels of a ratio press
+on their bearings, some forces are not certain: those are 0, and a joint of whose force nothing is
+certain is left out; ``linkage scene`` names them.
+
+One message holds all forces of an instant, hence the type ``sensor_msgs/MultiDOFJointState`` and
+not a ``geometry_msgs/WrenchStamped`` per pin: these would be separate topics, to be matched by
+stamp, each with a frame that no node broadcasts. ``wrench`` holds for each of ``joint_names`` the
+force and the moment, in the frame of the ground: in the plane the force (x, y) and the moment
+about z. ``transforms`` and ``twist`` are empty. At a toggle no forces exist, and there is no
 message.
 """
 
@@ -43,7 +47,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.kinematics import all_finite
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics import all_finite, Closure
 from linkage_ros.stages.drives import Context, CrankAtRest, CrankBehindPlay
 from linkage_ros.stages.effects.effect import MechanismEffect, MessageEffect
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stage, Writer
@@ -85,11 +90,10 @@ class EffortEffect(MechanismEffect):
 
 @dataclass(frozen=True, slots=True)
 class PinForcesEffect(MechanismEffect, MessageEffect):
-    """Forces in pins and sliders, on ~/pin_forces."""
+    """Forces in joints, on ~/pin_forces."""
 
     needs = ('acceleration',)
     needs_forces = True
-    is_planar = True
     is_compiled = True
     topic = '~/pin_forces'
     message = 'sensor_msgs/msg/MultiDOFJointState'
@@ -110,16 +114,29 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
 
     def writer(self, context: Context) -> Writer:
         """Build the writer of the message; b'' where there are no forces."""
-        from linkage_ros.messages import joint_values  # local import: if published
+        from linkage_ros.messages import JointWrenchWriter  # local import: if published
 
-        write = joint_values.PlanarWrenchWriter(
-            [context.prefix + name for name in context.reactions.names]
-        ).write
+        forces = context.reactions
+        if not forces.published:
+            raise DefinitionError(
+                'effects.pin_forces',
+                f'none of them is certain: {forces.uncertain}',
+                'leave it out',
+            )
+        names = [context.prefix + forces.names[number] for number in forces.published]
+        write = JointWrenchWriter(names, planar=isinstance(context.closure, Closure)).write
+        if len(names) == len(forces.names):
 
-        def write_forces(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
-            return write(now, motion.reactions) if motion.reactions else b''
+            def write_forces(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
+                return write(now, motion.reactions) if motion.reactions else b''
 
-        return write_forces
+            return write_forces
+
+        def write_certain(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
+            found = motion.reactions
+            return write(now, [found[n] for n in forces.published]) if found else b''
+
+        return write_certain
 
 
 def _at_rest(effort: Stage) -> Stage:

@@ -314,13 +314,13 @@ class Arrows:
         return self._eighth * log1p(force / self._weight)
 
     def force_arrows(
-        self, points: Points, reactions: Sequence[tuple[float, float, float]]
+        self, points: Points, reactions: Sequence[tuple[float, ...]]
     ) -> list[list[complex]]:
         """Return the arrow of each joint."""
         if not (self._joints and reactions):
             return [[] for _ in self._joints]
         drawn = []
-        for at, (fx, fy, _) in zip(self._joints, reactions, strict=True):
+        for at, (fx, fy, *_) in zip(self._joints, reactions, strict=True):
             force = complex(fx, fy)
             length = self._arrow_length(abs(force))
             start = points[at]

@@ -106,7 +106,7 @@ class Markers:
         reactions = context.reactions.joints if 'pin_forces' in named else ()
         joints = [
             Key(joint.link, closure.linkage.sliders[joint.name].point)
-            if joint.kind == 'P'
+            if joint.slides
             else Key(joint.link, joint.name)
             for joint in reactions
         ]

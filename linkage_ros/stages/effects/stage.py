@@ -18,7 +18,7 @@ from linkage_ros.kinematics import Acceleration, Position, Velocity
 from linkage_ros.stages.drives import CrankState
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import Reaction
+    from linkage_ros.dynamics import JointReaction
 
 
 class MechanismState(NamedTuple):
@@ -50,7 +50,7 @@ class MechanismState(NamedTuple):
     velocity: Velocity | None
     acceleration: Acceleration | None
     efforts: tuple[float, ...]
-    reactions: tuple[Reaction, ...]
+    reactions: tuple[JointReaction, ...]
     deflection: tuple[float, ...]
     given: tuple[float, ...] = ()
 

@@ -373,10 +373,12 @@ class PinForces:
         rows = {time: row for row, time in enumerate(sorted({time for time, _ in good}))}
         numbers = np.full((len(rows), 2, len(self._places)), np.nan)
         for time, values in good:
-            wrenches = np.reshape(values.numbers, (-1, 3))
-            for name, (x, y, moment) in zip(values.names, wrenches, strict=True):
+            wrenches = np.reshape(values.numbers, (-1, 2, 3))
+            for name, (force, (x, y, z)) in zip(values.names, wrenches, strict=True):
                 if name in self._places:
-                    numbers[rows[time], :, self._places[name]] = np.hypot(x, y), moment
+                    # About z a moment has a sign.
+                    moment = hypot(x, y, z) if x or y else z
+                    numbers[rows[time], :, self._places[name]] = hypot(*force), moment
                 else:
                     self.left_out[LATER_PINS] += 1
         self._kept.add(np.array([*rows]), numbers.reshape(len(rows), -1))
