@@ -51,9 +51,7 @@ from linkage_ros.dynamics.motion import (
 from linkage_ros.dynamics.motor import Motor as Motor, MotorLaw as MotorLaw
 from linkage_ros.dynamics.reactions import (
     JointReaction as JointReaction,
-    Reaction as Reaction,
     Reactions as Reactions,
-    SpatialReaction as SpatialReaction,
 )
 from linkage_ros.dynamics.several_freedoms import (
     InputVector as InputVector,

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.dynamics import longest_step
 from linkage_ros.dynamics.bodies import PLANE, Vectors
-from linkage_ros.dynamics.joint_forms import Direction
+from linkage_ros.dynamics.joint_forms import LinkTurn
 from linkage_ros.dynamics.laws import Contact, Law, LawTerm, TorqueTable
 from linkage_ros.dynamics.loads import (
     AppliedLoads,
@@ -106,18 +106,6 @@ class LoadedPoint(NamedTuple):
     def lever(self, _velocity: Velocity, position: Position, moved: Sequence[Any]) -> float:
         """Return the velocity of the point along the direction, in [m/s]."""
         return self.dot(moved[self.tracked_index], self.direction(position))
-
-
-class LinkTurn(NamedTuple):
-    """A link under a torque about an axis."""
-
-    link: str
-    rate: Callable[[Velocity, Position], float]  # About the axis, in [rad/s]
-    axis: Direction  # A unit vector in the frame of the ground
-
-    def lever(self, velocity: Velocity, position: Position, _moved: Sequence[Any]) -> float:
-        """Return the rate of the link about the axis, in [rad/s]."""
-        return self.rate(velocity, position)
 
 
 class LoadedParts(Protocol):

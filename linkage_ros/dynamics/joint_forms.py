@@ -25,7 +25,7 @@ own axis, which is 0: so each link has as many equations as numbers of a motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics import (
@@ -42,6 +42,7 @@ from linkage_ros.kinematics import (
     scale,
     unit_across,
     unit_vector,
+    Velocity,
     ZERO,
 )
 
@@ -65,6 +66,18 @@ class Action(NamedTuple):
     to: str
     direction: Direction
     joint: int = -1  # The joint at whose place a force acts; −1 of a moment
+
+
+class LinkTurn(NamedTuple):
+    """A link under a torque about an axis."""
+
+    link: str
+    rate: Callable[[Velocity, Position], float]  # About the axis, in [rad/s]
+    axis: Direction  # A unit vector in the frame of the ground
+
+    def lever(self, velocity: Velocity, position: Position, _moved: Sequence[Any]) -> float:
+        """Return the rate of the link about the axis, in [rad/s]."""
+        return self.rate(velocity, position)
 
 
 class JointForm(NamedTuple):
@@ -113,7 +126,7 @@ def planar_forms(closure: Closure) -> JointForms:
         direction = complex(*slider.direction)
         unit = along.unit * direction / abs(direction)
         point = joint.link, complex(*links[joint.link][slider.point])
-        ways = _turned(along.coordinate, unit, 1j), _turned(along.coordinate, unit)
+        ways = _turned_line(along.coordinate, unit, 1j), _turned_line(along.coordinate, unit)
         joints.append(JointForm(*ends, point, ways[:1], (0,), slides=True, axis=ways[1]))
     sliders = {joint.name: n for n, joint in enumerate(joints) if joint.slides}
     efforts = {
@@ -136,10 +149,10 @@ def planar_bar(
     """Return the direction on a link from one of its pins to another."""
     points, angle = closure.linkage.links[link], closure.angles[link]
     between = complex(*points[far.name]) - complex(*points[near.name])
-    return _turned(angle.coordinate, angle.unit * between / abs(between))
+    return _turned_line(angle.coordinate, angle.unit * between / abs(between))
 
 
-def _turned(
+def _turned_line(
     coordinate: int, unit: complex, by: complex | None = None
 ) -> Callable[[Position], complex]:
     """Return the direction of a line that a coordinate turns, or what ``by`` makes of it."""
@@ -209,7 +222,7 @@ def _spatial_form(closure: SpaceClosure, name: str, joint: SpatialJoint, rubs: b
     x = unit_across(axis)
     along = closure.carried_vector(joint.parent, axis)
     ends = name, joint.child, joint.parent
-    across = tuple(_carried(closure, joint.parent, way) for way in (x, cross(axis, x)))
+    across = tuple(_carried_direction(closure, joint.parent, way) for way in (x, cross(axis, x)))
     if name in linkage.slides:
         points = linkage.links.get(joint.child, ())
         at = linkage.points[points[0]] if points else joint.at
@@ -219,7 +232,7 @@ def _spatial_form(closure: SpaceClosure, name: str, joint: SpatialJoint, rubs: b
     return JointForm(*ends, (carrier, joint.at), forces, across, axis=along)
 
 
-def _carried(closure: SpaceClosure, link: str, vector: Vector) -> Direction:
+def _carried_direction(closure: SpaceClosure, link: str, vector: Vector) -> Direction:
     """Return a direction that a link turns; its sign does not matter."""
     if link == GROUND:
         for number, axis in enumerate(GROUND_FRAME[:3]):

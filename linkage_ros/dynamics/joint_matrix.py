@@ -29,7 +29,7 @@ Column = Sequence[tuple[Action, float]]
 """What an unknown of 1 does: actions, each with a factor."""
 
 
-class Side(NamedTuple):
+class ActionSide(NamedTuple):
     """A link of an action: its first row, the index of its pivot among the places, its sign."""
 
     row: int
@@ -78,7 +78,7 @@ class JointMatrix:
         """The columns that are solved for; the unknowns of the others are 0."""
         self._rows = [[0.0] * len(columns) for _ in range(self.size)]
         self._where: list[tuple[int, int]] = []  # Entries that vary, by row and column
-        self._varying: list[tuple[Action, list[tuple[Side, float]]]] = []
+        self._varying: list[tuple[Action, list[tuple[ActionSide, float]]]] = []
         for number, column in enumerate(columns):
             for action, factor in column:
                 sides = [(side, side.sign * factor) for side in self.sides(action)]
@@ -86,9 +86,10 @@ class JointMatrix:
                 for side, signed in sides:
                     self._add_entries(number, action, side, signed)
 
-    def _add_entries(self, column: int, action: Action, side: Side, factor: float) -> None:
+    def _add_entries(self, column: int, action: Action, side: ActionSide, factor: float) -> None:
         """Add the constant entries of an action on a link, and where the others are."""
-        moments = range(side.row, side.row + self.force_rows + self.moment_rows)[self.force_rows :]
+        last = side.row + self.force_rows + self.moment_rows
+        moments = range(side.row + self.force_rows, last)
         way, force = action.direction, action.joint >= 0
         first = side.row if force else moments.start
         levers: Sequence[Any] = moments
@@ -98,8 +99,8 @@ class JointMatrix:
             parts = self._vectors.unit_moments[way](lever) if force else ()
             levers = [row for row, part in zip(moments, parts, strict=False) if part is not None]
         else:
-            last = first + (self.force_rows if force else len(moments))
-            self._where += [(row, column) for row in range(first, last)]
+            count = self.force_rows if force else self.moment_rows
+            self._where += [(first + k, column) for k in range(count)]
         if force and self._places[action.joint] != side.pivot:
             self._where += [(row, column) for row in levers]
 
@@ -137,10 +138,10 @@ class JointMatrix:
             )
         return rows
 
-    def sides(self, action: Action) -> tuple[Side, ...]:
+    def sides(self, action: Action) -> tuple[ActionSide, ...]:
         """Return the links of an action that move, ``action.link`` with the sign +1 first."""
         return tuple(
-            Side(self.rows[name], self.pivots[name], sign)
+            ActionSide(self.rows[name], self.pivots[name], sign)
             for name, sign in ((action.link, 1.0), (action.to, -1.0))
             if name != GROUND
         )

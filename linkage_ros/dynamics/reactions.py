@@ -36,7 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property
-from itertools import accumulate, chain
+from itertools import accumulate, chain, islice
 from math import sin
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -54,6 +54,7 @@ from linkage_ros.dynamics.joint_forms import (
     Direction,
     JointForm,
     JointForms,
+    LinkTurn,
     NONE,
     planar_bar,
     planar_forms,
@@ -169,13 +170,13 @@ class Reactions:
                 )
 
     @property
-    def published(self) -> tuple[int, ...]:
-        """The numbers of the joints of whose force some part is certain."""
+    def published_joints(self) -> tuple[int, ...]:
+        """Return the numbers of the joints of whose force some part is certain."""
         return tuple(number for number, (force, _) in enumerate(self.parts) if force)
 
     @property
     def uncertain(self) -> str:
-        """What is not certain, and why, in a line; '' if all is."""
+        """Return what is not certain, and why, in a line; '' if all is."""
         said: dict[str, list[str]] = {}
         for name, joint, parts in zip(self.names, self.joints, self.parts, strict=True):
             for what, part, units in zip(('force', 'moment'), parts, joint[4:6], strict=True):
@@ -223,7 +224,7 @@ class Reactions:
         matrix, vectors = self._matrix, self._vectors
         reactions: tuple[JointReaction, ...] = ()
         for number, joint in enumerate(self.joints):
-            values = iter(unknowns[self._first[number] :])
+            values = islice(unknowns, self._first[number], None)
             force, moment = [0.0] * matrix.force_rows, [0.0] * matrix.moment_rows
             for way in joint.forces:
                 _add_along(force, way, next(values), position, vectors.coordinates)
@@ -371,7 +372,8 @@ class Reactions:
         along, slid = None if isinstance(way, int) else way(position), 0.0
         for row, pivot, sign in matrix.sides(joint):
             turned = row + matrix.force_rows
-            turn = vectors.turn_from(moved[turned : turned + matrix.moment_rows])
+            last = turned + matrix.moment_rows
+            turn = vectors.turn_from(moved[turned:last])
             if joint.joint >= 0:
                 place = places[self._places[joint.joint]]
                 lever = vectors.scale(1.0 / self._scale, vectors.minus(place, places[pivot]))
@@ -548,7 +550,6 @@ class Reactions:
         """Add a load on a joint, a point or a link to the right sides of its links."""
         from linkage_ros.dynamics.applied import (
             JointCoordinate,  # local import: only with such loads
-            LinkTurn,  # local import: only with such loads
             LoadedPoint,  # local import: only with such loads
         )
 

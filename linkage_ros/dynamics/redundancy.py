@@ -80,11 +80,11 @@ def _vector(way: Direction, position: Position) -> Array:
 
 def _idle_forces(matrix: Array) -> Array:
     """Return the forces that balance each other, a row for each independent one; none if loose."""
-    sizes = np.abs(matrix).max(axis=0)
+    sizes, redundant = np.abs(matrix).max(axis=0), matrix.shape[1] - matrix.shape[0]
     _, values, directions = np.linalg.svd(matrix / sizes)
     if values[-1] < _SINGULAR * values[0]:
         return np.zeros((0, matrix.shape[1]))
-    return np.asarray(directions[len(matrix) :] / sizes)
+    return np.asarray(directions[-redundant:] / sizes)
 
 
 def _independent_columns(idle: Sequence[Array]) -> tuple[int, ...]:

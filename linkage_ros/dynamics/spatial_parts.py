@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from linkage_ros.dynamics.applied import LinkTurn
+from linkage_ros.dynamics.joint_forms import LinkTurn
 from linkage_ros.dynamics.loads import AppliedLoads
 from linkage_ros.dynamics.spatial_bodies import SPACE
 from linkage_ros.errors import DefinitionError

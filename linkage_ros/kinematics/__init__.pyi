@@ -173,7 +173,6 @@ from linkage_ros.kinematics.plane.topology import (
     GearedLinks as GearedLinks,
     Group as Group,
     Iterated as Iterated,
-    Joint as Joint,
     links_of as links_of,
     Structure as Structure,
 )

@@ -53,7 +53,7 @@ class CompiledTick(NamedTuple):
     rates: list[str]
     accelerations: list[str]
     efforts: list[str]
-    reactions: list[list[str]]  # The values of each reaction, as expressions; likewise
+    reactions: list[tuple[str, ...]]  # The values of each reaction, as expressions; likewise
 
 
 def compile_tick(interpreted: InterpretedTick) -> Callable[[int], Tick] | None:
@@ -245,8 +245,8 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         lines += _unwrap_lines(linkage.running.places, joints, leave)
     crank, given = 'crank' if exerts else f'({_CRANK_FIELDS})', '()' if loads is None else 'given'
     reading = joints, rates, accelerations, efforts
-    each = max(1, len(reactions) // len(linkage.context.reactions.joints)) if reactions else 1
-    wrenches = [reactions[k : k + each] for k in range(0, len(reactions), each)]
+    each = len(reactions) // len(linkage.context.reactions.joints) if reactions else 1
+    wrenches = [*zip(*[iter(reactions)] * each, strict=True)]
     return CompiledTick(lines, bound, crank, given, *reading, wrenches)
 
 

@@ -62,11 +62,12 @@ def check_forces(reactions, closure, state, given, wrenches):
         axis = np.zeros(3)
         if pair is not None:
             axis = frames.turned(pair.parent, pair.axis) / np.linalg.norm(pair.axis)
-        for part, expected, number in zip(parts, (force, moment), (0, 3), strict=True):
+        both = zip(parts, (force, moment), (reaction[:3], reaction[3:]), strict=True)
+        for part, expected, numbers in both:
             along = axis * (axis @ expected)
             kept = {'whole': expected, 'across': expected - along, 'along': along}
             certain = kept.get(part, np.zeros(3))
-            assert reaction[number : number + 3] == pytest.approx(certain, abs=1e-9 * (1 + size))
+            assert numbers == pytest.approx(certain, abs=1e-9 * (1 + size))
             checked += part != ''
     assert position.status.has_rates
     return checked

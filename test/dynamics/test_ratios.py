@@ -119,7 +119,7 @@ def test_what_teeth_press_on_bearings_is_not_certain() -> None:
     """No file says the radii of the wheels; what they need of the drive is certain."""
     mechanics = Mechanics(pinion_and_rack(), Loads(gravity=(-9.81, 0.0)))
     reactions = Reactions(mechanics)
-    assert reactions.published == ()
+    assert reactions.published_joints == ()
     assert reactions.uncertain.startswith('force in O, way; moment in way: teeth and belts press')
     motion = motion_of(mechanics.closure, 0.7, 3.0, -2.0)
     assert reactions.drive_efforts(*motion) == pytest.approx(mechanics.drive_efforts(*motion))
@@ -156,7 +156,7 @@ def test_forces_behind_a_gear_are_those_without_it() -> None:
     assert found is not None
     assert right is not None
     expected = dict(zip(plain.names, right, strict=True))
-    published = {behind.names[number]: found[number] for number in behind.published}
+    published = {behind.names[number]: found[number] for number in behind.published_joints}
     assert {*published} == {*expected} - {'O2'}
     for name, reaction in published.items():
         assert reaction == pytest.approx(expected[name], rel=1e-11, abs=1e-13)

@@ -198,7 +198,8 @@ class AbsoluteMotion:
 
         ``loads`` are forces and moments on links: link, place now, force, moment.
         """
-        return self._multipliers(gravity, loads)[-len(self.linkage.driven) :]
+        multipliers = self._multipliers(gravity, loads)
+        return multipliers[-len(self.linkage.driven):]  # fmt: skip
 
     def wrenches(self, gravity=(0.0, 0.0, 0.0), loads=()):
         """
@@ -212,7 +213,7 @@ class AbsoluteMotion:
         for (one, other), row, size in zip(self.owners, self.equations, multipliers, strict=False):
             link, to = sorted((one, other), key=lambda name: (name == 'ground', name))
             first = 6 * self.moving.index(link)
-            force, moment = (size * row[first + k : first + k + 3] for k in (0, 3))
+            force, moment = size * row.reshape(-1, 2, 3)[first // 6]
             moment = moment + np.cross(self.frames[link][1], force)
             before = found.get((link, to), np.zeros((2, 3)))
             found[link, to] = before + np.array([force, moment])

@@ -117,13 +117,13 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
         from linkage_ros.messages import JointWrenchWriter  # local import: if published
 
         forces = context.reactions
-        if not forces.published:
+        if not forces.published_joints:
             raise DefinitionError(
                 'effects.pin_forces',
                 f'none of them is certain: {forces.uncertain}',
                 'leave it out',
             )
-        names = [context.prefix + forces.names[number] for number in forces.published]
+        names = [context.prefix + forces.names[number] for number in forces.published_joints]
         write = JointWrenchWriter(names, planar=isinstance(context.closure, Closure)).write
         if len(names) == len(forces.names):
 
@@ -134,7 +134,7 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
 
         def write_certain(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
             found = motion.reactions
-            return write(now, [found[n] for n in forces.published]) if found else b''
+            return write(now, [found[n] for n in forces.published_joints]) if found else b''
 
         return write_certain
 
