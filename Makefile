@@ -35,7 +35,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test_all bench accuracy topologies synthesis round_trips gallery schema reference effects docs lint format
+.PHONY: help demo test test_all bench accuracy topologies round_trips gallery schema reference effects docs lint format
 .PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled arrays planar_loops
 
 help:
@@ -50,7 +50,6 @@ help:
 	@echo 'make planar_loops  solve 660,000 states of planar loops in space, through change points (4 min)'
 	@echo 'make compiled  compare 100,000 states in C, Python and JavaScript with the plain steps (8 min)'
 	@echo 'make accuracy_page  measure where errors come from, into docs/accuracy.md (8 min)'
-	@echo 'make synthesis compute docs/synthesis.md and its pictures'
 	@echo 'make round_trips  design 1.7 million linkages back from their own pairs of angles'
 	@echo 'make damage    truncate a bag at every byte, flip every bit, into docs/recordings (one to three hours)'
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
@@ -196,9 +195,6 @@ arrays: $(STAMP)
 
 accuracy_page: $(STAMP)
 	@$(BIN)/python -m docs.make_accuracy
-
-synthesis: $(STAMP)
-	@$(BIN)/python -m docs.make_synthesis
 
 round_trips: $(STAMP)
 	@$(BIN)/python -m campaigns.synthesis

@@ -61,7 +61,7 @@ COMMANDS = {
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'view': 'show a linkage in the browser, to drag, drive and edit it; a scene, a node or a bag',
     'draw': 'draw a linkage, and its joints over its range',
-    'animate': 'animate a linkage over its range, or a part of a run: GIF, MP4 or SVG',
+    'animate': 'animate a linkage over its range: GIF, MP4 or SVG',
     'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',
     'fmu': 'write a scene as an FMI 3.0 co-simulation FMU, for test benches without ROS',
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',

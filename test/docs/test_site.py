@@ -28,7 +28,7 @@ for needed in ('sphinx', 'myst_parser', 'furo', 'matplotlib'):
     pytest.importorskip(needed, reason="pip install '.[docs]'")
 
 DOCS = ROOT / 'docs'
-NOT_PAGES = ('website', 'pictures', 'synthesis_page')
+NOT_PAGES = ('website', 'pictures')
 LOOKED_AT = (
     *('index', 'start', 'tutorial', 'effects', 'gallery', 'troubleshooting', 'faq'),
     *('how_to/robot', 'how_to/moveit', 'reference/topics', 'reference/files'),

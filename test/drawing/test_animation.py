@@ -9,7 +9,7 @@
 """A moving picture shows each link where the closure, or the recorded run, has it."""
 
 from itertools import pairwise
-from math import cos, hypot, isnan, radians
+from math import cos, hypot, radians
 from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
@@ -19,13 +19,11 @@ from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import frames_of_links, prepare_view, usual_inputs
 from linkage_ros.tools.drawing import animate, check_kind, range_motion, RATE
-from linkage_ros.tools.view.report import find_run_motion, Window
 import numpy as np
 import pytest
 
 from ..browser.chromium import browser
 from ..browser.opened import opened
-from ..report.runs import but, read, recorded
 
 image = pytest.importorskip('PIL.Image')
 pytest.importorskip('matplotlib')
@@ -135,67 +133,6 @@ def test_a_gif_shows_a_turn_in_its_time_and_is_small(tmp_path):
     assert file.stat().st_size < 150_000 * 2.0
 
 
-# A run of a four-bar at 1 kHz, whose crank turns at 7 rad/s; ticks 400 to 699 never were.
-
-
-@pytest.fixture(scope='module')
-def gapped(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('gapped')
-    return recorded(
-        folder, moments=but(1000, lambda tick, moment: None if 400 <= tick < 700 else moment)
-    )
-
-
-def test_links_of_a_run_are_where_their_recorded_joints_put_them(gapped):
-    found = read(gapped)
-    motion = find_run_motion(found, 'run', 1.0)
-    crank = motion.links.index('crank')
-    rocker = motion.links.index('rocker')
-    for time, frames, values in zip(motion.x, motion.frames, motion.values, strict=True):
-        if 0.399 < time < 0.7:
-            continue
-        angle = 0.007 * round(1000.0 * time)
-        position = found.linkages[0].closure.position(angle)
-        assert cos(frames[crank, 2] - angle) > cos(0.0071)  # at most a tick away
-        assert cos(frames[rocker, 2] - values[1]) == pytest.approx(1.0)
-        assert cos(values[1] - position.joints[1]) > cos(0.02)
-
-
-def test_a_gap_hides_the_linkage_and_interrupts_the_curves(gapped, tmp_path):
-    motion = find_run_motion(read(gapped), 'run', 1.0)
-    within = (motion.x > 0.41) & (motion.x < 0.69)
-    assert within.any()
-    assert np.isnan(motion.frames[within]).all()
-    assert np.isnan(motion.values[within]).all()
-    assert np.isfinite(motion.frames[~within & (motion.x < 0.39)]).all()
-    for joint in motion.joints:
-        gaps = [x for x, y in zip(joint.x, joint.y, strict=True) if isnan(y)]
-        assert len(gaps) == 1
-        assert 0.398 < gaps[0] < 0.401
-    file = tmp_path / 'x.svg'
-    animate(motion, file)
-    assert 'nan' not in file.read_text('utf-8')
-    held = rules(file)['link0']
-    hidden = {at for at, each in held.items() if each['visibility'] == 'hidden'}
-    assert {39.0 < at < 71.0 for at in hidden} == {True}
-    # It does not fly from the last pose before the gap to the first one after it.
-    before, after = max(at for at in held if at < 40.0), max(hidden)
-    assert held[before]['animation-timing-function'] == 'step-end'
-    assert held[after]['animation-timing-function'] == 'step-end'
-
-
-def test_a_part_of_a_run_begins_and_ends_as_named(gapped):
-    motion = find_run_motion(read(gapped, Window(100_000_000, 300_000_000)), 'run', None)
-    assert motion.x[0] == pytest.approx(0.1, abs=2e-3)
-    assert motion.x[-1] == pytest.approx(0.3, abs=0.02)
-    assert motion.title == 'run, 0.2 times as fast'  # the shortest picture takes a second
-
-
-def test_a_part_without_joint_states_is_refused(gapped):
-    with pytest.raises(LinkageError, match='holds no joint states in this part'):
-        find_run_motion(read(gapped, Window(450_000_000, 600_000_000)), 'run', 1.0)
-
-
 @pytest.mark.parametrize('seconds', ['0', '-1', '31', 'nan'])
 def test_a_time_out_of_bounds_is_told_with_them(tmp_path, monkeypatch, capsys, seconds):
     monkeypatch.chdir(tmp_path)
@@ -206,7 +143,7 @@ def test_a_time_out_of_bounds_is_told_with_them(tmp_path, monkeypatch, capsys, s
 
 def test_a_file_of_another_kind_is_refused_before_anything_is_read(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(['animate', 'no_such_bag.mcap', '-o', 'x.png']) == 2
+    assert main(['animate', 'no_such_linkage', '-o', 'x.png']) == 2
     said = capsys.readouterr().err
     assert said == (
         "linkage animate: x.png: ends in '.png'; name a file that ends in .gif or .mp4 or .svg\n"

@@ -49,7 +49,7 @@ def rad(*degrees: float) -> Angles:
 
 # Crank angles, rocker angles, ground; the source of the pairs.
 PUBLISHED: dict[str, tuple[Angles, Angles, float]] = {
-    # The worked text this package starts from (see docs/synthesis.md).
+    # The worked text this package starts from.
     'coordinated': (rad(25, 35, 50), rad(30, 40, 60), 1.0),
     # Ohio State University, ME 3751, lecture 12, as in the repository
     # github.com/haijunsu-osu/rocker_synthesis_4bar, test_synthesis.js; inches.

@@ -90,14 +90,13 @@ class AnimatedMotion(NamedTuple):
 
     title: str  # What moves
     view: LinkageView  # The linkage, in the pose in which its shapes are made
-    repeats: bool  # Whether it ends where it begins
     links: Sequence[str]  # The links and the blocks of sliders that move
     # Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN if
     # unknown: the linkage is hidden then.
     frames: Any
-    # Abscissa of the mark at the instants: the first input, in [rad] or [m], or time, in [s].
+    # Abscissa of the mark at the instants: the first input, in [rad] or [m].
     x: Any
-    # Its name, and the unit in which it is shown: °, m or s.
+    # Its name, and the unit in which it is shown: ° or m.
     x_name: str
     x_unit: str
     joints: Sequence[Curve]  # The curves of the joints
@@ -164,7 +163,6 @@ def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMoti
     return AnimatedMotion(
         title,
         shown,
-        True,
         links,
         frames,
         np.array(x),
@@ -410,7 +408,7 @@ def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
     count = len(motion.x)
     keys = list(range(0, count, _STEP))
     times = [100.0 * key / count for key in keys]
-    keys, times = [*keys, 0 if motion.repeats else count - 1], [*times, 100.0]
+    keys, times = [*keys, 0], [*times, 100.0]
     rules = [_STYLE.format(seconds=count / RATE)]
     firsts = {}
     for index, link in enumerate(motion.links):

@@ -7,10 +7,9 @@
 # language governing permissions and limitations under the License.
 
 """
-Animate a linkage through the range of its first input, or a recorded run, beside its joints.
+Animate a linkage through the range of its first input, beside its joints.
 
-A turn begins at the usual pose; a limited range is shown there and back. Of a run the first
-linkage is shown, each link where its recorded joint puts it.
+A turn begins at the usual pose; a limited range is shown there and back.
 """
 
 from __future__ import annotations
@@ -20,11 +19,9 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag import is_bag_name, layout_of
 from linkage_ros.cli import (
     add_output,
     add_robot,
-    open_bag,
     output_or,
     robot_of,
     show_progress,
@@ -40,8 +37,6 @@ from linkage_ros.tools.drawing import (
     check_kind,
     range_motion,
 )
-from linkage_ros.tools.view.part_of_run import add_window, read_part, window_of
-from linkage_ros.tools.view.report import find_run_motion
 
 _TURN = 4.0
 """How long a range is shown, in [s]."""
@@ -51,17 +46,15 @@ EXAMPLE = 'linkage animate jansen_leg -o leg.gif'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        'file', metavar='FILE|BAG', help='linkage file, a name of linkage gallery, or a bag'
-    )
+    parser.add_argument('file', metavar='FILE', help='linkage file, or a name of linkage gallery')
     add_output(parser, ANIMATION_KINDS, 'FILE.gif in this folder')
     parser.add_argument(
         '--seconds',
         type=float,
+        default=_TURN,
         metavar='SECONDS',
-        help=f'how long it lasts; without it {_TURN:g} s, or as long as the run, up to 10 s',
+        help='how long it lasts (default: %(default)g)',
     )
-    add_window(parser)
     add_robot(parser)
 
 
@@ -70,7 +63,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     given = Path(arguments.file)
     file = output_or(arguments, Path(f'{given.stem}.gif'))
     check_kind(file)
-    motion = _load_motion(arguments, given, stop)
+    motion = _load_motion(arguments, given)
     with show_progress('pictures') as advance:
 
         def report_picture(done: int, of: int) -> None:
@@ -83,17 +76,9 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def _load_motion(arguments: argparse.Namespace, given: Path, stop: Event) -> AnimatedMotion:
-    if is_bag_name(given):
-        window = window_of(arguments.since, arguments.until)
-        bag = open_bag(given, stop)
-        layouts = [layout_of(path) for path in bag.files]
-        trusted = arguments.trust_effects
-        found, scene, _ = read_part(bag, layouts, window, stop, trust_effects=trusted)
-        return find_run_motion(found, scene.name if scene else given.name, arguments.seconds)
+def _load_motion(arguments: argparse.Namespace, given: Path) -> AnimatedMotion:
     content = linkage_content(named_file(arguments.file, 'linkages'), robot_of(arguments))
     closure: Any = read_any_closure(content, given.stem)
     check_planar(arguments.file, closure.linkage)
     shown = prepare_view(closure, usual_inputs(closure))._replace(length=content.units.length)
-    seconds = _TURN if arguments.seconds is None else arguments.seconds
-    return range_motion(shown, given.stem, seconds)
+    return range_motion(shown, given.stem, arguments.seconds)

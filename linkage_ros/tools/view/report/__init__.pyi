@@ -71,4 +71,3 @@ from linkage_ros.tools.view.report.run import (
     Silences as Silences,
     Window as Window,
 )
-from linkage_ros.tools.view.report.run_motion import find_run_motion as find_run_motion
