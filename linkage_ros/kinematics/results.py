@@ -185,6 +185,7 @@ class LoopClosure(Protocol):
     def jacobian(self, position: Position) -> Array: ...
     def solve(self, *inputs: Any, rates: Any, derivatives: int) -> Any: ...  # A `Batch`
     def measuring(self, *names: str) -> Any: ...  # Likewise a closure
+
     def find_branch(
         self, joint: str, number: int | None = None, near: float | None = None
     ) -> Any: ...  # A `CrankBranch`

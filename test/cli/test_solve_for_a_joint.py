@@ -72,11 +72,13 @@ def test_as_many_joints_as_inputs_become_inputs(linkage: Run) -> None:
 @pytest.mark.parametrize(
     ('name', 'joints'),
     [
-        ('four_bar', ['rocker_joint']), ('rssr', ['rocker_joint']), ('five_bar', ['left_elbow',
-         'right_elbow']), ('wishbone', ['upper_joint', 'rack']),
+        ('four_bar', ['rocker_joint']),
+        ('rssr', ['rocker_joint']),
+        ('five_bar', ['left_elbow', 'right_elbow']),
+        ('wishbone', ['upper_joint', 'rack']),
         ('spherical_four_bar', ['rocker']),
     ],
-)  # fmt: skip
+)
 def test_values_that_are_not_reached_are_refused_in_plane_and_space(
     name: str, joints: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -230,7 +230,8 @@ def _reached_limits(
         if not position.joints or position.status is Status.LIMITED:
             continue
         for k, way in product(range(len(steps)), (-1, 1)):
-            beside = (*place[:k], place[k] + way, *place[k + 1 :])
+            after = k + 1
+            beside = (*place[:k], place[k] + way, *place[after:])
             if beside not in met:
                 met.add(beside)
                 waiting.append(beside)

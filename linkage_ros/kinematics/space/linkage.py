@@ -179,7 +179,7 @@ class SpaceLinkage(JointedLinkage):
     def with_limits(self, limits: Mapping[str, Limits]) -> SpaceLinkage:
         """Return the linkage with other limits of some joints."""
 
-        def limited(joints: Mapping[str, SpatialJoint]) -> dict[str, SpatialJoint]:
+        def limit_joints(joints: Mapping[str, SpatialJoint]) -> dict[str, SpatialJoint]:
             return {
                 name: replace(joint, limits=limits.get(name, joint.limits))
                 for name, joint in joints.items()
@@ -188,8 +188,8 @@ class SpaceLinkage(JointedLinkage):
         of_struts = {name: of for name, of in limits.items() if name in self.struts}
         return replace(
             self,
-            hinges=limited(self.hinges),
-            slides=limited(self.slides),
+            hinges=limit_joints(self.hinges),
+            slides=limit_joints(self.slides),
             strut_limits={**self.strut_limits, **of_struts},
         )
 

@@ -61,7 +61,6 @@ from linkage_ros.tools.design.pairs.freudenstein import (
     fit_equation as fit_equation,
     solve_links as solve_links,
     three_pairs as three_pairs,
-    ThreePairs as ThreePairs,
 )
 from linkage_ros.tools.design.pairs.zero_search import (
     search_zeros as search_zeros,
@@ -97,9 +96,4 @@ from linkage_ros.tools.design.study import (
     DesignFound as DesignFound,
     scipy_optimize as scipy_optimize,
     search as search,
-)
-from linkage_ros.tools.design.synthesis_tasks import DesignAnswer as DesignAnswer
-from linkage_ros.tools.design.synthesize_command import (
-    add_arguments as add_arguments,
-    find_solutions as find_solutions,
 )

@@ -11,7 +11,6 @@ from linkage_ros.tools.drawing.animation import (
     AnimatedMotion as AnimatedMotion,
     ANIMATION_KINDS as ANIMATION_KINDS,
     check_kind as check_kind,
-    count_of as count_of,
     range_motion as range_motion,
     RATE as RATE,
 )
