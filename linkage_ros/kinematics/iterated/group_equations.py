@@ -76,14 +76,6 @@ class GroupEquations(Equations):
         self._placed = _place_bodies(constraints, bodies)
         by_pins = {each.end.body for each in self._placed}
         self.free = tuple(k for k in range(3 * bodies) if not k % 3 or k // 3 not in by_pins)
-        self._rows_of_pins = {each.row + axis for each in self._placed for axis in (0, 1)}
-        rows = [
-            (constraint, axis)
-            for constraint in constraints
-            for axis in range(1 + isinstance(constraint, CoincidentPoints))
-        ]
-        self.closing = [row for row in range(len(rows)) if row not in self._rows_of_pins]
-        self._closing_constraints = [rows[row][0] for row in self.closing]
         self._sums = ArmSums({each.end.body: (each.end, each.other) for each in self._placed})
         # The last first: its place is in no other of the equations that remain.
         self.unit_pivots = [
@@ -91,6 +83,14 @@ class GroupEquations(Equations):
             for each in reversed(self._placed)
             for axis in (0, 1)
         ]
+        rows = [
+            constraint
+            for constraint in constraints
+            for _ in range(1 + isinstance(constraint, CoincidentPoints))
+        ]
+        rows_of_pins = {row for row, _ in self.unit_pivots}
+        self.closing = [row for row in range(len(rows)) if row not in rows_of_pins]
+        self._closing_constraints = [rows[row] for row in self.closing]
 
     def complete(self, values: Sequence[Any], solved: LinkState) -> list[Any]:
         unknowns: list[Any] = [0.0] * len(self.angles)

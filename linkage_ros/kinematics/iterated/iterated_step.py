@@ -249,11 +249,8 @@ class IteratedStep(Step):
         """Return other solutions at the inputs of the pose, that random starts lead to."""
         if self.solution is None:
             return []
-        equations, random = self._equations, Random(count)
-        known, pose = (
-            require_state(self._before.known_at(self._before.inputs)),
-            self.solution.tolist(),
-        )
+        equations, random, pose = self._equations, Random(count), self.solution.tolist()
+        known = require_state(self._before.known_at(self._before.inputs))
         found, places = [], [equations.list_places(known, pose)]
         for number in range(count):
             tell_progress('starts of other assemblies tried', number, count)

@@ -10,8 +10,8 @@
 Other assemblies of links that are iterated: further solutions at the inputs of the pose.
 
 Their number is not known beforehand (a platform on three arms has at most six; K. H. Hunt, J.
-Mech. Transm. Autom. Des. 105, 1983). The search starts from random angles, with the places that
-minimise the residuals of the constraints. Its results are assemblies; others may exist.
+Mech. Transm. Autom. Des. 105, 1983). The search starts from random angles, see
+`IteratedStep.other_solutions`. Its results are assemblies; others may exist.
 """
 
 from __future__ import annotations
