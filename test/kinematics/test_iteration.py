@@ -135,6 +135,30 @@ def test_near_a_limit_its_conditioning_falls_to_nothing():
     assert found[-1] < 1e-2 * found[0]
 
 
+@pytest.mark.parametrize('first', [True, False])
+def test_links_that_one_of_two_inputs_moves_follow_its_branch(first):
+    """A second crank on the ground changes nothing of them, to the last bit."""
+    alone = shipped('class_3')
+    spare = Input('spare_joint', GROUND, 'spare')
+    own = alone.inputs
+    both = Closure(
+        replace(
+            alone,
+            links={**alone.links, 'spare': {'O2': (0.0, 0.0), 'end': (0.05, 0.0)}},
+            inputs=(spare, *own) if first else (*own, spare),
+            pose=replace(alone.pose, inputs=(0.0, *alone.pose.inputs)),
+        )
+    )
+    closure = Closure(alone)
+    (step,) = (step for step in both.steps if step.iterates)
+    assert step.branch() is not None
+    assert both.grids == []
+    for crank in np.linspace(-7.0, 7.0, 29).tolist():
+        inputs = (0.3, crank) if first else (crank, 0.3)
+        one, other = closure.position(crank), both.position(*inputs)
+        assert (one.status, one.joints) == (other.status, other.joints)
+
+
 def test_a_pose_that_leads_nowhere_is_an_open_loop():
     # The pose's input is beyond the limit: there is nothing to continue from.
     sound = class_3_linkage()

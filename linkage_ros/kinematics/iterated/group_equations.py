@@ -197,6 +197,7 @@ def make_iterated_step(
         start,
         grid_inputs(linkage.inputs, inputs, planner.scale),
         far,
-        found.turns,
+        # With ratios, turns of the first input alone are counted.
+        0 if linkage.ratios and len(inputs) > 1 else found.turns,
     )
     return step, [*found.slides]
