@@ -19,6 +19,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import dist, frexp, isfinite, ldexp
+from typing import ClassVar
 
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics.checks import (
@@ -128,7 +129,8 @@ class SpaceLinkage(JointedLinkage):
 
     """
 
-    axes = ('x', 'y', 'z')
+    axes: ClassVar = ('x', 'y', 'z')
+    """The names of the axes of the ground."""
 
     points: Mapping[str, Vector]
     links: Mapping[str, tuple[str, ...]]
