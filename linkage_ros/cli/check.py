@@ -95,9 +95,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     with show_progress('parts examined') as advance:
         described, tables = _describe_linkage(closure, advance)
         if arguments.branches:
-            if not isinstance(closure, Closure):
-                raise LinkageError('--branches', 'is for planar linkages', 'leave it out')
-            tables.append(_branches_table(closure))
+            tables = [*tables, _branches_table(closure)]
             described |= tables_json(tables[-1:])
     account = {'file': arguments.file, **described}
     show_result(Result(account, [*_linkage_tables(account, tables, units)]), arguments, units)
@@ -187,7 +185,7 @@ def _limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
     ]
 
 
-def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
+def _list_branches(closure: StepwiseClosure) -> Iterator[tuple[Any, ...]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
     linkage = closure.linkage
     if len(linkage.inputs) > 1:
@@ -477,7 +475,7 @@ def _links_of(closure: StepwiseClosure, number: int) -> list[str]:
     return closure.links_of_group(number)
 
 
-def _branches_table(closure: Closure) -> Table:
+def _branches_table(closure: StepwiseClosure) -> Table:
     given = closure.linkage.inputs[0]
 
     def input_text(value: float, units: DisplayUnits) -> str:

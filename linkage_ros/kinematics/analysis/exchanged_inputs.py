@@ -186,16 +186,18 @@ def check_moved(closure: LoopClosure, names: Sequence[str], position: Position) 
 
 def turn_to_pose(closure: LoopClosure, values: Sequence[float]) -> tuple[float, ...]:
     """
-    Return values of several inputs; angles without limits in the turn that is nearest to the pose.
+    Return values of several inputs; angles beyond limits in the turn that is nearest to the pose.
 
-    Links that close only together are followed from there, and not a turn away.
+    So are those without limits: links that close only together are followed from there, and not a
+    turn away.
     """
     inputs, home = closure.linkage.inputs, closure.linkage.pose.inputs
     if len(inputs) == 1:
         return tuple(values)
     return tuple(
         value
-        if given.slider or given.limits.is_bounded
+        if given.slider
+        or (given.limits.is_bounded and given.limits.low <= value <= given.limits.high)
         else value - tau * round((value - at) / tau)
         for value, given, at in zip(values, inputs, home, strict=True)
     )
@@ -217,32 +219,43 @@ def _reached_limits(
         for name in names
         if not own.get(name, NO_LIMITS).is_bounded
     }
+    turns = [tau if closure.turning[row] else inf for row in rows.values()]
     steps = [_STEP * (closure.scale if given.slider else 1.0) for given in closure.linkage.inputs]
-    waiting = [(0,) * len(steps)]
-    met, reached = {*waiting}, []
+    first = closure.position(*at).joints
+    if not first:
+        return {}
+    # Each place of the lattice with the values of a neighbour, by which angles are in one turn.
+    waiting = [((0,) * len(steps), [first[row] for row in rows.values()])]
+    met, reached = {waiting[0][0]}, []
     while waiting:
-        place = waiting.pop()
-        position = closure.position(
-            *(x + k * by for x, k, by in zip(at, place, steps, strict=True))
-        )
-        if position.joints:
-            reached.append(position.joints)
-        if not position.joints or position.status is Status.LIMITED:
+        place, near = waiting.pop()
+        inputs = (x + k * step for x, k, step in zip(at, place, steps, strict=True))
+        position = closure.position(*inputs)
+        if not position.joints:
+            continue
+        found = [position.joints[row] for row in rows.values()]
+        values = [
+            value - turn * round((value - by) / turn) if turn < inf else value
+            for value, by, turn in zip(found, near, turns, strict=True)
+        ]
+        reached.append(values)
+        if position.status is Status.LIMITED:
             continue
         for k, way in product(range(len(steps)), (-1, 1)):
             after = k + 1
             beside = (*place[:k], place[k] + way, *place[after:])
             if beside not in met:
                 met.add(beside)
-                waiting.append(beside)
+                waiting.append((beside, values))
         if len(met) > _MOST_MET:
             return {}
-    found = {}
-    for name, row in rows.items():
-        values = [joints[row] for joints in reached]
-        limits = own.get(name, NO_LIMITS)
-        found[name] = replace(limits, low=min(values), high=max(values))
-    return found
+    ends = zip(
+        map(min, zip(*reached, strict=True)), map(max, zip(*reached, strict=True)), strict=True
+    )
+    return {
+        name: replace(own.get(name, NO_LIMITS), low=low, high=high)
+        for name, (low, high) in zip(rows, ends, strict=True)
+    }
 
 
 class PlaneExchange:

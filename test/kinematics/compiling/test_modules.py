@@ -22,7 +22,7 @@ from typing import Any
 
 from campaigns.topologies.families import FAMILIES
 import linkage_ros as lr
-from linkage_ros.kinematics import Closure, Limits
+from linkage_ros.kinematics import Closure, Limits, turn_to_pose
 from linkage_ros.tools.models.source_code import (
     C,
     FUNCTIONS,
@@ -83,7 +83,7 @@ def planar_group_of_two_inputs():
 
 @pytest.mark.parametrize('language', [JavaScript(), C('hexapod', header=False), PythonModule(2)])
 def test_what_has_too_many_cells_is_not_written(language):
-    told = '6 inputs .* too many cells; give these inputs limits'
+    told = '6 inputs .* too many cells; give the inputs of the file limits'
     with pytest.raises(lr.DefinitionError, match=told):
         write_source(subject(closure_of('hexapod')), language)
 
@@ -303,6 +303,71 @@ def test_a_source_of_a_linkage_that_a_dependent_joint_drives(run, name, joint, t
                 assert one == expected, state
         assert undecided < 5
         assert sum(one.status == 'CLOSED' for one in told) > 100
+
+
+EXCHANGED = {
+    'five_bar': (
+        ('A-B', 'P.y'),
+        ('left_forearm.angle', 'P.x'),
+        ('left_crank_joint', 'left_elbow'),
+    ),
+    'ankle_motors': (('pitch', 'roll'), ('c1.z', 'roll')),
+    'ankle': (('m1', 'c2.z'),),
+    'delta': (('x', 'y', 'z'),),
+    'wishbone': (('upper_joint', 'rack'),),
+    'rssr': (('B.x',), ('rocker_joint',)),
+    'gripper': (('left_pad-right_pad',),),
+}
+"""For each linkage what is given instead of its inputs: joints, coordinates, distances, angles."""
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize(
+    'run',
+    [
+        run_python,
+        pytest.param(run_c, marks=needs['C99']),
+        pytest.param(run_javascript, marks=needs['JavaScript']),
+    ],
+)
+@pytest.mark.parametrize(
+    ('name', 'joints'), [(name, joints) for name, sets in EXCHANGED.items() for joints in sets]
+)
+def test_source_of_what_is_driven_by_joints_coordinates_distances_and_angles(
+    run, name, joints, tmp_path
+):
+    """There and back: the linkage itself has the joints that were asked for, and their rates."""
+    random, closure = Random(name), closure_of(name)
+    pose = closure.linkage.pose.inputs if closure.linkage.pose else (1.1, 1.2)
+    inputs = tuple(
+        replace(given, limits=Limits(at - 0.2, at + 0.2)) if name == 'five_bar' else given
+        for given, at in zip(closure.linkage.inputs, pose, strict=True)
+    )
+    if name == 'five_bar':
+        closure = Closure(replace(closure.linkage, inputs=inputs))
+    measured = closure.measuring(*joints)
+    given, starts = [], []
+    for _ in range(20):
+        starts.append([at + random.uniform(0.02, 0.12) for at in pose])
+        rates = [random.uniform(-1.0, 1.0) for _ in pose]
+        position = measured.position(*starts[-1])
+        velocity = measured.velocity(position, *rates)
+        acceleration = measured.acceleration(position, velocity, *rates)
+        motion = (position, velocity, acceleration)
+        given.append(tuple(part[joint] for part in motion for joint in joints))
+        starts[-1] = [*starts[-1], *rates, *rates]
+    inverse = closure.driven_by(*joints, near=[at + 0.07 for at in pose])
+    given = [(*turn_to_pose(inverse, state[: len(pose)]), *state[len(pose) :]) for state in given]
+    former = [one for one in closure.input_names if one not in joints]
+    found = run(subject(inverse, joints=former), given, tmp_path)
+    places = [closure.input_names.index(one) + len(pose) * k for k in range(3) for one in former]
+    for one, start in zip(found, starts, strict=True):
+        assert one.status == 'CLOSED'
+        for value, place in zip(one.values, places, strict=True):
+            off = value - start[place]
+            turns = place < len(pose) and not closure.linkage.inputs[place].slider
+            off = math.remainder(off, math.tau) if turns else off
+            assert off == pytest.approx(0.0, abs=1e-11 if place < len(pose) else 1e-8)
 
 
 def test_a_spatial_linkage_is_driven_by_any_of_its_joints():
