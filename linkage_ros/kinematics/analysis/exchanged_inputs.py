@@ -10,9 +10,9 @@
 """
 A linkage with other joints as its inputs: another plan, the same assembly.
 
-Planes and spaces differ in how a linkage with other inputs is written down, which `PlaneExchange`
-does for the plane. All else is here: which state gives the assembly, whether the names move the
-linkage there, and whether what is planned has the joints of the linkage.
+Plane and space differ in how a linkage with other inputs is written down: `PlaneExchange` does it
+for the plane, `SpaceClosure.plan_exchange` in space. All else is here: which state gives the
+assembly, whether the names move the linkage there, and whether what is planned has its joints.
 """
 
 from __future__ import annotations
@@ -209,9 +209,9 @@ def _reached_limits(
     """
     Return limits of joints that have none: what those of the linkage let them reach from a state.
 
-    They are sought on a lattice, from neighbour to neighbour, and include the first states beyond.
-    None are returned if they are too many. They need not be exact, since the limits of the linkage
-    hold too: between them the cells of links are made that close only together.
+    They are sought on a lattice, from neighbour to neighbour, and include the first states beyond;
+    none are returned if the states are too many. They need not be exact, since the limits of the
+    linkage hold too: between them the cells of links are made that close only together.
     """
     own = closure.linkage.limits
     rows = {
@@ -226,12 +226,14 @@ def _reached_limits(
         return {}
     # Each place of the lattice with the values of a neighbour, by which angles are in one turn.
     waiting = [((0,) * len(steps), [first[row] for row in rows.values()])]
-    met, reached = {waiting[0][0]}, []
+    met, reached, longest = {waiting[0][0]}, [], [0.0] * len(rows)
+    opens = False
     while waiting:
         place, near = waiting.pop()
         inputs = (x + k * step for x, k, step in zip(at, place, steps, strict=True))
         position = closure.position(*inputs)
         if not position.joints:
+            opens = True
             continue
         found = [position.joints[row] for row in rows.values()]
         values = [
@@ -239,6 +241,8 @@ def _reached_limits(
             for value, by, turn in zip(found, near, turns, strict=True)
         ]
         reached.append(values)
+        ways = zip(longest, values, near, strict=True)
+        longest = [max(way, abs(value - by)) for way, value, by in ways]
         if position.status is Status.LIMITED:
             continue
         for k, way in product(range(len(steps)), (-1, 1)):
@@ -249,12 +253,11 @@ def _reached_limits(
                 waiting.append((beside, values))
         if len(met) > _MOST_MET:
             return {}
-    ends = zip(
-        map(min, zip(*reached, strict=True)), map(max, zip(*reached, strict=True)), strict=True
-    )
+    # Where loops open, the last state before may be two steps of the lattice away.
+    wider = [2.0 * way * opens for way in longest]
     return {
-        name: replace(own.get(name, NO_LIMITS), low=low, high=high)
-        for name, (low, high) in zip(rows, ends, strict=True)
+        name: replace(own.get(name, NO_LIMITS), low=min(values) - more, high=max(values) + more)
+        for name, values, more in zip(rows, zip(*reached, strict=True), wider, strict=True)
     }
 
 
