@@ -184,7 +184,8 @@ def _exchanged_table(
     if len(names) != count or len({*names}) != count:
         reason = f'{len(names)} for {count} inputs'
         raise LinkageError(', '.join(names), reason, f'name {count} different joints')
-    joints = closure.measuring(*names).linkage.joints
+    closure = closure.measuring(*names)
+    joints = closure.linkage.joints
     values = {
         name: arguments.angles.to_si(typed, joints[name].unit) for name, typed in arguments.joint
     }

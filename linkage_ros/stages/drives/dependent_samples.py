@@ -49,12 +49,12 @@ class ExchangedInputs:
 
     def __init__(self, closure: Closure, joints: Sequence[str], branch: int) -> None:
         try:
+            self._measured = measured = closure.measuring(*joints)
             self.branch: CrankBranch | None = None
             if len(closure.input_names) == 1 == len(joints):
-                self.branch = closure.find_branch(joints[0], branch or None)
+                self.branch = measured.find_branch(joints[0], branch or None)
                 branch = self.branch.number
-            self.inverse = closure.driven_by(*joints, branch=branch or None)
-            self._measured = closure.measuring(*joints)
+            self.inverse = measured.driven_by(*joints, branch=branch or None)
         except DefinitionError as error:
             key = 'drive.topic.branch' if branch else 'drive.topic.joint'
             raise DefinitionError(key, f'{error.where}: {error.reason}', error.remedy) from None
