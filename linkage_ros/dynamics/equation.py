@@ -33,9 +33,10 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import chain, islice
+from operator import mul
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
@@ -62,6 +63,7 @@ from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledM
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import AppliedForces
+    from linkage_ros.dynamics.dry_friction import DryFriction, Slip
     from linkage_ros.dynamics.laws import Law, LawTerm, Stribeck
 
 _ROUNDING = 1e-9
@@ -100,6 +102,7 @@ class InputTerms(NamedTuple):
     mobility: tuple[tuple[float, ...], ...]  # The rows of its inverse
     bias: tuple[float, ...]  # h: of inertia, weight, springs and dampers, and constant loads
     laws: tuple[InputLawTerm, ...] = ()  # One for each law of an applied force
+    slips: tuple[Slip, ...] = ()  # One for each joint with dry friction
 
     def inertia(self, row: int, column: int) -> float:
         """Return an element of M."""
@@ -122,6 +125,7 @@ class FrictionJoint(NamedTuple):
     that falls with the rate, if it has any.
     """
 
+    name: str
     joint: int
     friction: JointFriction
     one: int
@@ -176,6 +180,10 @@ class Mechanics:
         """Laws of the forces, in the order of ``Terms.laws``."""
         self.stribeck_joints = tuple(rubbing for rubbing in self.friction_joints if rubbing.law)
         """The joints whose friction falls with the rate; their laws are the last ones."""
+        self.dry_joints = tuple(
+            one for one in self.friction_joints if one.friction.coulomb or one.friction.breakaway
+        )
+        """The joints with dry friction by no force in them."""
         sticks = any(rubbing.friction.breakaway_excess for rubbing in self.friction_joints)
         self._has_no_laws = not sticks and self.applied is None
         """Whether the equation has neither laws nor an excess of friction at rest."""
@@ -284,7 +292,7 @@ class Mechanics:
         """
         Return the equation of motion of a linkage with several inputs, at their rates.
 
-        Return None as `motion_terms` does. Friction is no part of it but viscous friction.
+        Return None as `motion_terms` does. Of dry friction it has the slips alone.
         """
         if not position.status.has_rates:
             return None
@@ -331,11 +339,21 @@ class Mechanics:
         mobility = tuple(tuple(column) for column in columns if column)
         if len(mobility) < count or not all_finite((*chain(*mobility), *bias)):
             return None
+        slips: tuple[Slip, ...] = ()
+        if self.dry_joints:
+            from linkage_ros.dynamics.dry_friction import Slip  # local import: only with it
+
+            ways = [way.state.coordinates for way in alone]
+            a = still.state.coordinates
+            slips = tuple(
+                Slip(tuple(map(one.slip_rate, ways)), one.slip_rate(v), one.slip_rate(a))
+                for one in self.dry_joints
+            )
         if self.applied is None:
-            return InputTerms(matrix, mobility, bias)
+            return InputTerms(matrix, mobility, bias, (), slips)
         more, laws = self.applied.several_inputs(position, velocity, alone)
         bias = tuple(one + other for one, other in zip(bias, more, strict=True))
-        return InputTerms(matrix, mobility, bias, tuple(InputLawTerm(*law) for law in laws))
+        return InputTerms(matrix, mobility, bias, tuple(InputLawTerm(*law) for law in laws), slips)
 
     @cached_property
     def input_equation(
@@ -352,8 +370,11 @@ class Mechanics:
             terms = self.input_terms(motion.position, rates)
             if terms is None:
                 return []
-            laws = [(*law.levers, law.value, law.rate) for law in terms.laws]
-            return [terms.matrix, *terms.mobility, terms.bias, [*chain.from_iterable(laws)]]
+            laws, slips = (
+                [*chain.from_iterable((*at.levers, *at[1:]) for at in part)]
+                for part in (terms.laws, terms.slips)
+            )
+            return [terms.matrix, *terms.mobility, terms.bias, laws, slips]
 
         compiled = Compiled(self.closure, 0, list_terms, within_limits=False, given_count=count)
         fast, close, terms_at = compiled.fast, self.closure.close_unlimited, self.input_terms
@@ -362,14 +383,20 @@ class Mechanics:
             found = fast(*values, *rates)
             if found is None:
                 return terms_at(close(*values), rates)
-            matrix, *mobility, bias, numbers = found
-            left = iter(numbers)
-            laws = tuple(
-                InputLawTerm(tuple(islice(left, count)), next(left), next(left))
-                for _ in range(len(numbers) // (count + 2))
-            )
-            return InputTerms(matrix, tuple(mobility), bias, laws)
+            matrix, *mobility, bias, numbers, rubbing = found
+            laws = tuple(map(InputLawTerm._make, split(numbers)))
+            slips = tuple(map(slip_of, split(rubbing))) if rubbing else ()
+            return InputTerms(matrix, tuple(mobility), bias, laws, slips)
 
+        def split(numbers: Sequence[float]) -> Iterator[tuple[Any, float, float]]:
+            left = iter(numbers)
+            for _ in range(len(numbers) // (count + 2)):
+                yield tuple(islice(left, count)), next(left), next(left)
+
+        if self.dry_joints:
+            from linkage_ros.dynamics.dry_friction import Slip  # local import: only with it
+
+            slip_of = Slip._make
         return equation
 
     def _inertia_forces(
@@ -492,6 +519,14 @@ class Mechanics:
             efforts += (effort,)
         return efforts
 
+    @property
+    def dry_frictions(self) -> tuple[DryFriction, ...]:
+        """Return the dry friction of `dry_joints`, as a linkage of several inputs takes it."""
+        from linkage_ros.dynamics.dry_friction import DryFriction  # local import: only with it
+
+        rubbing = [joint.friction for joint in self.dry_joints]
+        return tuple(DryFriction(f.coulomb, f.breakaway_excess, f.stribeck) for f in rubbing)
+
     def check_curves(self, places: Sequence[Terms], method: str, step: float) -> None:
         """
         Refuse friction that falls with the rate faster than a step follows, in [s].
@@ -499,20 +534,40 @@ class Mechanics:
         ``places`` are the equation of motion at places of the range. The error has the key of the
         steepest curve; its remedy is the longest step that follows it.
         """
-        worst, blamed = 0.0, None
-        for terms in places:
-            first = len(terms.laws) - len(self.stribeck_joints)
-            pairs = zip(self.stribeck_joints, terms.laws[first:], strict=True)
-            falls = {
-                r: r.law.steepest_slope * at.factor**2 / terms.inertia for r, at in pairs if r.law
-            }
-            if sum(falls.values()) > worst:
-                worst, blamed = sum(falls.values()), max(falls, key=falls.__getitem__)
-        if blamed is not None:
-            joint = self.closure.structure.joints[blamed.joint].name
+        first = -len(self.stribeck_joints)
+        self._check_falls(
+            [
+                {
+                    joint: joint.law.steepest_slope * at.factor**2 / terms.inertia
+                    for joint, at in zip(self.stribeck_joints, terms.laws[first:], strict=True)
+                    if joint.law
+                }
+                for terms in places
+                if self.stribeck_joints
+            ],
+            method,
+            step,
+        )
+
+    def check_curves_at(self, terms: InputTerms, method: str, step: float) -> None:
+        """Refuse as `check_curves` does, at one state of a linkage with several inputs."""
+        falls = {}
+        for joint, slip in zip(self.dry_joints, terms.slips, strict=True):
+            if joint.law:
+                moved = [sum(map(mul, row, slip.levers)) for row in terms.mobility]
+                falls[joint] = joint.law.steepest_slope * sum(map(mul, slip.levers, moved))
+        self._check_falls([falls], method, step)
+
+    def _check_falls(
+        self, places: Sequence[Mapping[FrictionJoint, float]], method: str, step: float
+    ) -> None:
+        """Refuse curves by how fast they let rates fall, in [1/s], at some places."""
+        falls = max(places, key=lambda at: sum(at.values()), default={})
+        if sum(falls.values()) > 0.0:
+            blamed = max(falls, key=falls.__getitem__)
             check_step(
-                f'effects.friction.joints.{joint}.stribeck',
-                worst,
+                f'effects.friction.joints.{blamed.name}.stribeck',
+                sum(falls.values()),
                 method,
                 step,
                 'the curve is too steep',
@@ -520,8 +575,8 @@ class Mechanics:
                 EXACT,
             )
 
-    def _find_rubbing_joints(self) -> Iterator[tuple[int, JointFriction, int, int, float]]:
-        """Yield joints with friction: its number, and its rate as factor·(v[one] − v[other])."""
+    def _find_rubbing_joints(self) -> Iterator[tuple[str, int, JointFriction, int, int, float]]:
+        """Yield joints with friction: name, number, and its rate as factor·(v[one] − v[other])."""
         closure: Any = self.closure
         joints = self.friction.joints
         if not isinstance(closure, Closure):
@@ -529,7 +584,14 @@ class Mechanics:
             for name, friction in joints.items():
                 slides = name not in closure.linkage.hinges
                 coordinate = closure.joint_coordinates[name]
-                yield places.index(name), friction, coordinate, 0, closure.scale if slides else 1.0
+                yield (
+                    name,
+                    places.index(name),
+                    friction,
+                    coordinate,
+                    0,
+                    closure.scale if slides else 1.0,
+                )
             return
         for index, joint in enumerate(closure.structure.joints if joints else ()):
             if joint.name not in joints:
@@ -539,16 +601,16 @@ class Mechanics:
             if joint.kind == 'P':
                 slide = closure.slides[joint.name]
                 one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
-            yield index, joints[joint.name], one, other, factor
+            yield joint.name, index, joints[joint.name], one, other, factor
 
     def _find_friction_joints(self) -> Iterator[FrictionJoint]:
-        for index, friction, one, other, factor in self._find_rubbing_joints():
+        for name, index, friction, one, other, factor in self._find_rubbing_joints():
             law = None
             if friction.breakaway_excess and friction.stribeck:
                 from linkage_ros.dynamics.laws import Stribeck  # local import: only with it
 
                 law = Stribeck(friction.breakaway_excess, friction.stribeck)
-            yield FrictionJoint(index, friction, one, other, factor, law)
+            yield FrictionJoint(name, index, friction, one, other, factor, law)
 
 
 def solve_positive(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float] | None:

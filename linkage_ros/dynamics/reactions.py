@@ -162,7 +162,7 @@ class Reactions:
         """What is certain of the force and of the moment in each joint."""
         for rubbing in self._load_dependent:
             if self.parts[rubbing.joint][0] not in (WHOLE, ACROSS):
-                name = forms.joints[rubbing.joint].name
+                name = rubbing.name
                 raise DefinitionError(
                     f'effects.friction.joints.{name}.coefficient',
                     f'the force in {quote(name)} is not certain: {self._reason}',

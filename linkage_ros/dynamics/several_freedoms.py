@@ -24,6 +24,13 @@ that force would pull, the step is cut and the input is free. Of several inputs 
 those stay that are pushed (F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts,
 1996, ch. 6, without friction).
 
+Dry friction, in joints and of the brakes of inputs, is the complementarity of
+`linkage_ros.dynamics.dry_friction`: at the start of a piece of a step it says which joints stick
+and which slide, and whereto. Within the piece those that slide keep their direction, and those
+that stick add equations, w·q̈ + ẇ·q̇ = 0 each, whose multipliers are their friction. Where a slip
+comes to 0, or a joint that sticks needs more than it holds, the step is cut. Rates are projected
+so that slips at rest stay 0.
+
 At a toggle the inertia M grows without bound. With several inputs toggles are no ends of ranges
 but surfaces: the motion is held as by a stop where the sum of the inertias is a given multiple of
 that at the start.
@@ -31,12 +38,19 @@ that at the start.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import copysign, inf, ulp
 from operator import add, mul, sub
+from types import MappingProxyType
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.dynamics.dry_friction import (
+    DryFriction,
+    independent_slips,
+    settle_forces,
+    Slip,
+)
 from linkage_ros.dynamics.equation import InputTerms, solve_positive
 from linkage_ros.dynamics.motion import LARGEST, last_before, NARROW
 
@@ -89,13 +103,19 @@ class SeveralMotion(NamedTuple):
     rate: InputVector  # Their rates, in [rad/s] or [m/s]
     terms: InputTerms  # The equation of motion there
     ahead: float = 0.0  # The time since the start of the step in which it was found, in [s]
+    resting: frozenset[int] = frozenset()  # Joints and brakes that do not slip, by number
 
 
 class _StepEnd(NamedTuple):
-    """What ends a piece of a step: ``kind`` is 'stop', 'leave', 'toggle' or 'segment'."""
+    """
+    What ends a piece of a step.
+
+    ``kind`` is 'stop', 'leave', 'toggle', 'segment', 'break' where a joint that sticks breaks
+    away, or 'halt' where one that slides comes to rest.
+    """
 
     kind: str
-    number: int = 0  # The input, of a stop that is met or left
+    number: int = 0  # The input, of a stop that is met or left; the joint that comes to rest
 
 
 class _Piece(NamedTuple):
@@ -106,6 +126,10 @@ class _Piece(NamedTuple):
     held: tuple[int, ...]  # The inputs that rest at their stops
     cuts: bool  # Whether it is cut at segments of laws and where a stop lets go
     segments: tuple[int, ...]  # Of the laws; empty without cuts
+    brakes: tuple[float, ...] = ()  # What the brake of each input holds; empty without brakes
+    # Of joints with dry friction and of brakes, by number, the direction in which they slide or 0.
+    senses: Mapping[int, float] = MappingProxyType({})
+    sticking: tuple[int, ...] = ()  # Of those that stick as many as say that all do
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +143,7 @@ class SeveralDofMechanism:
     restitution: float = 0.0  # Ratio of the rates after and before an impact, 0 to 1
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``InputTerms.laws``
     most_inertia: float = inf  # Sum of the inertias at which a toggle holds the motion
+    frictions: tuple[DryFriction, ...] = ()  # As in ``InputTerms.slips``
 
     def state_at(self, value: Sequence[float], rate: Sequence[float]) -> SeveralMotion | None:
         """Return a state, or None if it cannot exist."""
@@ -127,11 +152,15 @@ class SeveralDofMechanism:
         return self._reach(InputVector(value), InputVector(rate))
 
     def acceleration(
-        self, motion: SeveralMotion, force: Sequence[float], _brake: float = 0.0, time: float = 0.0
+        self,
+        motion: SeveralMotion,
+        force: Sequence[float],
+        brakes: Sequence[float] = (),
+        time: float = 0.0,
     ) -> InputVector:
         """Return q̈, in [rad/s²] or [m/s²]; the parameters are as in `advance`."""
-        piece = self._begin_piece(motion, InputVector(force), time, cuts=False)
-        found = self._accelerate(motion.terms, time, piece)
+        piece = self._begin_piece(motion, InputVector(force), tuple(brakes), time, cuts=False)
+        found = self._accelerate(motion.terms, motion.rate, time, piece)
         return InputVector([0.0] * len(motion.value)) if found is None else found
 
     def advance(
@@ -139,7 +168,7 @@ class SeveralDofMechanism:
         motion: SeveralMotion,
         seconds: float,
         force: Sequence[float],
-        _brake: float = 0.0,
+        brakes: Sequence[float] = (),
         time: float = 0.0,
     ) -> SeveralMotion:
         """
@@ -148,13 +177,16 @@ class SeveralDofMechanism:
         A step that leads to where no motion exists is halved until it succeeds. If no part of it
         succeeds, the mechanism is held as by a stop. So the work is bounded, whatever the force.
 
-        ``seconds`` is the length of the step, ``force`` has τ on each input, in [N·m] or [N], and
-        ``time`` is the time of the state since the first tick, in [s].
+        ``seconds`` is the length of the step, ``force`` has τ on each input and ``brakes`` what
+        the brake of each holds, in [N·m] or [N]. ``time`` is the time of the state since the first
+        tick, in [s].
         """
         left, pieces, cuts = seconds, 0, 0
         while pieces < 2 * _PIECES:
             now = time + (seconds - left)
-            piece = self._begin_piece(motion, InputVector(force), now, cuts=cuts < _CUTS)
+            piece = self._begin_piece(
+                motion, InputVector(force), tuple(brakes), now, cuts=cuts < _CUTS
+            )
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
                 return _at_rest(motion)
@@ -170,14 +202,15 @@ class SeveralDofMechanism:
                 margin = self._event_margin(happened, piece)
                 length, last, known = last_before(reach, margin, motion, length, reached)
                 reached, event = last, happened if known else None
-            if event and event.kind in ('leave', 'segment'):
+            if event and event.kind in ('leave', 'segment', 'break', 'halt'):
                 cuts += 1
                 # The next piece begins just beyond, at a time that differs when it is rounded.
                 length = min(length + 2.0 * ulp(time + seconds), left)
                 reached = reach(length) or reached
             else:
                 pieces += 1
-            motion = reached
+            halted = event.number if event and event.kind == 'halt' else None
+            motion = self._rest_slips(reached, piece, halted)
             if event and event.kind == 'toggle':
                 motion = self._bounce(motion)
             elif event and event.kind == 'stop':
@@ -189,21 +222,140 @@ class SeveralDofMechanism:
         return _at_rest(motion)
 
     def _begin_piece(
-        self, motion: SeveralMotion, force: InputVector, now: float, *, cuts: bool
+        self,
+        motion: SeveralMotion,
+        force: InputVector,
+        brakes: tuple[float, ...],
+        now: float,
+        *,
+        cuts: bool,
     ) -> _Piece:
         """Return what stays the same from a state on."""
         begin = motion._replace(ahead=0.0)
         segments = self._law_segments(motion, force, now) if cuts else ()
         held = [n for n in self._inputs_at_stops(motion) if motion.rate[n] == 0.0]
+        brakes = brakes if any(brakes) else ()
         # Those that would be pulled are free; the worst of them first.
-        while held:
-            piece = _Piece(now, force, tuple(held), cuts, segments)
+        while True:
+            piece = _Piece(now, force, tuple(held), cuts, segments, brakes)
+            if self.frictions or brakes:
+                piece = self._with_frictions(begin, piece)
             pulls = {n: self._stop_pull(begin, n, piece) for n in held}
-            worst = max(held, key=pulls.__getitem__)
-            if pulls[worst] <= 0.0:
+            worst = max(held, key=pulls.__getitem__, default=None)
+            if worst is None or pulls[worst] <= 0.0:
                 return piece
             held.remove(worst)
-        return _Piece(now, force, (), cuts, segments)
+
+    def _slips(self, terms: InputTerms, rate: InputVector, piece: _Piece) -> dict[int, Slip]:
+        """Return the slips of joints by number, then those of inputs that a brake holds."""
+        slips = dict(enumerate(terms.slips))
+        for n, brake in enumerate(piece.brakes):
+            if brake:
+                levers = tuple(float(i == n) for i in range(len(rate)))
+                slips[len(self.frictions) + n] = Slip(levers, rate[n], 0.0)
+        return slips
+
+    def _friction_of(self, number: int, piece: _Piece) -> DryFriction:
+        joints = len(self.frictions)
+        if number < joints:
+            return self.frictions[number]
+        return DryFriction(piece.brakes[number - joints])
+
+    def _with_frictions(self, motion: SeveralMotion, piece: _Piece) -> _Piece:
+        """Return a piece with the joints that slide from a state on, and those that stick."""
+        slips = self._slips(motion.terms, motion.rate, piece)
+        senses = {
+            j: 0.0
+            if j in motion.resting or slip.is_still(motion.rate)
+            else copysign(1.0, slip.rate)
+            for j, slip in slips.items()
+        }
+        while True:
+            piece = piece._replace(senses=senses)
+            slipping = self._find_slipping(motion, piece)
+            if not slipping:
+                break
+            # Once they slide they resist less, and others may break away.
+            senses = {**senses, **slipping}
+        matrix, resting = self._couple_slips(motion.terms, slips, piece)
+        sticking = independent_slips(matrix, range(len(resting)))
+        return piece._replace(sticking=tuple([resting[k] for k in sticking]))
+
+    def _couple_slips(
+        self, terms: InputTerms, slips: dict[int, Slip], piece: _Piece
+    ) -> tuple[list[list[float]], list[int]]:
+        """Return how slips at rest accelerate by units of their friction, and their numbers."""
+        resting = [j for j, sense in piece.senses.items() if not sense]
+        rows = [InputVector(slips[j].levers) for j in resting]
+        moved = [self._move(terms, row, piece) for row in rows]
+        return [[sum(map(mul, row, way)) for way in moved] for row in rows], resting
+
+    def _find_slipping(self, motion: SeveralMotion, piece: _Piece) -> dict[int, float]:
+        """Return which joints at rest break away, and in which direction."""
+        terms, slips = motion.terms, self._slips(motion.terms, motion.rate, piece)
+        matrix, resting = self._couple_slips(terms, slips, piece)
+        if not resting:
+            return {}
+        force = self._force(terms, motion.rate, piece.now + motion.ahead, piece)
+        change = self._move(terms, force, piece)
+        _, accelerations = settle_forces(
+            matrix,
+            [sum(map(mul, slips[j].levers, change)) + slips[j].bias for j in resting],
+            [self._friction_of(j, piece).holding for j in resting],
+        )
+        found = zip(resting, accelerations, strict=True)
+        return {j: copysign(1.0, slipping) for j, slipping in found if slipping}
+
+    def _sticking_forces(
+        self, terms: InputTerms, rate: InputVector, piece: _Piece, force: InputVector
+    ) -> list[tuple[InputVector, float]]:
+        """Return of each joint that sticks its levers, and its friction beside a force."""
+        slips = self._slips(terms, rate, piece)
+        rows = [InputVector(slips[j].levers) for j in piece.sticking]
+        moved = [self._move(terms, row, piece) for row in rows]
+        change = self._move(terms, force, piece)
+        needed = [
+            -sum(map(mul, row, change)) - slips[j].bias
+            for row, j in zip(rows, piece.sticking, strict=True)
+        ]
+        return [*zip(rows, _solve_coupled(rows, moved, needed), strict=True)]
+
+    def _break_margin(self, motion: SeveralMotion, piece: _Piece) -> float:
+        """Return how much more the joints hold that stick; negative where one breaks away."""
+        if sum(not sense for sense in piece.senses.values()) > len(piece.sticking):
+            # What each of them bears is not certain, but whether they hold is.
+            return -1.0 if self._find_slipping(motion, piece) else 1.0
+        force = self._force(motion.terms, motion.rate, piece.now + motion.ahead, piece)
+        borne = self._sticking_forces(motion.terms, motion.rate, piece, force)
+        holding = [self._friction_of(j, piece).holding for j in piece.sticking]
+        pairs = zip(holding, borne, strict=False)
+        return min((most - abs(part) for most, (_, part) in pairs), default=inf)
+
+    def _rest_slips(
+        self, motion: SeveralMotion, piece: _Piece, halted: int | None
+    ) -> SeveralMotion:
+        """Return the end of a piece, with rates at which nothing slips that sticks."""
+        resting = frozenset(j for j, sense in piece.senses.items() if not sense or j == halted)
+        if not resting:
+            return motion
+        if piece.sticking:
+            motion = (
+                self._reach(motion.value, self._stuck_rates(motion, piece), motion.ahead) or motion
+            )
+        return motion._replace(resting=resting)
+
+    def _stuck_rates(self, motion: SeveralMotion, piece: _Piece) -> InputVector:
+        """Return the rates nearest to those of a motion at which sticking joints do not slip."""
+        terms, rate = motion.terms, motion.rate
+        if len(piece.sticking) + len(piece.held) >= len(rate):
+            return InputVector([0.0] * len(rate))
+        slips = self._slips(terms, rate, piece)
+        rows = [InputVector(slips[j].levers) for j in piece.sticking]
+        moved = [self._move(terms, row, piece) for row in rows]
+        parts = _solve_coupled(rows, moved, [slips[j].rate for j in piece.sticking])
+        for way, part in zip(moved, parts, strict=True):
+            rate -= part * way
+        return rate
 
     def _law_segments(
         self, motion: SeveralMotion, force: InputVector, now: float
@@ -212,7 +364,8 @@ class SeveralDofMechanism:
         laws = motion.terms.laws
         change: InputVector | None = None
         if any(at.rate == 0.0 for at in laws):
-            change = self._accelerate(motion.terms, now, _Piece(now, force, (), False, ()))
+            piece = _Piece(now, force, (), False, ())
+            change = self._accelerate(motion.terms, motion.rate, now, piece)
         segments: tuple[int, ...] = ()
         for law, at in zip(self.laws, laws, strict=True):
             rate = at.rate
@@ -229,25 +382,58 @@ class SeveralDofMechanism:
     def _stop_pull(self, motion: SeveralMotion, number: int, piece: _Piece) -> float:
         """Return the force with which a stop would have to pull an input to hold it."""
         terms = motion.terms
-        change = self._accelerate(terms, piece.now + motion.ahead, piece)
+        force = self._total_force(terms, motion.rate, piece.now + motion.ahead, piece)
+        change = self._free_acceleration(terms, force, piece)
         if change is None:
             return 0.0
         needed = sum(terms.inertia(number, j) * change[j] for j in range(len(change)))
-        needed -= self._force(terms, piece.now + motion.ahead, piece)[number]
+        needed -= force[number]
         return needed if motion.value[number] >= self.stops[number][1] else -needed
 
-    def _force(self, terms: InputTerms, time: float, piece: _Piece) -> InputVector:
-        """Return the force on each input, without what inertia and stops need."""
+    def _force(
+        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
+    ) -> InputVector:
+        """Return the force on each input, without what inertia, stops and sticking joints need."""
         total = piece.force - terms.bias
         for index, (law, at) in enumerate(zip(self.laws, terms.laws, strict=True)):
             segments = piece.segments
             segment = segments[index] if segments else law.segment(at.value, at.rate, time)
             total += law.force(segment, at.value, at.rate, time) * InputVector(at.levers)
+        if piece.senses:
+            for j, slip in self._slips(terms, rate, piece).items():
+                if sense := piece.senses[j]:
+                    resisted = self._friction_of(j, piece).sliding(slip.rate)
+                    total -= sense * resisted * InputVector(slip.levers)
         return total
 
-    def _accelerate(self, terms: InputTerms, time: float, piece: _Piece) -> InputVector | None:
+    def _total_force(
+        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
+    ) -> InputVector:
+        """Return the force on each input with that of joints that stick."""
+        total = self._force(terms, rate, time, piece)
+        if piece.sticking:
+            for row, part in self._sticking_forces(terms, rate, piece, total):
+                total += part * row
+        return total
+
+    def _accelerate(
+        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
+    ) -> InputVector | None:
         """Return q̈ of the equation of motion; 0 of inputs that are held at their stops."""
-        force = self._force(terms, time, piece)
+        if piece.sticking and len(piece.sticking) + len(piece.held) >= len(rate):
+            return InputVector([0.0] * len(rate))
+        force = self._total_force(terms, rate, time, piece)
+        return self._free_acceleration(terms, force, piece)
+
+    def _move(self, terms: InputTerms, force: InputVector, piece: _Piece) -> InputVector:
+        """Return q̈ under a force alone; 0 where there is none."""
+        found = self._free_acceleration(terms, force, piece)
+        return InputVector([0.0] * len(force)) if found is None else found
+
+    def _free_acceleration(
+        self, terms: InputTerms, force: InputVector, piece: _Piece
+    ) -> InputVector | None:
+        """Return M⁻¹ times a force; 0 of inputs that are held at their stops."""
         if not piece.held:
             return InputVector([sum(map(mul, row, force)) for row in terms.mobility])
         free = [n for n in range(len(force)) if n not in piece.held]
@@ -265,11 +451,11 @@ class SeveralDofMechanism:
     ) -> Callable[[float], SeveralMotion | None]:
         """Return a function that gives the state after some seconds of one step."""
         value, rate = motion.value, motion.rate
-        start = self._accelerate(motion.terms, piece.now, piece)
+        start = self._accelerate(motion.terms, rate, piece.now, piece)
 
         def acceleration_at(q: InputVector, w: InputVector, ahead: float) -> InputVector | None:
             there = self._terms_at(q, w)
-            return None if there is None else self._accelerate(there, piece.now + ahead, piece)
+            return None if there is None else self._accelerate(there, w, piece.now + ahead, piece)
 
         def state_after(seconds: float) -> SeveralMotion | None:
             if start is None:
@@ -313,6 +499,14 @@ class SeveralDofMechanism:
         if inertia > self.most_inertia and inertia > begin.terms.total_inertia:
             return _StepEnd('toggle')
         if piece.cuts:
+            # What rounding says of the start already is no event.
+            for n, margin in self._slip_margins(motion, piece).items():
+                if margin < 0.0 <= self._slip_margins(begin, piece)[n]:
+                    return _StepEnd('halt', n)
+            if piece.sticking and self._break_margin(motion, piece) < 0.0:
+                start = begin._replace(ahead=0.0)
+                if self._break_margin(start, piece) >= 0.0:
+                    return _StepEnd('break')
             if self._segment_margin(motion, piece) < 0.0:
                 return _StepEnd('segment')
             for n in piece.held:
@@ -330,7 +524,18 @@ class SeveralDofMechanism:
             return lambda motion: self.most_inertia - motion.terms.total_inertia
         if kind == 'segment':
             return lambda motion: self._segment_margin(motion, piece)
+        if kind == 'halt':
+            return lambda motion: self._slip_margins(motion, piece)[n]
+        if kind == 'break':
+            return lambda motion: self._break_margin(motion, piece)
         return lambda motion: -self._stop_pull(motion, n, piece)
+
+    def _slip_margins(self, motion: SeveralMotion, piece: _Piece) -> dict[int, float]:
+        """Return the slips of joints that slide, in their directions."""
+        if not piece.senses:
+            return {}
+        slips = self._slips(motion.terms, motion.rate, piece)
+        return {j: sense * slips[j].rate for j, sense in piece.senses.items() if sense}
 
     def _segment_margin(self, motion: SeveralMotion, piece: _Piece) -> float:
         """Return the least margin of the laws to the ends of their segments."""
@@ -365,6 +570,14 @@ class SeveralDofMechanism:
         """Return a state whose rates are reversed, as far as an impact returns them."""
         back = InputVector([0.0 - self.restitution * rate for rate in motion.rate])
         return self._reach(motion.value, back) or _at_rest(motion)
+
+
+def _solve_coupled(
+    rows: Sequence[InputVector], moved: Sequence[InputVector], right: Sequence[float]
+) -> Sequence[float]:
+    """Return the forces of joints that give their slips the right accelerations, or rates."""
+    matrix = [[sum(map(mul, row, way)) for way in moved[: k + 1]] for k, row in enumerate(rows)]
+    return solve_positive(matrix, right) or [0.0] * len(rows)
 
 
 def _at_rest(motion: SeveralMotion) -> SeveralMotion:

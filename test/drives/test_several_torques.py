@@ -198,7 +198,6 @@ def test_an_input_at_its_stop_shows_its_command():
 
 REFUSED = {
     'play': ({'play': PlayParameters(0.1, 0.1)}, 'drive.torque.play: is for one input'),
-    'brake': ({'on_timeout': 'brake', 'brake': 1.0}, 'drive.torque.brake: is for one input'),
     'gear': (
         {'motor': MotorParameters(0.05, efficiency=0.8)},
         'drive.torque.motor: the friction of its gear is for one input',
@@ -226,13 +225,40 @@ def test_what_is_for_one_input_is_refused(name):
     assert str(caught.value).startswith(line)
 
 
-def test_dry_friction_is_refused_and_viscous_friction_is_not():
-    closure = closed('five_bar')
-    drive = TorqueDrive(inputs=START)
-    dry, viscous = (Friction({'P': JointFriction(0.1, coulomb)}) for coulomb in (0.2, 0.0))
-    with pytest.raises(DefinitionError, match=r'joints\.P: dry friction is for one input'):
-        drive.build(context_of(closure, friction=dry))
-    drive.build(context_of(closure, friction=viscous))
+def test_friction_by_the_force_in_a_joint_is_refused_and_a_curve_too_steep():
+    drive, closure = TorqueDrive(inputs=START), closed('five_bar')
+    rubbing = {
+        'coefficient: friction by the force in a joint is for one input': JointFriction(
+            coefficient=0.1, radius=0.01
+        ),
+        'stribeck: the curve is too steep': JointFriction(breakaway=50.0, stribeck=1e-4),
+    }
+    for line, friction in rubbing.items():
+        with pytest.raises(DefinitionError, match=rf'effects\.friction\.joints\.P\.{line}'):
+            drive.build(context_of(closure, friction=Friction({'P': friction})))
+    drive.build(context_of(closure, friction=Friction({'P': JointFriction(0.1, 0.2)})))
+
+
+BRAKED = b"""
+drive: {torque: {start: 0, timeout: 0.05, on_timeout: brake, brake: 2}}
+loads: {gravity: [0, 0, -9.81]}
+effects: {velocity: {}, effort: {}}
+"""
+
+
+def test_brakes_hold_the_inputs_that_have_no_command():
+    pipeline = pipeline_of(BRAKED, ANKLE)
+    pipeline.tick(BEGIN)
+    state = read_joint_state(pipeline.tick(BEGIN + 100 * MS).message)
+    assert [*state.position[:2], *state.velocity[:2]] == [0.0] * 4
+    # The brakes bear the weight of the foot.
+    assert 0.0 < max(map(abs, state.effort[:2])) < 2.0
+    # An input under a command moves, and the other stays.
+    pipeline.offer(serialized(['m1'], efforts=[0.8]), BEGIN + 110 * MS)
+    state = read_joint_state(pipeline.tick(BEGIN + 115 * MS).message)
+    assert abs(state.velocity[0]) > 0.1
+    assert state.position[1] == pytest.approx(0.0, abs=1e-15)
+    assert state.effort[0] == 0.8
 
 
 def test_a_hard_stop_of_a_dependent_joint_is_refused_and_a_stiff_load():

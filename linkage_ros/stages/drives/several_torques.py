@@ -40,7 +40,15 @@ class SeveralTorqueCrank(TorqueCrank):
     input, with the step to which its command is rounded; None for an input without one.
     """
 
-    __slots__ = ('_commands', '_most_each', '_motors', '_newest_inputs', '_stamps', '_untils')
+    __slots__ = (
+        '_brake',
+        '_commands',
+        '_most_each',
+        '_motors',
+        '_newest_inputs',
+        '_stamps',
+        '_untils',
+    )
 
     def __init__(
         self,
@@ -53,7 +61,7 @@ class SeveralTorqueCrank(TorqueCrank):
         wrenches: tuple[HeldWrench, ...] = (),
         exerts_effort: bool = False,
     ) -> None:
-        self._motors, self._most_each = motors, most_each
+        self._motors, self._most_each, self._brake = motors, most_each, use.brake
         driven = [number for number, motor in enumerate(motors) if motor]
         if driven:
             mechanism = replace(
@@ -114,8 +122,8 @@ class SeveralTorqueCrank(TorqueCrank):
                 self._commands[number], self._untils[number] = None, NEVER
         self._acting, self._until = self._actuation(), min(self._untils)
 
-    def _actuation(self) -> tuple[Any, InputVector, float]:
-        """Return mechanism, forces on its inputs and brake under the commands."""
+    def _actuation(self) -> tuple[Any, InputVector, tuple[float, ...]]:
+        """Return mechanism, forces on its inputs and brakes under the commands."""
         mechanism, forces = self._mechanism, [0.0] * len(self._motors)
         laws: list[MotorLaw] = []
         for number, (given, command) in enumerate(zip(self._motors, self._commands, strict=True)):
@@ -131,14 +139,15 @@ class SeveralTorqueCrank(TorqueCrank):
         if laws:
             others = len(mechanism.laws) - len(laws)
             mechanism = replace(mechanism, laws=(*mechanism.laws[:others], *laws))
-        return mechanism, InputVector(forces), 0.0
+        brakes = tuple([self._brake if each is None else 0.0 for each in self._commands])
+        return mechanism, InputVector(forces), brakes
 
     def _crank_state(self, motion: Any, acceleration: InputVector) -> CrankState:
         values = tuple(motion.value), tuple(motion.rate), tuple(acceleration)
         if not self.exerts_effort:
             return CrankState(*values, 0)
         # A stop may bear a part of an effort, which then does not follow from the motion.
-        mechanism, forces, _ = self._acting
+        mechanism, forces, brakes = self._acting
         efforts: list[float] = list(forces)
         driven = [number for number, motor in enumerate(self._motors) if motor]
         # The laws of the motors are the last ones.
@@ -146,7 +155,10 @@ class SeveralTorqueCrank(TorqueCrank):
             rate = motion.rate[number]
             efforts[number] = law.force(law.segment(0.0, rate, 0.0), 0.0, rate, 0.0)
         state = CrankAtRest(*values, 0)
-        state.bearing = tuple(end for effort in efforts for end in (effort, effort))
+        held = zip(efforts, brakes, strict=True)
+        state.bearing = tuple(
+            end for effort, brake in held for end in (effort - brake, effort + brake)
+        )
         return state
 
 

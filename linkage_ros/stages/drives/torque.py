@@ -404,7 +404,8 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         METHODS[parameters.method].step,
         tuple((given.limits.low, given.limits.high) for given in limits),
         parameters.restitution,
-        mechanics.laws,
+        mechanics.applied.laws if mechanics.applied else (),
+        frictions=mechanics.dry_frictions if mechanics.dry_joints else (),
     )
     start = mechanism.state_at([use.start for use in own], [use.rate for use in own])
     if start is None:
@@ -421,6 +422,7 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
             # What it moves if the other inputs are free.
             alone = 1.0 / start.terms.mobility[index][index]
             given_motor[0].check_step(alone, parameters.method, parameters.step, key)
+    mechanics.check_curves_at(start.terms, parameters.method, parameters.step)
     if mechanics.applied:
         mobility = start.terms.mobility
         mechanics.applied.check_step_at(start.value, mobility, parameters.method, parameters.step)
@@ -433,13 +435,11 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
 
 
 def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
-    """Refuse what is for one input only: dry friction in all its forms, and play."""
+    """Refuse what is for one input only: friction by the force in a joint, and play."""
     names = context.closure.input_names
     reason = f'is for one input, and the linkage has {len(names)}'
     if parameters.play is not None:
         raise DefinitionError('drive.torque.play', reason, 'leave it out')
-    if parameters.brake:
-        raise DefinitionError('drive.torque.brake', reason, 'write on_timeout: zero')
     if parameters.motor_encoder is not None:
         raise DefinitionError('drive.torque.motor_encoder', reason, 'leave it out')
     for name in names:
@@ -454,11 +454,11 @@ def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
             if getattr(motor, part):
                 raise DefinitionError(f'{key}.{part}', reason, 'leave it out')
     for name, rubbing in context.mechanics.friction.joints.items():
-        if rubbing.coulomb or rubbing.breakaway_excess or rubbing.coefficient:
+        if rubbing.coefficient:
             raise DefinitionError(
-                f'effects.friction.joints.{name}',
-                f'dry friction {reason}',
-                'write viscous alone',
+                f'effects.friction.joints.{name}.coefficient',
+                f'friction by the force in a joint {reason}',
+                'write coulomb instead',
             )
     hard = context.hard_limited.linkage.limits
     for name in hard.keys() - {*names}:

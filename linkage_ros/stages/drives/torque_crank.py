@@ -44,8 +44,8 @@ NEVER = 1 << 63
 _PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
 """What passes through the play, by the side on which the motor touches the crank."""
 
-_Acting = tuple[Any, Any, float]
-"""What acts by a command: the mechanism, the force on its input or inputs, and the brake."""
+_Acting = tuple[Any, Any, Any]
+"""What acts by a command: the mechanism, and of its input or inputs the force and the brake."""
 
 
 def _without_winding(motion: Any) -> Any:

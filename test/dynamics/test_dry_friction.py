@@ -1,0 +1,190 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""Dry friction with several inputs: what sticks, what slides, and what it costs."""
+
+from dataclasses import replace
+from math import sin
+
+from linkage_ros.dynamics import (
+    Friction,
+    JointFriction,
+    Loads,
+    Mechanics,
+    METHODS,
+    SeveralDofMechanism,
+    SingleDofMechanism,
+)
+from linkage_ros.dynamics.dry_friction import settle_forces
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from .loaded import closed
+from .test_several_freedoms import FREE, GRAVITY, several
+
+
+def test_forces_of_joints_at_rest_are_complementary_to_their_slips():
+    """The least acceleration in the metric of inertia, by scipy, and the law joint by joint."""
+    random = np.random.default_rng(4)
+    kinds = {'sticks': 0, 'slides': 0}
+    for _ in range(200):
+        inputs, joints = random.integers(1, 4), random.integers(1, 7)
+        root = random.normal(size=(inputs, inputs))
+        inertia = root @ root.T + 0.1 * np.eye(inputs)
+        levers, limits = random.normal(size=(joints, inputs)), random.uniform(0.0, 1.0, joints)
+        push = random.normal(size=inputs) * random.choice([0.1, 1.0, 5.0])
+        mobility = np.linalg.inv(inertia)
+        forces, slips = settle_forces(
+            (levers @ mobility @ levers.T).tolist(), (levers @ mobility @ push).tolist(), limits
+        )
+        lower = np.linalg.inv(np.linalg.cholesky(inertia))
+        least = lsq_linear(
+            lower @ levers.T, -lower @ push, (-limits - 1e-300, limits), method='bvls', tol=1e-15
+        ).x
+        change, right = (mobility @ (push + levers.T @ each) for each in (forces, least))
+        assert change == pytest.approx(right, rel=1e-8, abs=1e-9)
+        for force, limit, slip, lever in zip(forces, limits, slips, levers, strict=True):
+            assert abs(force) <= limit
+            if slip:
+                assert force == -np.copysign(limit, slip)
+                assert slip == pytest.approx(lever @ change, rel=1e-6, abs=1e-9)
+            else:
+                assert abs(lever @ change) < 1e-7
+            kinds['slides' if slip else 'sticks'] += 1
+    assert min(kinds.values()) > 100
+
+
+def mechanism(mechanics, stops=None, **given):
+    count = len(mechanics.closure.input_names)
+    return SeveralDofMechanism(
+        mechanics.input_equation, METHODS['rk4'].step, stops or (FREE,) * count,
+        frictions=mechanics.dry_frictions, **given,
+    )  # fmt: skip
+
+
+RUBBING = {
+    'O2': JointFriction(coulomb=0.004, breakaway=0.006),
+    'B': JointFriction(coulomb=0.003, breakaway=0.005, stribeck=0.5),
+    'O4': JointFriction(coulomb=0.005, viscous=0.001),
+}
+
+
+@pytest.mark.parametrize(
+    ('start', 'rate', 'push'), [(0.3, 4.0, 0.0), (1.0, 0.0, 0.07), (2.0, 0.0, 0.05)]
+)
+def test_one_input_moves_as_by_its_own_equation(start, rate, push):
+    """Slips that turn, sticking and breaking away: the other equation is of one input alone."""
+    mechanics = Mechanics(closed('four_bar'), Loads((0.0, -0.05)), Friction(RUBBING))
+    several = mechanism(mechanics)
+    alone = SingleDofMechanism(mechanics.motion_equation, METHODS['rk4'].step, laws=mechanics.laws)
+    one, other = several.state_at([start], [rate]), alone.state_at(start, rate)
+    rested = 0
+    for count in range(600):
+        force = push * sin(0.02 * count)
+        one = several.advance(one, 1e-3, [force])
+        other = alone.advance(other, 1e-3, force)
+        assert (*one.value, *one.rate) == pytest.approx((other.value, other.rate), abs=1e-8)
+        change = alone.acceleration(other, force)
+        assert several.acceleration(one, [force]) == pytest.approx((change,), abs=1e-5)
+        rested += one.rate == (0.0,)
+    assert rested or rate, 'it sticks'
+
+
+def test_friction_takes_what_the_joints_turn_times_its_moment():
+    closure, start = several('five_bar')
+    names = [joint.name for joint in closure.structure.joints]
+    moments = {name: 2e-4 * (1 + number) for number, name in enumerate(names)}
+    frictions = Friction({name: JointFriction(coulomb=size) for name, size in moments.items()})
+    mechanics = Mechanics(closure, Loads(GRAVITY[:2]), frictions)
+    moved = mechanism(mechanics)
+    state = moved.state_at(start, [-3.0, 2.0])
+
+    def angles(state):
+        found = closure.link_angles(closure.close_unlimited(*state.value))
+        return np.array(
+            [found[joint.link] - found.get(joint.to, 0.0) for joint in closure.structure.joints]
+        )
+
+    def energy(state):
+        return mechanics.total_energy(closure.close_unlimited(*state.value), *state.rate)
+
+    begin, lost, before = energy(state), 0.0, angles(state)
+    for _ in range(250):
+        state = moved.advance(state, 4e-4, [0.0, 0.0])
+        now = angles(state)
+        turned = np.abs(np.angle(np.exp(1j * (now - before))))
+        lost, before = lost + turned @ [*moments.values()], now
+    assert lost > 5e-4
+    assert begin - energy(state) == pytest.approx(lost, rel=1e-4)
+
+
+def test_an_input_that_sticks_leaves_the_others_one_equation():
+    closure, start = several('delta')
+    names = closure.input_names
+    frictions = Friction({names[0]: JointFriction(coulomb=3.0, breakaway=5.0)})
+    mechanics = Mechanics(closure, Loads(GRAVITY), frictions)
+    moved = mechanism(mechanics)
+    state = moved.state_at(start, [0.0] * 3)
+    for _ in range(50):
+        state = moved.advance(state, 1e-3, [0.2, -1.0, -1.5])
+    assert (state.value[0], state.rate[0]) == pytest.approx((start[0], 0.0), abs=1e-14)
+    assert abs(state.rate[1]) > 0.1, 'the others move'
+    change = moved.acceleration(state, [0.2, -1.0, -1.5])
+    rows = [[state.terms.inertia(i, j) for j in (1, 2)] for i in (1, 2)]
+    expected = np.linalg.solve(rows, np.array([-1.0, -1.5]) - state.terms.bias[1:])
+    assert change == pytest.approx((0.0, *expected), rel=1e-11, abs=1e-12)
+    # Beyond what it holds it breaks away, and is resisted by less.
+    change = moved.acceleration(state, [40.0, -1.0, -1.5])
+    pushed = np.array([40.0 - 3.0, -1.0, -1.5]) - state.terms.bias
+    assert change == pytest.approx(tuple(np.array(state.terms.mobility) @ pushed), rel=1e-11)
+
+
+def test_steps_of_any_length_turn_slip_and_stick_at_the_same_instants():
+    closure, start = several('five_bar')
+    names = [joint.name for joint in closure.structure.joints]
+    frictions = Friction({name: JointFriction(coulomb=2e-3) for name in names})
+    ends = []
+    for count in (40, 320):
+        moved = mechanism(Mechanics(closure, Loads(), frictions))
+        state = moved.state_at(start, [-1.5, 1.0])
+        for _ in range(count):
+            state = moved.advance(state, 0.08 / count, [0.0, 0.0])
+        ends.append((*state.value, *state.rate))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+
+
+def test_brakes_hold_each_input_as_far_as_they_go():
+    closure, start = several('ankle')
+    mechanics = Mechanics(closure, Loads(GRAVITY))
+    moved = mechanism(mechanics)
+    state = moved.state_at(start, [0.0, 0.0])
+    held = moved.advance(state, 1e-2, [0.0, 0.0], [50.0, 50.0])
+    assert (held.value, held.rate) == (state.value, (0.0, 0.0))
+    one = moved.state_at(start, [0.0, 0.0])
+    for _ in range(20):
+        one = moved.advance(one, 1e-3, [0.0, 0.0], [50.0, 0.0])
+    assert one.value[0] == pytest.approx(start[0], abs=1e-15)
+    assert abs(one.rate[1]) > 1e-3
+    # A brake that is too weak resists with all that it has.
+    change = moved.acceleration(state, [0.0, 0.0], [1e-3, 0.0])
+    free = np.array(moved.acceleration(state, [0.0, 0.0]))
+    by_brake = -1e-3 * np.sign(free[0]) * np.array(state.terms.mobility[0])
+    assert change == pytest.approx(tuple(free + by_brake), rel=1e-9)
+
+
+def test_at_a_toggle_friction_ends_no_step_for_ever():
+    closure, start = several('five_bar')
+    names = [joint.name for joint in closure.structure.joints]
+    frictions = Friction({name: JointFriction(coulomb=0.02, breakaway=0.03) for name in names})
+    moved = mechanism(Mechanics(closure, Loads((0.0, -9.81)), frictions))
+    state = moved.state_at(start, [0.5, -0.3])
+    moved = replace(moved, most_inertia=1e3 * state.terms.total_inertia)
+    for _ in range(600):
+        state = moved.advance(state, 1e-3, [0.0, 0.0])
+    assert state.rate == (0.0, 0.0)
