@@ -37,6 +37,7 @@ from linkage_ros.dynamics.loads import (
 )
 from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
+    Acceleration,
     call,
     Closure,
     GROUND,
@@ -71,8 +72,10 @@ class JointCoordinate(NamedTuple):
         """Return its value, in [rad] or [m]; of a driven joint with all its turns."""
         return (position.inputs if self.driven else position.joints)[self.number]
 
-    def lever(self, velocity: Velocity, _position: Position, _moved: Sequence[Any]) -> float:
-        """Return its rate, in [rad/s] or [m/s]."""
+    def lever(
+        self, velocity: Velocity | Acceleration, _position: Position, _moved: Sequence[Any]
+    ) -> float:
+        """Return its rate, in [rad/s] or [m/s]; or what of its acceleration rates do not give."""
         v = velocity.state.coordinates
         return self.factor * (v[self.one] - v[self.other])
 

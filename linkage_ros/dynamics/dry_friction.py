@@ -59,11 +59,12 @@ class DryFriction:
 
 
 class Slip(NamedTuple):
-    """The slip of a joint with dry friction."""
+    """The slip of a joint with dry friction, or the motion of one with a stop."""
 
     levers: tuple[float, ...]  # w, its rate for a rate of 1 of each input
     rate: float  # In [rad/s] or [m/s]
     bias: float  # ẇ·q̇, its acceleration at q̈ = 0
+    value: float = 0.0  # Of a joint with a stop, in [rad] or [m]
 
     def is_still(self, rates: Sequence[float]) -> bool:
         """Return whether it is 0 within the rounding of the rates of the inputs."""
@@ -72,14 +73,17 @@ class Slip(NamedTuple):
 
 
 def settle_forces(
-    matrix: Sequence[Sequence[float]], begin: Sequence[float], limits: Sequence[float]
+    matrix: Sequence[Sequence[float]],
+    begin: Sequence[float],
+    bounds: Sequence[tuple[float, float]],
 ) -> tuple[list[float], list[float]]:
     """
     Return the friction of joints at rest, and the accelerations of their slips; 0 of what sticks.
 
-    The accelerations are ``begin`` plus ``matrix`` times the forces, each within ± its limit.
+    The accelerations are ``begin`` plus ``matrix`` times the forces, each within its bounds: ± its
+    limit; of a stop, which only pushes, one of them is 0 and the other infinite.
     """
-    count = len(limits)
+    count = len(bounds)
     forces = [0.0] * count
     for _ in range(_ROUNDS):
         moved = False
@@ -88,8 +92,9 @@ def settle_forces(
             if not own > 0.0:
                 continue
             slip = begin[j] + sum(matrix[j][k] * forces[k] for k in range(count))
-            new = min(max(forces[j] - slip / own, -limits[j]), limits[j])
-            moved = moved or abs(new - forces[j]) > _SETTLED * limits[j]
+            low, high = bounds[j]
+            new = min(max(forces[j] - slip / own, low), high)
+            moved = moved or abs(new - forces[j]) > _SETTLED * min(max(-low, high), abs(new))
             forces[j] = new
         if not moved:
             break
@@ -97,7 +102,8 @@ def settle_forces(
     for j in range(count):
         parts = [begin[j], *(matrix[j][k] * forces[k] for k in range(count))]
         total = sum(parts)
-        is_still = abs(total) <= _STILL * sum(map(abs, parts)) or abs(forces[j]) < limits[j]
+        low, high = bounds[j]
+        is_still = abs(total) <= _STILL * sum(map(abs, parts)) or low < forces[j] < high
         slips.append(0.0 if is_still or not matrix[j][j] > 0.0 else total)
     return forces, slips
 

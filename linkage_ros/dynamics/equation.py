@@ -40,6 +40,7 @@ from operator import mul
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
+from linkage_ros.dynamics.dry_friction import DryFriction, Slip
 from linkage_ros.dynamics.loads import (
     check_loads,
     check_masses,
@@ -55,6 +56,7 @@ from linkage_ros.kinematics import (
     call,
     Closure,
     copysign,
+    Limits,
     Position,
     Velocity,
     where,
@@ -63,7 +65,6 @@ from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledM
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import AppliedForces
-    from linkage_ros.dynamics.dry_friction import DryFriction, Slip
     from linkage_ros.dynamics.laws import Law, LawTerm, Stribeck
 
 _ROUNDING = 1e-9
@@ -103,6 +104,7 @@ class InputTerms(NamedTuple):
     bias: tuple[float, ...]  # h: of inertia, weight, springs and dampers, and constant loads
     laws: tuple[InputLawTerm, ...] = ()  # One for each law of an applied force
     slips: tuple[Slip, ...] = ()  # One for each joint with dry friction
+    limited: tuple[Slip, ...] = ()  # One for each joint with a hard stop that is no input
 
     def inertia(self, row: int, column: int) -> float:
         """Return an element of M."""
@@ -184,6 +186,8 @@ class Mechanics:
             one for one in self.friction_joints if one.friction.coulomb or one.friction.breakaway
         )
         """The joints with dry friction by no force in them."""
+        self.stopped_joints = _find_stopped(closure, self.loads)
+        """Of several inputs, the other joints with hard stops, by name, with their limits."""
         sticks = any(rubbing.friction.breakaway_excess for rubbing in self.friction_joints)
         self._has_no_laws = not sticks and self.applied is None
         """Whether the equation has neither laws nor an excess of friction at rest."""
@@ -340,8 +344,9 @@ class Mechanics:
         if len(mobility) < count or not all_finite((*chain(*mobility), *bias)):
             return None
         slips: tuple[Slip, ...] = ()
-        if self.dry_joints:
-            from linkage_ros.dynamics.dry_friction import Slip  # local import: only with it
+        limited: tuple[Slip, ...] = ()
+        if self.dry_joints or self.stopped_joints:
+            from linkage_ros.dynamics.applied import joint_coordinate  # local import: only here
 
             ways = [way.state.coordinates for way in alone]
             a = still.state.coordinates
@@ -349,11 +354,17 @@ class Mechanics:
                 Slip(tuple(map(one.slip_rate, ways)), one.slip_rate(v), one.slip_rate(a))
                 for one in self.dry_joints
             )
-        if self.applied is None:
-            return InputTerms(matrix, mobility, bias, (), slips)
-        more, laws = self.applied.several_inputs(position, velocity, alone)
-        bias = tuple(one + other for one, other in zip(bias, more, strict=True))
-        return InputTerms(matrix, mobility, bias, tuple(InputLawTerm(*law) for law in laws), slips)
+            for name in self.stopped_joints:
+                joint = joint_coordinate(closure, name)
+                levers = tuple(joint.lever(way, position, ()) for way in alone)
+                rate, curved = (joint.lever(of, position, ()) for of in (velocity, still))
+                limited += (Slip(levers, rate, curved, joint.value(position)),)
+        laws: tuple[InputLawTerm, ...] = ()
+        if self.applied is not None:
+            more, found = self.applied.several_inputs(position, velocity, alone)
+            bias = tuple(one + other for one, other in zip(bias, more, strict=True))
+            laws = tuple(InputLawTerm(*law) for law in found)
+        return InputTerms(matrix, mobility, bias, laws, slips, limited)
 
     @cached_property
     def input_equation(
@@ -370,11 +381,11 @@ class Mechanics:
             terms = self.input_terms(motion.position, rates)
             if terms is None:
                 return []
-            laws, slips = (
+            others = (
                 [*chain.from_iterable((*at.levers, *at[1:]) for at in part)]
-                for part in (terms.laws, terms.slips)
+                for part in (terms.laws, terms.slips, terms.limited)
             )
-            return [terms.matrix, *terms.mobility, terms.bias, laws, slips]
+            return [terms.matrix, *terms.mobility, terms.bias, *others]
 
         compiled = Compiled(self.closure, 0, list_terms, within_limits=False, given_count=count)
         fast, close, terms_at = compiled.fast, self.closure.close_unlimited, self.input_terms
@@ -383,20 +394,18 @@ class Mechanics:
             found = fast(*values, *rates)
             if found is None:
                 return terms_at(close(*values), rates)
-            matrix, *mobility, bias, numbers, rubbing = found
-            laws = tuple(map(InputLawTerm._make, split(numbers)))
-            slips = tuple(map(slip_of, split(rubbing))) if rubbing else ()
-            return InputTerms(matrix, tuple(mobility), bias, laws, slips)
+            matrix, *mobility, bias, numbers, rubbing, stopped = found
+            laws = tuple([InputLawTerm(*at) for at in split(numbers, 2)])
+            slips, limited = (
+                tuple([Slip(*at) for at in split(part, 3)]) for part in (rubbing, stopped)
+            )
+            return InputTerms(matrix, tuple(mobility), bias, laws, slips, limited)
 
-        def split(numbers: Sequence[float]) -> Iterator[tuple[Any, float, float]]:
+        def split(numbers: Sequence[float], more: int) -> Iterator[tuple[Any, ...]]:
             left = iter(numbers)
-            for _ in range(len(numbers) // (count + 2)):
-                yield tuple(islice(left, count)), next(left), next(left)
+            for _ in range(len(numbers) // (count + more)):
+                yield tuple(islice(left, count)), *islice(left, more)
 
-        if self.dry_joints:
-            from linkage_ros.dynamics.dry_friction import Slip  # local import: only with it
-
-            slip_of = Slip._make
         return equation
 
     def _inertia_forces(
@@ -522,10 +531,17 @@ class Mechanics:
     @property
     def dry_frictions(self) -> tuple[DryFriction, ...]:
         """Return the dry friction of `dry_joints`, as a linkage of several inputs takes it."""
-        from linkage_ros.dynamics.dry_friction import DryFriction  # local import: only with it
-
         rubbing = [joint.friction for joint in self.dry_joints]
         return tuple(DryFriction(f.coulomb, f.breakaway_excess, f.stribeck) for f in rubbing)
+
+    @property
+    def joint_stops(self) -> tuple[tuple[float, float, float | None], ...]:
+        """Return the hard stops of `stopped_joints`, as a linkage of several inputs takes them."""
+        joints, stops = self.closure.linkage.joints, self.stopped_joints
+        return tuple(
+            (one.low, one.high, 0.5 * (one.low + one.high) if joints[name].unit == 'rad' else None)
+            for name, one in stops.items()
+        )
 
     def check_curves(self, places: Sequence[Terms], method: str, step: float) -> None:
         """
@@ -656,6 +672,14 @@ def _bodies_of(closure: Any, loads: Loads) -> BodyModel:
     from linkage_ros.dynamics.spatial_bodies import spatial_bodies  # local import: in space only
 
     return spatial_bodies(closure, loads)
+
+
+def _find_stopped(closure: Closure, loads: Loads) -> dict[str, Limits]:
+    """Return the limits of joints with hard stops that are no inputs, of several inputs."""
+    inputs = [given.joint for given in closure.linkage.inputs]
+    yielding = (*inputs, *loads.applied.stops)
+    limits = closure.linkage.limits.items() if len(inputs) > 1 else ()
+    return {name: one for name, one in limits if one.is_bounded and name not in yielding}
 
 
 def _make_applied(closure: Closure, loads: Loads) -> AppliedForces | None:

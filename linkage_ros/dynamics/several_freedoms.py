@@ -31,6 +31,10 @@ that stick add equations, w·q̈ + ẇ·q̇ = 0 each, whose multipliers are thei
 comes to 0, or a joint that sticks needs more than it holds, the step is cut. Rates are projected
 so that slips at rest stay 0.
 
+The hard stop of another joint is met by an impulse on this joint, w: M·Δq̇ = L·w. While it is
+pushed against its stop it is a joint at rest whose friction only pushes, one of that
+complementarity.
+
 At a toggle the inertia M grows without bound. With several inputs toggles are no ends of ranges
 but surfaces: the motion is held as by a stop where the sum of the inertias is a given multiple of
 that at the start.
@@ -38,7 +42,7 @@ that at the start.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import copysign, inf, ulp
 from operator import add, mul, sub
@@ -52,6 +56,7 @@ from linkage_ros.dynamics.dry_friction import (
     Slip,
 )
 from linkage_ros.dynamics.equation import InputTerms, solve_positive
+from linkage_ros.dynamics.laws import nearest_turn
 from linkage_ros.dynamics.motion import LARGEST, last_before, NARROW
 
 if TYPE_CHECKING:
@@ -130,6 +135,8 @@ class _Piece(NamedTuple):
     # Of joints with dry friction and of brakes, by number, the direction in which they slide or 0.
     senses: Mapping[int, float] = MappingProxyType({})
     sticking: tuple[int, ...] = ()  # Of those that stick as many as say that all do
+    # Joints that lean on their stops, by number among these: 1 on the upper one, −1 on the lower.
+    leaning: Mapping[int, int] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +151,15 @@ class SeveralDofMechanism:
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``InputTerms.laws``
     most_inertia: float = inf  # Sum of the inertias at which a toggle holds the motion
     frictions: tuple[DryFriction, ...] = ()  # As in ``InputTerms.slips``
+    # Stops as in ``InputTerms.limited``, and the angle nearest to which values are meant, if any.
+    joint_stops: tuple[tuple[float, float, float | None], ...] = ()
 
     def state_at(self, value: Sequence[float], rate: Sequence[float]) -> SeveralMotion | None:
         """Return a state, or None if it cannot exist."""
         if any(not low <= at <= high for at, (low, high) in zip(value, self.stops, strict=True)):
             return None
-        return self._reach(InputVector(value), InputVector(rate))
+        begin = self._reach(InputVector(value), InputVector(rate))
+        return None if begin and self._passed_stop(begin.terms) is not None else begin
 
     def acceleration(
         self,
@@ -236,9 +246,14 @@ class SeveralDofMechanism:
         held = [n for n in self._inputs_at_stops(motion) if motion.rate[n] == 0.0]
         brakes = brakes if any(brakes) else ()
         # Those that would be pulled are free; the worst of them first.
+        leaning = {
+            k: self._nearer_stop(k, motion.terms)
+            for k in range(len(self.joint_stops))
+            if self._first_stop + k in motion.resting
+        }
         while True:
-            piece = _Piece(now, force, tuple(held), cuts, segments, brakes)
-            if self.frictions or brakes:
+            piece = _Piece(now, force, tuple(held), cuts, segments, brakes, leaning=leaning)
+            if self.frictions or brakes or leaning:
                 piece = self._with_frictions(begin, piece)
             pulls = {n: self._stop_pull(begin, n, piece) for n in held}
             worst = max(held, key=pulls.__getitem__, default=None)
@@ -253,13 +268,45 @@ class SeveralDofMechanism:
             if brake:
                 levers = tuple(float(i == n) for i in range(len(rate)))
                 slips[len(self.frictions) + n] = Slip(levers, rate[n], 0.0)
-        return slips
+        return slips | {self._first_stop + k: terms.limited[k] for k in piece.leaning}
+
+    @property
+    def _first_stop(self) -> int:
+        """Return the number of the first joint with a stop, after frictions and brakes."""
+        return len(self.frictions) + len(self.stops)
 
     def _friction_of(self, number: int, piece: _Piece) -> DryFriction:
         joints = len(self.frictions)
         if number < joints:
             return self.frictions[number]
         return DryFriction(piece.brakes[number - joints])
+
+    def _bounds_of(self, number: int, piece: _Piece) -> tuple[float, float]:
+        """Return the least and the greatest force that holds a joint at rest."""
+        if number >= self._first_stop:
+            return (-inf, 0.0) if piece.leaning[number - self._first_stop] > 0 else (0.0, inf)
+        holding = self._friction_of(number, piece).holding
+        return -holding, holding
+
+    def _joint_value(self, number: int, terms: InputTerms) -> float:
+        """Return the value of a joint with a stop."""
+        value, middle = terms.limited[number].value, self.joint_stops[number][2]
+        return value if middle is None else nearest_turn(value, middle)
+
+    def _nearer_stop(self, number: int, terms: InputTerms) -> int:
+        low, high, _ = self.joint_stops[number]
+        return 1 if 2.0 * self._joint_value(number, terms) >= low + high else -1
+
+    def _passed_stop(self, terms: InputTerms, leaning: Collection[int] = ()) -> int | None:
+        """Return the number of a joint beyond a stop on which it does not lean, or None."""
+        for number in range(len(self.joint_stops)):
+            if number not in leaning and self._stop_margin(number, terms) < 0.0:
+                return number
+        return None
+
+    def _stop_margin(self, number: int, terms: InputTerms) -> float:
+        (low, high, _), value = self.joint_stops[number], self._joint_value(number, terms)
+        return min(value - low, high - value)
 
     def _with_frictions(self, motion: SeveralMotion, piece: _Piece) -> _Piece:
         """Return a piece with the joints that slide from a state on, and those that stick."""
@@ -275,8 +322,12 @@ class SeveralDofMechanism:
             slipping = self._find_slipping(motion, piece)
             if not slipping:
                 break
-            # Once they slide they resist less, and others may break away.
-            senses = {**senses, **slipping}
+            # Once they slide they resist less, and others may break away; stops only let go.
+            free = {j - self._first_stop for j in slipping}
+            leaning = {k: side for k, side in piece.leaning.items() if k not in free}
+            piece = piece._replace(leaning=leaning)
+            slips = self._slips(motion.terms, motion.rate, piece)
+            senses = {j: {**senses, **slipping}[j] for j in slips}
         matrix, resting = self._couple_slips(motion.terms, slips, piece)
         sticking = independent_slips(matrix, range(len(resting)))
         return piece._replace(sticking=tuple([resting[k] for k in sticking]))
@@ -301,7 +352,7 @@ class SeveralDofMechanism:
         _, accelerations = settle_forces(
             matrix,
             [sum(map(mul, slips[j].levers, change)) + slips[j].bias for j in resting],
-            [self._friction_of(j, piece).holding for j in resting],
+            [self._bounds_of(j, piece) for j in resting],
         )
         found = zip(resting, accelerations, strict=True)
         return {j: copysign(1.0, slipping) for j, slipping in found if slipping}
@@ -327,9 +378,9 @@ class SeveralDofMechanism:
             return -1.0 if self._find_slipping(motion, piece) else 1.0
         force = self._force(motion.terms, motion.rate, piece.now + motion.ahead, piece)
         borne = self._sticking_forces(motion.terms, motion.rate, piece, force)
-        holding = [self._friction_of(j, piece).holding for j in piece.sticking]
-        pairs = zip(holding, borne, strict=False)
-        return min((most - abs(part) for most, (_, part) in pairs), default=inf)
+        bounds = [self._bounds_of(j, piece) for j in piece.sticking]
+        parts = zip(bounds, borne, strict=True)
+        return min((min(part - low, high - part) for (low, high), (_, part) in parts), default=inf)
 
     def _rest_slips(
         self, motion: SeveralMotion, piece: _Piece, halted: int | None
@@ -495,6 +546,9 @@ class SeveralDofMechanism:
         for n, (at, (low, high)) in enumerate(zip(motion.value, self.stops, strict=True)):
             if not low <= at <= high and n not in piece.held:
                 return _StepEnd('stop', n)
+        passed = self._passed_stop(motion.terms, piece.leaning)
+        if passed is not None:
+            return _StepEnd('stop', len(self.stops) + passed)
         inertia = motion.terms.total_inertia
         if inertia > self.most_inertia and inertia > begin.terms.total_inertia:
             return _StepEnd('toggle')
@@ -517,6 +571,8 @@ class SeveralDofMechanism:
     def _event_margin(self, event: _StepEnd, piece: _Piece) -> Callable[[SeveralMotion], float]:
         """Return a function that gives the margin of a state to an event."""
         kind, n = event
+        if kind == 'stop' and n >= len(self.stops):
+            return lambda motion: self._stop_margin(n - len(self.stops), motion.terms)
         if kind == 'stop':
             low, high = self.stops[n]
             return lambda motion: min(motion.value[n] - low, high - motion.value[n])
@@ -551,7 +607,9 @@ class SeveralDofMechanism:
         )
 
     def _meet_stop(self, motion: SeveralMotion, number: int, restitution: float) -> SeveralMotion:
-        """Return the state after an input's impact on the nearer stop."""
+        """Return the state after an impact of an input or another joint on its nearer stop."""
+        if number >= len(self.stops):
+            return self._meet_joint_stop(motion, number - len(self.stops), restitution)
         low, high = self.stops[number]
         at, rate = motion.value[number], motion.rate[number]
         upper = abs(at - high) <= abs(at - low)
@@ -565,6 +623,20 @@ class SeveralDofMechanism:
         rates = [w - impulse * by for w, by in zip(motion.rate, way, strict=True)]
         rates[number] = 0.0 - restitution * rate
         return self._reach(met.value, InputVector(rates)) or _at_rest(met)
+
+    def _meet_joint_stop(
+        self, motion: SeveralMotion, number: int, restitution: float
+    ) -> SeveralMotion:
+        terms, rates = motion.terms, motion.rate
+        joint, side = terms.limited[number], self._nearer_stop(number, terms)
+        if joint.rate * side > 0.0:
+            way = InputVector([sum(map(mul, row, joint.levers)) for row in terms.mobility])
+            impulse = (1.0 + restitution) * joint.rate / sum(map(mul, joint.levers, way))
+            rates = motion.rate - impulse * way
+        met = self._reach(motion.value, rates) or _at_rest(motion)
+        if restitution and joint.rate:
+            return met
+        return met._replace(resting=frozenset({self._first_stop + number}))
 
     def _bounce(self, motion: SeveralMotion) -> SeveralMotion:
         """Return a state whose rates are reversed, as far as an impact returns them."""

@@ -21,6 +21,7 @@ from linkage_ros.dynamics import (
     SingleDofMechanism,
 )
 from linkage_ros.dynamics.dry_friction import settle_forces
+from linkage_ros.kinematics import Limits
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
@@ -41,7 +42,9 @@ def test_forces_of_joints_at_rest_are_complementary_to_their_slips():
         push = random.normal(size=inputs) * random.choice([0.1, 1.0, 5.0])
         mobility = np.linalg.inv(inertia)
         forces, slips = settle_forces(
-            (levers @ mobility @ levers.T).tolist(), (levers @ mobility @ push).tolist(), limits
+            (levers @ mobility @ levers.T).tolist(),
+            (levers @ mobility @ push).tolist(),
+            [(-limit, limit) for limit in limits],
         )
         lower = np.linalg.inv(np.linalg.cholesky(inertia))
         least = lsq_linear(
@@ -64,7 +67,7 @@ def mechanism(mechanics, stops=None, **given):
     count = len(mechanics.closure.input_names)
     return SeveralDofMechanism(
         mechanics.input_equation, METHODS['rk4'].step, stops or (FREE,) * count,
-        frictions=mechanics.dry_frictions, **given,
+        frictions=mechanics.dry_frictions, joint_stops=mechanics.joint_stops, **given,
     )  # fmt: skip
 
 
@@ -188,3 +191,69 @@ def test_at_a_toggle_friction_ends_no_step_for_ever():
     for _ in range(600):
         state = moved.advance(state, 1e-3, [0.0, 0.0])
     assert state.rate == (0.0, 0.0)
+
+
+def stopped_foot(restitution):
+    """Return an ankle whose roll, no input, has a stop beside the pose, and its mechanism."""
+    closure, start = several('ankle_motors')
+    hinges = dict(closure.linkage.hinges)
+    hinges['roll'] = replace(hinges['roll'], limits=Limits(-0.02, 0.3))
+    closure = type(closure)(replace(closure.linkage, hinges=hinges), closure.name)
+    mechanics = Mechanics(closure, Loads())
+    return closure, start, mechanism(mechanics, restitution=restitution)
+
+
+def roll_of(closure, state):
+    position = closure.close_unlimited(*state.value)
+    joint = closure.joint_names.index('roll')
+    return position.joints[joint], closure.velocity(position, *state.rate).joints[joint]
+
+
+def roll_levers(closure, values):
+    position, joint = closure.close_unlimited(*values), closure.joint_names.index('roll')
+    units = (1.0, 0.0), (0.0, 1.0)
+    return np.array([closure.velocity(position, *unit).joints[joint] for unit in units])
+
+
+@pytest.mark.parametrize('restitution', [1.0, 0.5, 0.0])
+def test_a_joint_that_is_no_input_meets_its_hard_stop(restitution):
+    closure, start, moved = stopped_foot(restitution)
+    ways = roll_levers(closure, start)
+    state = moved.state_at(start, (-0.5 * ways / (ways @ ways)).tolist())
+    rates, energies, lowest = [], [], 0.0
+    for _ in range(100):
+        state = moved.advance(state, 1e-3, [0.0, 0.0])
+        value, rate = roll_of(closure, state)
+        lowest = min(lowest, value)
+        rates.append(rate)
+        inertia = [[state.terms.inertia(i, j) for j in range(2)] for i in range(2)]
+        energies.append(0.5 * np.dot(state.rate, np.dot(inertia, state.rate)))
+    assert lowest == pytest.approx(-0.02, abs=1e-3)
+    assert lowest >= -0.02 - 1e-12
+    impact = int(np.argmax(np.diff(rates)))
+    assert rates[impact + 1] == pytest.approx(
+        -restitution * rates[impact], abs=0.05 * abs(rates[impact])
+    )
+    if restitution == 1.0:
+        assert energies[-1] == pytest.approx(energies[0], rel=1e-9)
+    else:
+        assert energies[-1] < 0.99 * energies[0]
+
+
+def test_a_joint_leans_on_its_stop_while_it_is_pushed():
+    closure, start, moved = stopped_foot(0.0)
+    joint = closure.joint_names.index('roll')
+    push = (-0.1 * roll_levers(closure, start)).tolist()
+    state = moved.state_at(start, [0.0, 0.0])
+    for _ in range(150):
+        state = moved.advance(state, 1e-3, push)
+    assert roll_of(closure, state) == pytest.approx((-0.02, 0.0), abs=1e-9)
+    # The other freedom has the acceleration of what is held there.
+    change = moved.acceleration(state, push)
+    position = closure.close_unlimited(*state.value)
+    velocity = closure.velocity(position, *state.rate)
+    assert abs(closure.acceleration(position, velocity, *change).joints[joint]) < 1e-9
+    for _ in range(100):
+        state = moved.advance(state, 1e-3, [-part for part in push])
+    value, rate = roll_of(closure, state)
+    assert value > -0.01 or rate > 0.01, 'it leaves'

@@ -26,7 +26,7 @@ from typing import Any, TYPE_CHECKING
 
 from linkage_ros.description import choice, each_part, number, optional_section, whole_number
 from linkage_ros.dynamics import LARGEST, METHODS, SingleDofMechanism
-from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, describe_ranges
 from linkage_ros.messages import effort_reader, JOINT_STATE_TYPE, NANOSECONDS
 from linkage_ros.stages.drives.drive import Context, Drive, Reader
@@ -405,7 +405,8 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         tuple((given.limits.low, given.limits.high) for given in limits),
         parameters.restitution,
         mechanics.applied.laws if mechanics.applied else (),
-        frictions=mechanics.dry_frictions if mechanics.dry_joints else (),
+        frictions=mechanics.dry_frictions,
+        joint_stops=mechanics.joint_stops,
     )
     start = mechanism.state_at([use.start for use in own], [use.rate for use in own])
     if start is None:
@@ -459,12 +460,4 @@ def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
                 f'effects.friction.joints.{name}.coefficient',
                 f'friction by the force in a joint {reason}',
                 'write coulomb instead',
-            )
-    hard = context.hard_limited.linkage.limits
-    for name in hard.keys() - {*names}:
-        if hard[name].is_bounded:
-            raise DefinitionError(
-                'drive.torque',
-                f'the hard stop of {quote(name)}, by its limits, {reason}: only inputs have one',
-                f'write loads.stops.{name}: {{stiffness: 1000}}, or remove its limits',
             )
