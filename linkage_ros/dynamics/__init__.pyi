@@ -7,6 +7,7 @@
 # language governing permissions and limitations under the License.
 
 from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
+from linkage_ros.dynamics.dry_friction import settle_forces as settle_forces
 from linkage_ros.dynamics.equation import (
     InputLawTerm as InputLawTerm,
     InputTerms as InputTerms,

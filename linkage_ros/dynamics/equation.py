@@ -395,13 +395,13 @@ class Mechanics:
             if found is None:
                 return terms_at(close(*values), rates)
             matrix, *mobility, bias, numbers, rubbing, stopped = found
-            laws = tuple([InputLawTerm(*at) for at in split(numbers, 2)])
+            laws = tuple([InputLawTerm(*at) for at in take_parts(numbers, 2)])
             slips, limited = (
-                tuple([Slip(*at) for at in split(part, 3)]) for part in (rubbing, stopped)
+                tuple([Slip(*at) for at in take_parts(part, 3)]) for part in (rubbing, stopped)
             )
             return InputTerms(matrix, tuple(mobility), bias, laws, slips, limited)
 
-        def split(numbers: Sequence[float], more: int) -> Iterator[tuple[Any, ...]]:
+        def take_parts(numbers: Sequence[float], more: int) -> Iterator[tuple[Any, ...]]:
             left = iter(numbers)
             for _ in range(len(numbers) // (count + more)):
                 yield tuple(islice(left, count)), *islice(left, more)

@@ -17,10 +17,10 @@ from linkage_ros.dynamics import (
     Loads,
     Mechanics,
     METHODS,
+    settle_forces,
     SeveralDofMechanism,
     SingleDofMechanism,
 )
-from linkage_ros.dynamics.dry_friction import settle_forces
 from linkage_ros.kinematics import Limits
 import numpy as np
 import pytest
