@@ -343,28 +343,40 @@ class Mechanics:
         mobility = tuple(tuple(column) for column in columns if column)
         if len(mobility) < count or not all_finite((*chain(*mobility), *bias)):
             return None
-        slips: tuple[Slip, ...] = ()
-        limited: tuple[Slip, ...] = ()
-        if self.dry_joints or self.stopped_joints:
-            from linkage_ros.dynamics.applied import joint_coordinate  # local import: only here
-
-            ways = [way.state.coordinates for way in alone]
-            a = still.state.coordinates
-            slips = tuple(
-                Slip(tuple(map(one.slip_rate, ways)), one.slip_rate(v), one.slip_rate(a))
-                for one in self.dry_joints
-            )
-            for name in self.stopped_joints:
-                joint = joint_coordinate(closure, name)
-                levers = tuple(joint.lever(way, position, ()) for way in alone)
-                rate, curved = (joint.lever(of, position, ()) for of in (velocity, still))
-                limited += (Slip(levers, rate, curved, joint.value(position)),)
         laws: tuple[InputLawTerm, ...] = ()
         if self.applied is not None:
             more, found = self.applied.several_inputs(position, velocity, alone)
             bias = tuple(one + other for one, other in zip(bias, more, strict=True))
             laws = tuple(InputLawTerm(*law) for law in found)
-        return InputTerms(matrix, mobility, bias, laws, slips, limited)
+        if not (self.dry_joints or self.stopped_joints):
+            return InputTerms(matrix, mobility, bias, laws)
+        return InputTerms(
+            matrix, mobility, bias, laws, *self._find_slips(position, velocity, still, alone)
+        )
+
+    def _find_slips(
+        self,
+        position: Position,
+        velocity: Velocity,
+        still: Acceleration,
+        alone: Sequence[Velocity],
+    ) -> tuple[tuple[Slip, ...], tuple[Slip, ...]]:
+        """Return the slips of joints with dry friction, and the motion of those with stops."""
+        from linkage_ros.dynamics.applied import joint_coordinate  # local import: only here
+
+        limited: tuple[Slip, ...] = ()
+        ways = [way.state.coordinates for way in alone]
+        v, a = velocity.state.coordinates, still.state.coordinates
+        slips = tuple(
+            Slip(tuple(map(one.slip_rate, ways)), one.slip_rate(v), one.slip_rate(a))
+            for one in self.dry_joints
+        )
+        for name in self.stopped_joints:
+            joint = joint_coordinate(self.closure, name)
+            levers = tuple(joint.lever(way, position, ()) for way in alone)
+            rate, curved = (joint.lever(of, position, ()) for of in (velocity, still))
+            limited += (Slip(levers, rate, curved, joint.value(position)),)
+        return slips, limited
 
     @cached_property
     def input_equation(
@@ -396,6 +408,8 @@ class Mechanics:
                 return terms_at(close(*values), rates)
             matrix, *mobility, bias, numbers, rubbing, stopped = found
             laws = tuple([InputLawTerm(*at) for at in take_parts(numbers, 2)])
+            if not (rubbing or stopped):
+                return InputTerms(matrix, tuple(mobility), bias, laws)
             slips, limited = (
                 tuple([Slip(*at) for at in take_parts(part, 3)]) for part in (rubbing, stopped)
             )
