@@ -357,7 +357,8 @@ def test_source_of_what_is_driven_by_joints_coordinates_distances_and_angles(
         given.append(tuple(part[joint] for part in motion for joint in joints))
         starts[-1] = [*starts[-1], *rates, *rates]
     inverse = closure.driven_by(*joints, near=[at + 0.07 for at in pose])
-    given = [(*turn_to_pose(inverse, state[: len(pose)]), *state[len(pose) :]) for state in given]
+    count = len(pose)
+    given = [(*turn_to_pose(inverse, state[:count]), *state[count:]) for state in given]
     former = [one for one in closure.input_names if one not in joints]
     found = run(subject(inverse, joints=former), given, tmp_path)
     places = [closure.input_names.index(one) + len(pose) * k for k in range(3) for one in former]
