@@ -35,7 +35,7 @@ from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics import Position, Status
 from linkage_ros.node.demo_nodes import run_demo_node
 from linkage_ros.node.parameters import declare_parameters, LINKAGE_NODE
-from linkage_ros.stages.drives import ExchangedInputs, FoundInputs
+from linkage_ros.stages.drives import ExchangedInputs, ExchangedMotion
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -168,7 +168,7 @@ class _Line(NamedTuple):
 
     def motion_at(
         self, values: list[float], rates: list[float], accelerations: list[float]
-    ) -> FoundInputs:
+    ) -> ExchangedMotion:
         """Return the inputs, with rates and accelerations: NaN where those of a joint are."""
         exchange = self.exchange
         position = exchange.find_position(values)
@@ -185,7 +185,7 @@ class _Line(NamedTuple):
             if any(isfinite(one) and one for one in (*rates, *accelerations)):
                 joints = list_names(self.joints)
                 raise RefusedError(f'{joints} turns back there: the crank has no rate')
-            return FoundInputs(motion.inputs, tuple(rates), tuple(accelerations))
+            return ExchangedMotion(motion.inputs, tuple(rates), tuple(accelerations))
         return motion
 
     def _reason(self, position: Position | None) -> str:

@@ -246,8 +246,7 @@ def _reached_limits(
         if position.status is Status.LIMITED:
             continue
         for k, way in product(range(len(steps)), (-1, 1)):
-            after = k + 1
-            beside = (*place[:k], place[k] + way, *place[after:])
+            beside = tuple(one + way * (i == k) for i, one in enumerate(place))
             if beside not in met:
                 met.add(beside)
                 waiting.append((beside, values))

@@ -163,7 +163,7 @@ class SpaceClosure(StepwiseClosure):
         """Return a linkage of these links with the places of a position as its pose."""
         plan, state = self._plan, position.state
 
-        def place_joint(link: str, joint: SpatialJoint) -> tuple[Vector, Vector, Vector]:
+        def carry_joint(link: str, joint: SpatialJoint) -> tuple[Vector, Vector, Vector]:
             """Return place and axis of a joint, and a vector across, as a link has them."""
             drawn, frame = plan.pose_frames[link], state.pins[plan.frames[link]]
             at = frame.place(drawn.locate(scale(1.0 / self.scale, joint.at)))
@@ -172,12 +172,12 @@ class SpaceClosure(StepwiseClosure):
             return scale(self.scale, at), frame.turn(drawn.resolve(along)), across
 
         def redraw(name: str, joint: SpatialJoint, *, slides: bool) -> SpatialJoint:
-            at, axis, across = place_joint(joint.parent, joint)
+            at, axis, across = carry_joint(joint.parent, joint)
             value = joint.value
             if name in plan.coordinates:
                 value = state.coordinates[plan.coordinates[name]] * (self.scale if slides else 1.0)
             elif joint.child in plan.frames:
-                moved, _, turned = place_joint(joint.child, joint)
+                moved, _, turned = carry_joint(joint.child, joint)
                 value += (
                     dot(axis, minus(moved, at))
                     if slides

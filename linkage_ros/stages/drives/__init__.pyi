@@ -12,7 +12,7 @@ from linkage_ros.stages.drives.compiled_drive import compile_drive as compile_dr
 from linkage_ros.stages.drives.dependent_samples import (
     DependentSampleReader as DependentSampleReader,
     ExchangedInputs as ExchangedInputs,
-    FoundInputs as FoundInputs,
+    ExchangedMotion as ExchangedMotion,
 )
 from linkage_ros.stages.drives.drive import (
     Context as Context,

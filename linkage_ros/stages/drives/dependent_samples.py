@@ -31,7 +31,7 @@ _SAME = 1e-6
 """Farthest that a joint may be from what is asked for, in [rad] or of the linkage's size."""
 
 
-class FoundInputs(NamedTuple):
+class ExchangedMotion(NamedTuple):
     """Inputs with their rates and accelerations; NaN where they have none, or none are given."""
 
     inputs: Values
@@ -85,10 +85,10 @@ class ExchangedInputs:
 
     def motion_at(
         self, position: Position, rates: Sequence[float], accelerations: Sequence[float] = ()
-    ) -> FoundInputs:
+    ) -> ExchangedMotion:
         """Return the inputs at a position with rates and accelerations of the joints."""
         none = (nan,) * len(self._names)
-        found = FoundInputs(self._inputs_of(position), none, none)
+        found = ExchangedMotion(self._inputs_of(position), none, none)
         if not (position.status.has_rates and rates and all(map(isfinite, rates))):
             return found
         velocity = self.inverse.velocity(position, *rates)
