@@ -46,7 +46,7 @@ This page is made by `python -m campaigns.robots FOLDER --write`; do not edit it
 those of Gepetto/example-parallel-robots: URDFs of legs and arms with loops, which a YAML file
 beside each closes. The files are as published, and this is all that was typed:
 
-```text
+```sh no-test: needs a checkout of the robots
 linkage check FOLDER/ROBOT/robot.yaml --near
 ```
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import shutil
 import sys
 
-from linkage_ros.cli import angle_text, describe_group, fixed_text
+from linkage_ros.cli import angle_text, describe_groups, fixed_text
 from linkage_ros.description import load
 from linkage_ros.kinematics import (
     Closure,
@@ -33,7 +33,6 @@ from linkage_ros.kinematics import (
     LinkageView,
     links_of,
     prepare_view,
-    sides_at,
     SpaceClosure,
     transmission_angles,
     usual_inputs,
@@ -190,9 +189,8 @@ def _sequence(closure: Closure | SpaceClosure) -> str:
     if isinstance(closure, SpaceClosure):
         return '; '.join(' '.join(filter(None, group_words(*group))) for group in closure.groups)
     steps = []
-    sides = sides_at(closure, closure.position(*usual_inputs(closure)))
-    for index, group in enumerate(closure.structure.groups):
-        kind, links, how, assembly = describe_group(closure, index, sides)
+    described = zip(closure.structure.groups, describe_groups(closure), strict=True)
+    for group, (kind, links, how, assembly) in described:
         if isinstance(group, Driven):
             driven = closure.linkage.driven_joints[group.index].joint
             steps.append(f'{kind} {driven}')

@@ -40,6 +40,7 @@ from linkage_ros.cli.bag_reading import (
     scene_json as scene_json,
     scene_of as scene_of,
 )
+from linkage_ros.cli.check import describe_groups as describe_groups
 from linkage_ros.cli.completion import SHELLS as SHELLS
 from linkage_ros.cli.echo import as_yaml as as_yaml, rate_text as rate_text
 from linkage_ros.cli.info import bag_tables as bag_tables

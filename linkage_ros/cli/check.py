@@ -114,7 +114,7 @@ def _describe_linkage(
     parts: list[Callable[..., dict[str, Any] | Table]] = []
     assemblies: Callable[..., dict[str, Any] | Table] = _other_poses_table
     if isinstance(closure, Closure):
-        groups, account = [*_describe_groups(closure)], _structure_json(closure)
+        groups, account = [*describe_groups(closure)], _structure_json(closure)
         parts, assemblies = [_four_bars_table], _other_assemblies
     else:
         groups, account = closure.groups, _space_json(closure)
@@ -296,7 +296,8 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
     return {'other_assemblies': groups}
 
 
-def _describe_groups(closure: Closure) -> Iterator[GroupDescription]:
+def describe_groups(closure: Closure) -> Iterator[GroupDescription]:
+    """Yield the groups of a planar linkage in words, with the sides on which they are."""
     sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
     for number in range(len(closure.structure.groups)):
         yield _describe_group(closure, number, sides)

@@ -28,9 +28,9 @@ def read_as_urdf(file: Path) -> bytes:
 
     A LinkageError has file, line or element, and remedy.
     """
-    if file.suffix.lower() in YAML:
-        return _with_closings(file)
     data = read_urdf_file(file)
+    if file.suffix.lower() in YAML and CLOSINGS.encode() in data:
+        return _with_closings(file)
     name = str(file)
     root = parse_robot(data, name) if file.suffix.lower() != '.urdf' else None
     if root is not None and root.tag == 'sdf':

@@ -456,7 +456,8 @@ def test_messages_tell_what_rosbags_has_written(data: Any, stamp: int, kind: str
         vector, wrench = types['geometry_msgs/msg/Vector3'], types['geometry_msgs/msg/Wrench']
         wrenches = [wrench(vector(*row[:3]), vector(*row[3:])) for row in six.tolist()]
         message = types[kind](header, joints, [], [], wrenches)
-        told_of = {'force x': six[:, 0], 'force y': six[:, 1], 'torque': six[:, 5]}
+        quantities = ('force x', 'force y', 'force z', 'torque x', 'torque y', 'torque')
+        told_of = dict(zip(quantities, six.T, strict=True))
     for quantity, values in told_of.items():
         if len(values):
             expected += [((name, quantity), v) for name, v in zip(joints, values, strict=True)]

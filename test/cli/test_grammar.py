@@ -169,7 +169,6 @@ def test_a_name_that_is_nearly_right_is_told(name: str) -> None:
 METAVARS = {
     'BAG',
     'FILE',
-    'FILE|BAG',
     'FILE|SCENE|BAG',
     'NAME',
     'OTHER',

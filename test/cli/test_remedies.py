@@ -86,7 +86,7 @@ def test_masses_are_added_as_the_error_writes_them(tmp_path):
 
 def test_of_two_inputs_one_joint_is_not_asked_for_by_two_names():
     text = refusal_of('five_bar', 'drive={topic: {joint: left_elbow}}')
-    assert 'one joint does not determine 2 inputs; leave it out' in text
+    assert '1 for 2 inputs; name 2 different joints' in text
     load_scene('five_bar', ['drive={topic: {}}'])
 
 

@@ -34,7 +34,7 @@ WITH_BAGS_TOO = {'accuracy', 'animate', 'view'}
 
 FILES = {
     'urdf': (b'<?xml version="1.0"?>\n<!-- by hand -->\n<robot name="r"/>\n', 'a URDF'),
-    'xml': (b'<mujoco model="m"/>', 'a model of MuJoCo'),
+    'xml': (b'<mujocoinclude/>', 'an XML file'),
     'html': (b'<!doctype html>\n<html></html>', 'a web page'),
     'svg': (b'<svg xmlns="http://www.w3.org/2000/svg"/>', 'a picture'),
     'png': (b'\x89PNG\r\n\x1a\n' + bytes(range(256)), 'a picture'),

@@ -128,9 +128,10 @@ record: {RECORD}
 linkages:
   - {{name: one, linkage: linkage.yaml, prefix: a_, publish_input: true, beyond_limits: stop,
       drive: {{}}, effects: {{}}, loads: {LOADS}}}
-  - {{name: two, linkage: {{urdf: robot.urdf, input: [m], at: {{m: 1}}, close: [a=b]}}}}
+  - name: two
+    linkage: {{urdf: robot.urdf, input: [m], at: {{m: 1}}, near: true, close: [a=b]}}
 """,
-    'robot': 'linkage: {urdf: robot.urdf, input: [m], at: {m: 1}, close: [a=b]}\n',
+    'robot': 'linkage: {urdf: robot.urdf, input: [m], at: {m: 1}, near: true, close: [a=b]}\n',
 }
 ROBOTS = Path(__file__).parents[1] / 'robot_models' / 'robots'
 TYPES = [None, True, -1, 1e300, float('nan'), '', 'nobody', [], [0], [[]], {}, {'nobody': 0}]

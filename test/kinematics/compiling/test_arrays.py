@@ -217,7 +217,7 @@ def test_a_module_needs_nothing_but_array_api_compat():
 
 
 def test_what_has_too_many_cells_is_not_written():
-    with pytest.raises(lr.DefinitionError, match=r'6 inputs .* too many cells; give these inputs'):
+    with pytest.raises(lr.DefinitionError, match=r'6 inputs .* too many cells; give the inputs'):
         write_arrays(subject(closure_of('hexapod')))
 
 
