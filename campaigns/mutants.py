@@ -63,7 +63,7 @@ DYNAMICS = 'dynamics', 'drives', 'effects/test_effort.py', 'effects/test_pin_for
 TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py'
 BAG = ('bag',)
 TESTS: dict[str, Sequence[str]] = {
-    'kinematics/stepwise_closure': KINEMATICS,
+    'kinematics/closure': KINEMATICS,
     'kinematics/plane/plan': KINEMATICS,
     'kinematics/plane/topology': KINEMATICS,
     'kinematics/plane/diagonals': KINEMATICS,

@@ -32,6 +32,7 @@ from linkage_ros.kinematics import (
     InputSweep,
     LinkageView,
     links_of,
+    PlanarClosure,
     prepare_view,
     SpaceClosure,
     transmission_angles,
@@ -155,7 +156,7 @@ def chapter(closure: Closure | SpaceClosure, file: Path, drawn: Path) -> Iterato
     yield ''
     yield f'![{name}, its range and its joints]({drawn.name})'
     yield ''
-    yield _PLANAR_LOOK if isinstance(closure, Closure) else _SPATIAL_LOOK
+    yield _PLANAR_LOOK if isinstance(closure, PlanarClosure) else _SPATIAL_LOOK
     yield ''
     yield _head(file)
     yield ''

@@ -17,7 +17,7 @@ close its loops at a value of its input. Angles are in [rad], lengths in [m]:
 >>> import linkage_ros as lr
 >>> closure = lr.load('four_bar')
 >>> closure
-<Closure four_bar: 1 input, 2 joints>
+<PlanarClosure four_bar: 1 input, 2 joints>
 >>> position = closure.position(0.7)
 >>> position.status
 <Status.CLOSED: 'closed'>
@@ -59,8 +59,8 @@ Design a four-bar whose rocker follows a function of the crank:
 >>> from math import radians
 >>> crank, rocker = (radians(45), radians(105)), (radians(135), radians(225))
 >>> design = lr.generate_function('log10(x)', (1, 2), crank, rocker)
->>> lr.Closure(design.four_bar.linkage(), 'logarithm')
-<Closure logarithm: 1 input, 2 joints>
+>>> lr.PlanarClosure(design.four_bar.linkage(), 'logarithm')
+<PlanarClosure logarithm: 1 input, 2 joints>
 """
 
 from linkage_ros.faces import lazy_names

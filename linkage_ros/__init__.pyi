@@ -29,7 +29,8 @@ from linkage_ros.messages.joint_state import (
     Rejection as Rejection,
 )
 from linkage_ros.kinematics.batch import Batch as Batch
-from linkage_ros.kinematics.plane.closure import Closure as Closure
+from linkage_ros.kinematics.closure import Closure as Closure
+from linkage_ros.kinematics.plane.closure import PlanarClosure as PlanarClosure
 from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
     Position as Position,

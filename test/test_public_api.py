@@ -61,7 +61,7 @@ NAMES = {
     *('ArrayFunctions', 'Batch', 'Closure', 'InputRange', 'Status'),
     *('Acceleration', 'Position', 'Velocity', 'load', 'linkage_names', 'svg', 'LinkagePage'),
     *('Input', 'Limits', 'Linkage', 'Mass', 'Ratio', 'RevoluteJoint', 'SlideJoint', 'Slider'),
-    *('SpaceClosure', 'SpaceLinkage', 'SpatialJoint', 'SpatialMass'),
+    *('PlanarClosure', 'SpaceClosure', 'SpaceLinkage', 'SpatialJoint', 'SpatialMass'),
     *('Pipeline', 'Scene', 'Tick', 'load_scene', 'recorded_scene', 'scene_names'),
     *('DefinitionError', 'FileError', 'LinkageError', 'SynthesisError'),
     *('Assessment', 'Design', 'PathTask', 'Pose', 'assess', 'from_fixed_pivots'),
@@ -118,9 +118,9 @@ def test_positions_are_equal_whoever_has_found_them():
 @pytest.mark.parametrize(
     ('shown', 'text'),
     [
-        (FOUR_BAR, '<Closure four_bar: 1 input, 2 joints>'),
-        (FIVE_BAR, '<Closure five_bar: 2 inputs, 2 joints>'),
-        (lr.Closure(FOUR_BAR.linkage), '<Closure: 1 input, 2 joints>'),
+        (FOUR_BAR, '<PlanarClosure four_bar: 1 input, 2 joints>'),
+        (FIVE_BAR, '<PlanarClosure five_bar: 2 inputs, 2 joints>'),
+        (lr.Closure(FOUR_BAR.linkage), '<PlanarClosure: 1 input, 2 joints>'),
         (lr.load_scene('two_fingers'), '<Scene two_fingers: 2 linkages, 500 Hz>'),
         (POSITION, '<Position closed: coupler_joint -0.346042, rocker_joint 1.00103>'),
         (OPEN, '<Position open by 0.0619 m>'),
@@ -189,11 +189,11 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
         lambda: OPEN.points, ValueError,
         'points: <Position open by 0.0619 m> has none; check its st',
     ),
-    (lambda: FOUR_BAR.velocity(0.7, 1.0), TypeError, 'position: 0.7 is not from <Closure'),
+    (lambda: FOUR_BAR.velocity(0.7, 1.0), TypeError, 'position: 0.7 is not from <PlanarClosure'),
     (lambda: FOUR_BAR.velocity(OPEN, 1.0), TypeError, 'position: <Position open by 0.0619 m> is'),
     (
         lambda: FOUR_BAR.acceleration(POSITION, POSITION.joints, 0.0), TypeError,
-        'velocity: (-0.3460422454115175, 1.001032173019738) is not from <Closure four_bar',
+        'velocity: (-0.3460422454115175, 1.001032173019738) is not from <PlanarClosure four_bar',
     ),
     (
         lambda: lr.generate_function('x', *RANGES, points=2), lr.SynthesisError,

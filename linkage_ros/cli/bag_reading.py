@@ -45,7 +45,7 @@ from linkage_ros.cli.arguments import finite_or_none
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError, escape_unprintable, list_names
-from linkage_ros.kinematics import Closure, four_bars
+from linkage_ros.kinematics import four_bars, PlanarClosure
 from linkage_ros.replay import recorded_scene, WorstResiduals
 from linkage_ros.signals import heed_signals, StoppedError
 
@@ -280,7 +280,7 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
             'inputs': list(place.inputs),
         }
     closure = worst.closure
-    bars = four_bars(closure.structure) if isinstance(closure, Closure) else []
+    bars = four_bars(closure.structure) if isinstance(closure, PlanarClosure) else []
     return {
         'four_bars': [{'kind': bar.kind.name, 'lengths_m': list(bar.lengths)} for bar in bars],
         'states': worst.states,

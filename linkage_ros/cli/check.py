@@ -51,10 +51,10 @@ from linkage_ros.kinematics import (
     Iterated,
     Linkage,
     links_of,
+    PlanarClosure,
     sides_at,
     SpaceClosure,
     SpaceLinkage,
-    StepwiseClosure,
     SweptCurve,
     transmission_angles,
     turning_points,
@@ -107,13 +107,13 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _describe_linkage(
-    closure: Closure | SpaceClosure, advance: ProgressCallback
+    closure: Any, advance: ProgressCallback
 ) -> tuple[dict[str, Any], list[Table]]:
     """Return the description of a linkage as JSON holds it, and tables of it in their order."""
     sweep = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
     parts: list[Callable[..., dict[str, Any] | Table]] = []
     assemblies: Callable[..., dict[str, Any] | Table] = _other_poses_table
-    if isinstance(closure, Closure):
+    if isinstance(closure, PlanarClosure):
         groups, account = [*describe_groups(closure)], _structure_json(closure)
         parts, assemblies = [_four_bars_table], _other_assemblies
     else:
@@ -134,7 +134,7 @@ def _describe_linkage(
     return account, tables
 
 
-def _structure_json(closure: Closure) -> dict[str, Any]:
+def _structure_json(closure: PlanarClosure) -> dict[str, Any]:
     """Return what a planar linkage consists of."""
     linkage, structure = closure.linkage, closure.structure
     moving = len(structure.links) - 1
@@ -185,7 +185,7 @@ def _limits_json(linkage: Linkage | SpaceLinkage) -> list[dict[str, Any]]:
     ]
 
 
-def _list_branches(closure: StepwiseClosure) -> Iterator[tuple[Any, ...]]:
+def _list_branches(closure: Closure) -> Iterator[tuple[Any, ...]]:
     """Yield the branches of each joint that moves, and of each coordinate of a traced point."""
     linkage = closure.linkage
     if len(linkage.inputs) > 1:
@@ -203,14 +203,14 @@ def _list_branches(closure: StepwiseClosure) -> Iterator[tuple[Any, ...]]:
                 )
 
 
-def _counts_turns(closure: Closure) -> bool:
+def _counts_turns(closure: PlanarClosure) -> bool:
     """Return whether whole turns of several inputs against each other lead to another pose."""
     if len(closure.linkage.inputs) == 1:
         return False
     return is_iterated(closure) or any(sum(step.crosses) == 1 for step in closure.steps)
 
 
-def _examine_reach(closure: StepwiseClosure, sweep: InputSweep | None) -> dict[str, Any]:
+def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]:
     """Return ranges and singular inputs; None if they depend on several inputs."""
     if sweep is None:
         return {'ranges': None, 'singular_inputs': None}
@@ -243,7 +243,7 @@ def _is_reached(sweep: InputSweep, value: float) -> bool:
     return not sweep.closure.bounds or any(sweep.range_about(value + turn) for turn in turns)
 
 
-def _examine_states(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+def _examine_states(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
     """Return the worst residual, and of several inputs the nearest singularity; None if open."""
     worst = find_worst_states(closure)
     if worst is None:
@@ -263,7 +263,7 @@ def _examine_states(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict
     }
 
 
-def _examine_joints(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict[str, Any]:
+def _examine_joints(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
     """Return where joints turn back, or of several inputs where they stand together."""
     if len(closure.linkage.inputs) > 1:
         return {'turning_points': None, 'joints_stand_at': find_standing_state(closure)}
@@ -271,7 +271,7 @@ def _examine_joints(closure: StepwiseClosure, _sweep: InputSweep | None) -> dict
     return {'turning_points': turns, 'joints_stand_at': None}
 
 
-def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, Any]:
+def _other_assemblies(closure: PlanarClosure, _way: InputSweep | None) -> dict[str, Any]:
     """Return for each iterated group the other assemblies that a pose could name."""
     pose = closure.linkage.pose
     groups = []
@@ -296,14 +296,16 @@ def _other_assemblies(closure: Closure, _way: InputSweep | None) -> dict[str, An
     return {'other_assemblies': groups}
 
 
-def describe_groups(closure: Closure) -> Iterator[GroupDescription]:
+def describe_groups(closure: PlanarClosure) -> Iterator[GroupDescription]:
     """Yield the groups of a planar linkage in words, with the sides on which they are."""
     sides = sides_at(closure, closure.close_unlimited(*usual_inputs(closure)))
     for number in range(len(closure.structure.groups)):
         yield _describe_group(closure, number, sides)
 
 
-def _describe_group(closure: Closure, number: int, sides: Mapping[str, str]) -> GroupDescription:
+def _describe_group(
+    closure: PlanarClosure, number: int, sides: Mapping[str, str]
+) -> GroupDescription:
     """Return a group in words; sides as `sides_at`."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
@@ -410,7 +412,7 @@ def _linkage_tables(
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 
 
-def _four_bars_table(closure: Closure, _sweep: InputSweep | None) -> Table:
+def _four_bars_table(closure: PlanarClosure, _sweep: InputSweep | None) -> Table:
     rows = [
         (
             *(bar.group + 1, list(bar.links), list(bar.lengths)),
@@ -422,7 +424,7 @@ def _four_bars_table(closure: Closure, _sweep: InputSweep | None) -> Table:
     return Table(title, _FOUR_BAR, rows, 'four_bars')
 
 
-def _transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
+def _transmission_table(closure: Closure, sweep: InputSweep | None) -> Table:
     """Return the extreme transmission angles over the range, by group."""
 
     def angle(value: float | None, units: DisplayUnits) -> str:
@@ -434,7 +436,7 @@ def _transmission_table(closure: StepwiseClosure, sweep: InputSweep | None) -> T
     return _extremes_table(title, 'transmission_angles', closure, found, ends)
 
 
-def _conditioning_table(closure: StepwiseClosure, sweep: InputSweep | None) -> Table:
+def _conditioning_table(closure: Closure, sweep: InputSweep | None) -> Table:
     least = Column('>least', 'least.conditioning', form='.4f')
     ends = [least, Column(None, 'greatest.conditioning')]
     found = {} if sweep is None else conditioning_curves(sweep)
@@ -445,7 +447,7 @@ def _conditioning_table(closure: StepwiseClosure, sweep: InputSweep | None) -> T
 def _extremes_table(
     title: str,
     key: str,
-    closure: StepwiseClosure,
+    closure: Closure,
     found: Mapping[int, SweptCurve],
     ends: Sequence[Column],
 ) -> Table:
@@ -470,13 +472,13 @@ def _extremes_table(
     return Table(title, columns, rows, key)
 
 
-def _links_of(closure: StepwiseClosure, number: int) -> list[str]:
-    if isinstance(closure, Closure):
+def _links_of(closure: Closure, number: int) -> list[str]:
+    if isinstance(closure, PlanarClosure):
         return [*links_of(closure.structure.groups[number])]
     return closure.links_of_group(number)
 
 
-def _branches_table(closure: StepwiseClosure) -> Table:
+def _branches_table(closure: Closure) -> Table:
     given = closure.linkage.inputs[0]
 
     def input_text(value: float, units: DisplayUnits) -> str:

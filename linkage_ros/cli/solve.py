@@ -44,10 +44,10 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
     Closure,
     InputSweep,
+    PlanarClosure,
     Position,
     search_inputs,
     Status,
-    StepwiseClosure,
     turn_to_pose,
 )
 from linkage_ros.resources import named_file
@@ -153,7 +153,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _forward_table(
-    closure: StepwiseClosure, arguments: argparse.Namespace
+    closure: Closure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     question = _read_question(closure, arguments)
     rows = []
@@ -176,7 +176,7 @@ def _check_alone(arguments: argparse.Namespace) -> None:
 
 
 def _exchanged_table(
-    closure: StepwiseClosure, arguments: argparse.Namespace
+    closure: Closure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     """Return a row for every state that is found in which the joints have the typed values."""
     names = [name for name, _ in arguments.joint]
@@ -222,7 +222,7 @@ def _note(text: str) -> None:
 
 
 def _inverse_table(
-    closure: StepwiseClosure, arguments: argparse.Namespace
+    closure: Closure, arguments: argparse.Namespace
 ) -> tuple[list[Column], list[list[Any]]]:
     """Return a row for every input at which the joint has one of the typed values."""
     name = arguments.joint[0][0]
@@ -246,7 +246,7 @@ def _inverse_table(
             crank = inverse.position(value).joints[0]
             # The branch and its crank come first; the gap is 0.
             rows.append([number, crank, row[1], value, *row[4:]])
-    if not isinstance(closure, Closure):
+    if not isinstance(closure, PlanarClosure):
         _note(f'cranks are those that a search over {closure.input_names[0]} finds')
     own, status, _, crank_column, *others = columns
     columns = [Column('branch', 'branch'), crank_column, status, own, *others]
@@ -258,7 +258,7 @@ def _inverse_table(
 
 
 def _unreached_error(
-    closure: StepwiseClosure, joint: str, value: float, option: str, angles: DisplayUnits
+    closure: Closure, joint: str, value: float, option: str, angles: DisplayUnits
 ) -> LinkageError:
     """Return the error for a value of a joint that no input within the limits reaches."""
     free = closure.branches(joint, limited=False)
@@ -274,7 +274,7 @@ def _unreached_error(
 
 
 def _show_reach(
-    closure: StepwiseClosure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
+    closure: Closure, typed: Sequence[tuple[float, ...]], angles: DisplayUnits
 ) -> None:
     """Say once where the linkage closes, if it does not at an input that was typed."""
     for given in typed:
@@ -284,7 +284,7 @@ def _show_reach(
             return
 
 
-def _reach_text(closure: StepwiseClosure, given: tuple[float, ...], angles: DisplayUnits) -> str:
+def _reach_text(closure: Closure, given: tuple[float, ...], angles: DisplayUnits) -> str:
     """Return where a linkage closes by its first input; '' if nowhere."""
     ends = [
         [angles.value_text(end, one.turning) for end in (one.lowest, one.highest)]
@@ -306,7 +306,7 @@ class Question(NamedTuple):
 
 
 def _read_question(
-    closure: StepwiseClosure,
+    closure: Closure,
     arguments: argparse.Namespace,
     asked: Sequence[tuple[float, ...]] = (),
 ) -> Question:
@@ -377,7 +377,7 @@ def _sweep_inputs(
             yield (value,)
 
 
-def _output_columns(closure: StepwiseClosure, question: Question) -> Iterator[Column]:
+def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:
     linkage = closure.linkage
     for given in linkage.inputs:
         yield _state_column(given.joint, given.unit)
@@ -411,9 +411,7 @@ def _derivative_orders(question: Question) -> range:
     return range(1 + (question.rates is not None) + (question.accelerations is not None))
 
 
-def _state_row(
-    closure: StepwiseClosure, question: Question, given: tuple[float, ...]
-) -> list[Any]:
+def _state_row(closure: Closure, question: Question, given: tuple[float, ...]) -> list[Any]:
     """Return the cells of a state; empty cells where there is no value."""
     row: list[Any] = [*given]
     position = closure.position(*given)
@@ -438,9 +436,7 @@ def _state_row(
     return row
 
 
-def _rate_cells(
-    closure: StepwiseClosure, question: Question, position: Position
-) -> Iterator[float]:
+def _rate_cells(closure: Closure, question: Question, position: Position) -> Iterator[float]:
     """Yield rates and accelerations, as far as asked for."""
     assert question.rates is not None
     velocity = closure.velocity(position, *question.rates)

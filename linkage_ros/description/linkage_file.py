@@ -45,10 +45,10 @@ from linkage_ros.kinematics import (
     Linkage,
     Mass,
     PLANAR_ONLY,
+    PlanarClosure,
     Point,
     RevoluteJoint,
     SlideJoint,
-    SpaceClosure,
     thin_rod,
     without_drawn_pose,
 )
@@ -66,11 +66,9 @@ def looks_like_linkage(content: Section) -> bool:
     return any(key in content for key in ('links', 'points', 'urdf', *SHORTHANDS))
 
 
-def load(
-    linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None
-) -> Closure | SpaceClosure:
+def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -> Closure:
     """
-    Load a linkage as a closure: a `Closure`, or a `SpaceClosure` if it is spatial.
+    Load a linkage as a closure: a `PlanarClosure`, or a `SpaceClosure` if it is spatial.
 
     Parameters
     ----------
@@ -151,7 +149,7 @@ def read_any_closure(
     *,
     publish_inputs: bool = False,
     publish_model_joints: bool = False,
-) -> Closure | SpaceClosure:
+) -> Closure:
     """
     Read a planar or a spatial linkage; errors as in `read_closure`.
 
@@ -171,7 +169,9 @@ def read_any_closure(
     )
 
 
-def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
+def read_closure(
+    content: Section, name: str = '', *, publish_inputs: bool = False
+) -> PlanarClosure:
     """
     Read a planar linkage and check that it closes.
 
@@ -305,10 +305,12 @@ def _published_joint(driven: Input) -> RevoluteJoint | SlideJoint:
     return RevoluteJoint(driven.parent, driven.child)
 
 
-def checked_closure(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
+def checked_closure(
+    content: Section, linkage: Linkage, name: str, shorthand: str = ''
+) -> PlanarClosure:
     """Return a linkage of a file as a closure, and check that it closes."""
     try:
-        closure = Closure(linkage, name)
+        closure = PlanarClosure(linkage, name)
         check_closes(closure)
         check_turns(closure)
         check_limits(closure)
@@ -325,7 +327,7 @@ def checked_closure(content: Section, linkage: Linkage, name: str, shorthand: st
     return closure
 
 
-def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
+def find_assemblies(linkage: str | PathLike[str]) -> dict[str, PlanarClosure]:
     """
     Return a linkage in each choice of assembly sides in which it closes; errors as in `load`.
 
@@ -337,7 +339,7 @@ def find_assemblies(linkage: str | PathLike[str]) -> dict[str, Closure]:
     return find_closures(linkage_content(file), file.stem)
 
 
-def find_closures(content: Section, name: str) -> dict[str, Closure]:
+def find_closures(content: Section, name: str) -> dict[str, PlanarClosure]:
     """Return the closures of a linkage file by name, as `find_assemblies` does."""
     written, shorthand = written_linkage(content)
     try:

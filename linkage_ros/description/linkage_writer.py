@@ -36,13 +36,13 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     AssemblyPose,
     check_planar,
-    Closure,
     describe_ranges,
     Input,
     InputRange,
     InputSweep,
     Limits,
     Linkage,
+    PlanarClosure,
     Ratio,
     RevoluteJoint,
     SlideJoint,
@@ -303,7 +303,7 @@ def _name_text(name: str) -> str:
     return json.dumps(name, ensure_ascii=False)  # its escapes are valid in YAML
 
 
-def scene_text_for(closure: Closure, file: str) -> str:
+def scene_text_for(closure: PlanarClosure, file: str) -> str:
     """
     Return the text of a linkage's default scene, which names its file.
 
@@ -318,7 +318,7 @@ def scene_text_for(closure: Closure, file: str) -> str:
     )
 
 
-def _drive_text(closure: Closure) -> str:
+def _drive_text(closure: PlanarClosure) -> str:
     if len(closure.linkage.inputs) > 1:
         return '{topic: {}}'
     start, interval = _find_start(closure)
@@ -342,7 +342,7 @@ def _drive_text(closure: Closure) -> str:
     return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in entries.items())}}}}}'
 
 
-def _find_start(closure: Closure) -> tuple[float, InputRange]:
+def _find_start(closure: PlanarClosure) -> tuple[float, InputRange]:
     """Return the start of the single input, and the range that contains it."""
     way, pose = InputSweep(closure), closure.linkage.pose
     if pose is None or not starts_at_pose(closure):

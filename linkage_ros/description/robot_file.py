@@ -69,7 +69,6 @@ from linkage_ros.kinematics import (
     Limits,
     PoseCorrections,
     Ratio,
-    SpaceClosure,
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
@@ -128,13 +127,13 @@ ROBOT = Keys(
 
 def read_robot_closure(
     content: Section, name: str, *, publish_inputs: bool, publish_model_joints: bool
-) -> Closure | SpaceClosure:
+) -> Closure:
     """Read the loops of a robot and check that they close, as `read_any_closure` does."""
     urdf = read_urdf(content.named_data, content.mapping['urdf'])
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
 
-    def close(without: Sequence[str]) -> Closure | SpaceClosure:
+    def close(without: Sequence[str]) -> Closure:
         linkage = robot.linkage(publish_inputs, without)
         closure = closure_as_drawn(linkage, name, publish_model_joints=publish_model_joints)
         check_limits(closure)

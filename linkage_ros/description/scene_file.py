@@ -49,7 +49,7 @@ from linkage_ros.errors import (
     quote,
     read_each,
 )
-from linkage_ros.kinematics import Closure, Linkage, SpaceClosure, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.stages.drives import drive_class
 
@@ -80,7 +80,7 @@ class _SceneSource:
     trust_effects: bool = True  # Whether user-defined effects are imported
     confinement: Confinement | None = None  # What the scene may name; None for anything
     publishes_model_joints: bool = False  # Whether all joints of a robot model are published
-    closed: Closure | None = None  # Closure of its only linkage, if there is one already
+    closed: Closure | None = None  # Of its only linkage, if there is one already
 
 
 def load_scene(
@@ -492,9 +492,7 @@ def _refuse_in_space(
             raise effects.error(name, reason, remedy)
 
 
-def _check_sampled(
-    drives: Section, closure: Closure | SpaceClosure, joints: Sequence[str]
-) -> None:
+def _check_sampled(drives: Section, closure: Closure, joints: Sequence[str]) -> None:
     """Refuse samples of what is neither a joint nor measures the linkage."""
     try:
         closure.measuring(*joints)

@@ -26,7 +26,6 @@ from linkage_ros.kinematics import (
     closure_as_drawn,
     GROUND,
     GROUND_FRAME,
-    SpaceClosure,
     SpaceLinkage,
     SpatialJoint,
     SpatialMass,
@@ -42,7 +41,7 @@ def is_spatial(content: Section) -> bool:
 
 def read_space_closure(
     content: Section, name: str, *, publish_inputs: bool, publish_model_joints: bool
-) -> Closure | SpaceClosure:
+) -> Closure:
     """Read a spatial linkage and check that its pose closes, as `read_any_closure` does."""
     try:
         linkage = _read_linkage(content, publish_inputs)

@@ -39,8 +39,8 @@ from linkage_ros.errors import DefinitionError, did_you_mean, list_names, quote
 from linkage_ros.kinematics import (
     Acceleration,
     call,
-    Closure,
     GROUND,
+    PlanarClosure,
     Position,
     remainder,
     RevoluteJoint,
@@ -84,7 +84,7 @@ class JointCoordinate(NamedTuple):
         return 0.5 * (low + high) if self.is_revolute and high - low <= tau + 1e-9 else None
 
 
-def joint_coordinate(closure: Closure, name: str) -> JointCoordinate:
+def joint_coordinate(closure: PlanarClosure, name: str) -> JointCoordinate:
     """Return a driven or published joint of a linkage by its name."""
     linkage = closure.linkage
     for index, given in enumerate(linkage.inputs):
@@ -137,7 +137,7 @@ class PlanarParts:
     vectors = PLANE
     wrench_numbers: tuple[int, ...] = (0, 1, 5)
 
-    def __init__(self, closure: Closure) -> None:
+    def __init__(self, closure: PlanarClosure) -> None:
         self._closure = closure
 
     def place(self, link: str, point: str) -> complex:
@@ -159,7 +159,7 @@ class PlanarParts:
 
 
 def _parts_of(closure: Any, applied: AppliedLoads) -> LoadedParts:
-    if isinstance(closure, Closure):
+    if isinstance(closure, PlanarClosure):
         return PlanarParts(closure)
     from linkage_ros.dynamics.spatial_parts import SpatialParts  # local import: in space only
 
@@ -187,7 +187,7 @@ class AppliedForces:
     ``loads.KIND.NAME``.
     """
 
-    def __init__(self, closure: Closure, applied: AppliedLoads) -> None:
+    def __init__(self, closure: PlanarClosure, applied: AppliedLoads) -> None:
         linkage = closure.linkage
         self._closure, self._given = closure, applied
         self.begin = -1  # Time of the first pose, in [ns]; negative before it
@@ -522,7 +522,7 @@ def _spring_stretch(joint: JointCoordinate, spring: JointSpring, position: Posit
     return remainder(stretch, tau) if joint.is_revolute and not joint.driven else stretch
 
 
-def _check_loads(closure: Closure, applied: AppliedLoads) -> None:
+def _check_loads(closure: PlanarClosure, applied: AppliedLoads) -> None:
     """Refuse loads that make no sense."""
     linkage = closure.linkage
     for name in applied.stops:

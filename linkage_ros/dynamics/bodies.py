@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.kinematics import (
     Acceleration,
-    Closure,
     cross_product,
     make_vector,
+    PlanarClosure,
     Position,
     Velocity,
 )
@@ -108,7 +108,7 @@ class BodyModel(NamedTuple):
     moments_in_ground: Callable[[Position, list[Any]], list[Any]]
 
 
-def planar_bodies(closure: Closure, loads: Loads) -> BodyModel:
+def planar_bodies(closure: PlanarClosure, loads: Loads) -> BodyModel:
     """Return the bodies of a linkage in the plane, and the ends of its springs."""
     linkage = closure.linkage
     heavy = {link: linkage.masses[link] for link in linkage.links if link in linkage.masses}

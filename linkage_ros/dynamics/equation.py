@@ -54,9 +54,9 @@ from linkage_ros.kinematics import (
     Acceleration,
     all_finite,
     call,
-    Closure,
     copysign,
     Limits,
+    PlanarClosure,
     Position,
     Velocity,
     where,
@@ -149,7 +149,7 @@ class Mechanics:
     """
 
     def __init__(
-        self, closure: Closure, loads: Loads | None = None, friction: Friction | None = None
+        self, closure: PlanarClosure, loads: Loads | None = None, friction: Friction | None = None
     ) -> None:
         self.closure = closure
         self.loads = loads or Loads()
@@ -609,7 +609,7 @@ class Mechanics:
         """Yield joints with friction: name, number, and its rate as factor·(v[one] − v[other])."""
         closure: Any = self.closure
         joints = self.friction.joints
-        if not isinstance(closure, Closure):
+        if not isinstance(closure, PlanarClosure):
             places = [*closure.linkage.pair_joints, *closure.linkage.struts]
             for name, friction in joints.items():
                 slides = name not in closure.linkage.hinges
@@ -681,14 +681,14 @@ def _unit_rates(count: int, number: int) -> list[float]:
 
 def _bodies_of(closure: Any, loads: Loads) -> BodyModel:
     """Return the bodies of a linkage in plane or space."""
-    if isinstance(closure, Closure):
+    if isinstance(closure, PlanarClosure):
         return planar_bodies(closure, loads)
     from linkage_ros.dynamics.spatial_bodies import spatial_bodies  # local import: in space only
 
     return spatial_bodies(closure, loads)
 
 
-def _find_stopped(closure: Closure, loads: Loads) -> dict[str, Limits]:
+def _find_stopped(closure: PlanarClosure, loads: Loads) -> dict[str, Limits]:
     """Return the limits of joints with hard stops that are no inputs, of several inputs."""
     inputs = [given.joint for given in closure.linkage.inputs]
     yielding = (*inputs, *loads.applied.stops)
@@ -696,7 +696,7 @@ def _find_stopped(closure: Closure, loads: Loads) -> dict[str, Limits]:
     return {name: one for name, one in limits if one.is_bounded and name not in yielding}
 
 
-def _make_applied(closure: Closure, loads: Loads) -> AppliedForces | None:
+def _make_applied(closure: PlanarClosure, loads: Loads) -> AppliedForces | None:
     """Return the loads on joints and points, or None without importing their model."""
     if not loads.applied:
         return None

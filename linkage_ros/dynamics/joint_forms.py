@@ -31,12 +31,12 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics import (
     balls_of,
     CarriedPoints,
-    Closure,
     cross,
     GROUND,
     GROUND_FRAME,
     length,
     minus,
+    PlanarClosure,
     Position,
     RevoluteJoint,
     scale,
@@ -112,7 +112,7 @@ class JointForms(NamedTuple):
     spins: tuple[Action, ...] = ()  # What holds the spin of rods
 
 
-def planar_forms(closure: Closure) -> JointForms:
+def planar_forms(closure: PlanarClosure) -> JointForms:
     """Return what the joints of a planar linkage transmit."""
     linkage, structure = closure.linkage, closure.structure
     joints = []
@@ -144,7 +144,7 @@ def planar_forms(closure: Closure) -> JointForms:
 
 
 def planar_bar(
-    closure: Closure, link: str, near: JointForm, far: JointForm
+    closure: PlanarClosure, link: str, near: JointForm, far: JointForm
 ) -> Callable[[Position], complex]:
     """Return the direction on a link from one of its pins to another."""
     points, angle = closure.linkage.links[link], closure.angles[link]

@@ -65,11 +65,11 @@ from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics import (
     Acceleration,
     call,
-    Closure,
     dot,
     GROUND,
     has_result,
     minus,
+    PlanarClosure,
     Position,
     scale,
     Status,
@@ -269,7 +269,7 @@ class Reactions:
         """Return the direction on a link from one of its joints to another, a unit vector."""
         closure: Any = self._mechanics.closure
         ends = self.joints[near], self.joints[far]
-        if isinstance(closure, Closure):
+        if isinstance(closure, PlanarClosure):
             return planar_bar(closure, link, *ends)
         from linkage_ros.dynamics.joint_forms import spatial_bar  # local import: in space only
 
@@ -646,7 +646,7 @@ class Reactions:
 
 def _forms_of(closure: Any, rubbing: Collection[int]) -> JointForms:
     """Return what the joints transmit; of those that rub by their force, first what rubs."""
-    if isinstance(closure, Closure):
+    if isinstance(closure, PlanarClosure):
         return planar_forms(closure)
     from linkage_ros.dynamics.joint_forms import spatial_forms  # local import: in space only
 

@@ -99,6 +99,7 @@ from linkage_ros.kinematics.batch import (
     Mask as Mask,
 )
 from linkage_ros.kinematics.checks import check_weighed as check_weighed
+from linkage_ros.kinematics.closure import Closure as Closure
 from linkage_ros.kinematics.doubles import (
     SHRINK as SHRINK,
 )
@@ -123,7 +124,7 @@ from linkage_ros.kinematics.plane.checks import (
     check_planar as check_planar,
     PLANAR_ONLY as PLANAR_ONLY,
 )
-from linkage_ros.kinematics.plane.closure import Closure as Closure
+from linkage_ros.kinematics.plane.closure import PlanarClosure as PlanarClosure
 from linkage_ros.kinematics.plane.drawn_pose import read_drawn_pose as read_drawn_pose
 from linkage_ros.kinematics.plane.dyads.rpr import (
     RPRDyad as RPRDyad,
@@ -233,4 +234,3 @@ from linkage_ros.kinematics.step import (
     GroupDescription as GroupDescription,
     LinkState as LinkState,
 )
-from linkage_ros.kinematics.stepwise_closure import StepwiseClosure as StepwiseClosure

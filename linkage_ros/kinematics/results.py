@@ -9,24 +9,23 @@
 """
 Results of a closure: position, velocity, acceleration; ranges, singular inputs, margins.
 
-The modules that compute them, and `Closure`, import this one.
+The modules that compute them, and `PlanarClosure`, import this one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from math import tau
-from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import list_names, quote
-from linkage_ros.kinematics.plane.linkage import Limits, Linkage
-from linkage_ros.kinematics.plane.topology import Structure
+from linkage_ros.kinematics.plane.linkage import Limits
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import LinkState, Step, StepPose
+from linkage_ros.kinematics.step import LinkState, StepPose
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Array
+    from linkage_ros.kinematics.closure import Closure
 
 
 class InputRange(NamedTuple):
@@ -146,91 +145,13 @@ It takes known values of joints with their whole turns, and limits for inputs th
 """
 
 
-class LoopClosure(Protocol):
-    """
-    The part of a `Closure` that ranges, margins, limits and the compiler use.
-
-    `Closure` imports them. Its docstrings describe the members.
-    """
-
-    linkage: Any  # A `Linkage`, or a `SpaceLinkage`, which has inputs, joints, limits and pose too
-
-    @property
-    def slide_bound(self) -> float: ...
-
-    @property
-    def grids(self) -> list[Any]: ...
-
-    def slide_reach(self, number: int) -> tuple[float, float]: ...
-
-    input_names: tuple[str, ...]
-    joint_names: tuple[str, ...]
-    scale: float
-    gap_unit: str
-    steps: tuple[Step, ...]
-    step_groups: tuple[int, ...]
-    turning: tuple[bool, ...]
-    turns_with: Any
-    ratio_turns: int
-    bounds: Any
-
-    def keep_usual(self, ranges: tuple[InputRange, ...]) -> tuple[InputRange, ...]: ...
-    def needed_groups(self, number: int) -> set[int]: ...
-    def links_of_group(self, number: int) -> list[str]: ...
-    def initial_state(self, *inputs: float) -> LinkState: ...
-    def position(self, *inputs: float) -> Position: ...
-    def close_unlimited(self, *inputs: float) -> Position: ...
-    def velocity(self, position: Position, *rates: float) -> Velocity: ...
-    def acceleration(self, position: Position, velocity: Velocity, *a: float) -> Acceleration: ...
-    def jacobian(self, position: Position) -> Array: ...
-    def solve(self, *inputs: Any, rates: Any, derivatives: int) -> Any: ...  # A `Batch`
-    def measuring(self, *names: str) -> Any: ...  # Likewise a closure
-
-    def find_branch(
-        self, joint: str, number: int | None = None, near: float | None = None
-    ) -> Any: ...  # A `CrankBranch`
-    def plan_exchange(self, names: Sequence[str], near: Near) -> Plan: ...
-    def inputs_of(self, state: LinkState) -> tuple[float, ...]: ...
-    def named_points(self, position: Position) -> dict[str, Any]: ...
-    def closing_errors(self, position: Position) -> list[float]: ...
-    def residual(self, position: Position) -> float: ...
-    def singularity_margin(self, position: Position) -> SingularityMargin: ...
-
-    @property
-    def input_ranges(self) -> tuple[InputRange, ...]: ...
-
-    @property
-    def closing_ranges(self) -> tuple[InputRange, ...]: ...
-
-    @property
-    def singular_inputs(self) -> tuple[SingularInput, ...]: ...
-
-    @property
-    def zero_length(self) -> float | None: ...
-
-
-class PlanarClosure(LoopClosure, Protocol):
-    """The part of a `Closure` that only planar linkages have."""
-
-    linkage: Linkage
-    structure: Structure
-
-    def points(self, position: Position) -> dict[tuple[str, str], complex]: ...
-
-    def point_motion(
-        self, position: Position, velocity: Velocity, acceleration: Acceleration
-    ) -> dict[tuple[str, str], PointMotion]: ...
-    def slide_values(self, position: Position) -> dict[str, float]: ...
-    def link_angles(self, position: Position) -> dict[str, float]: ...
-
-
 class _JointValues(Mapping[str, float]):
     """A value for each published joint, by its name: ``found['rocker_joint']``."""
 
     __slots__ = ()
 
     joints: tuple[float, ...]
-    closure: LoopClosure
+    closure: Closure
 
     def __getitem__(self, joint: str) -> float:
         """
@@ -301,7 +222,7 @@ class Position(_JointValues):
     joints: tuple[float, ...]
     state: LinkState
     poses: list[StepPose]
-    closure: LoopClosure = field(compare=False)
+    closure: Closure = field(compare=False)
 
     @property
     def inputs(self) -> tuple[float, ...]:
@@ -352,7 +273,7 @@ class Velocity(_JointValues):
     joints: tuple[float, ...]
     state: LinkState
     rates: Any
-    closure: LoopClosure = field(compare=False)
+    closure: Closure = field(compare=False)
 
 
 @dataclass(slots=True, repr=False)
@@ -373,7 +294,7 @@ class Acceleration(_JointValues):
 
     joints: tuple[float, ...]
     state: LinkState
-    closure: LoopClosure = field(compare=False)
+    closure: Closure = field(compare=False)
 
 
 class PointMotion(NamedTuple):

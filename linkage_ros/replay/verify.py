@@ -24,7 +24,13 @@ from typing import NamedTuple
 from linkage_ros.bag import Bag, BagMessage, missing_start_reason, read_run_metadata
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import BagError
-from linkage_ros.kinematics import Closure, Position, RevoluteJoint, SingularityMargin, Status
+from linkage_ros.kinematics import (
+    Closure,
+    Position,
+    RevoluteJoint,
+    SingularityMargin,
+    Status,
+)
 from linkage_ros.messages import JOINT_STATE_TYPE
 from linkage_ros.replay.compare import Comparison, FirstDifference, TickPlace
 from linkage_ros.replay.replay import replay_all, replay_ticks, ReplayedTick

@@ -66,7 +66,7 @@ COMPUTE = (
     'accuracy',
 )
 
-CLOSES = 'linkage_ros.kinematics.stepwise_closure:StepwiseClosure.position'
+CLOSES = 'linkage_ros.kinematics.closure:Closure.position'
 
 WRITES = 'os:fsync'
 
@@ -181,7 +181,7 @@ def test_a_command_ends_while_it_reads(folder, command, number) -> None:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
-@pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.stepwise_closure:singular_inputs'])
+@pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
 def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
     found = ended_by(stuck_at(folder, at, 'run', 'four.yaml', '--plain'), number)
     assert found == (1, 'linkage run: stopped\n')

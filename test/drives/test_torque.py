@@ -20,7 +20,7 @@ import random
 from hypothesis import given, settings, strategies as st
 from linkage_ros.dynamics import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, Mass, Status
+from linkage_ros.kinematics import Closure, Mass, PlanarClosure, Status
 from linkage_ros.messages import EffortCommand, Rejection
 from linkage_ros.stages.drives import Context, TorqueDrive
 import pytest
@@ -339,7 +339,7 @@ UNBUILT = {
 
 @pytest.mark.parametrize(('context', 'parameters', 'line'), UNBUILT.values(), ids=UNBUILT)
 def test_what_cannot_be_built_is_said_in_one_line(context, parameters, line):
-    if isinstance(context, Closure):
+    if isinstance(context, PlanarClosure):
         context = Context(context, 1000.0, True, 'seed', None, None)
     with pytest.raises(DefinitionError) as raised:
         TorqueDrive(**parameters).build(context)

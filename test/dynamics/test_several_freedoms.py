@@ -20,7 +20,7 @@ from linkage_ros.dynamics import (
     SeveralDofMechanism,
     SoftStop,
 )
-from linkage_ros.kinematics import Closure, Limits
+from linkage_ros.kinematics import Limits, PlanarClosure
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -50,7 +50,7 @@ def mechanism(mechanics, stops=None, method='rk4', **given):
 
 def loaded(closure):
     """Return mechanics with gravity, springs and loads on every joint and point."""
-    if isinstance(closure, Closure):
+    if isinstance(closure, PlanarClosure):
         loads = replace(loads_of(closure.linkage, 3.0), applied=everywhere_in_plane(closure))
     else:
         loads = Loads(GRAVITY, drive_inertia=0.01, applied=everywhere(closure))

@@ -17,8 +17,8 @@ from linkage_ros.cli.main import main
 from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import (
-    Closure,
     Limits,
+    PlanarClosure,
     PoseCorrections,
     RevoluteJoint,
     SpaceClosure,
@@ -244,7 +244,7 @@ def test_pins_of_simulators_close_a_loop(tags, floor):
         )
     )  # fmt: skip
     closure = robot_of(robot(turned, PINS[tags]), input='crank_joint')
-    assert isinstance(closure, Closure if floor == '0 0 0' else SpaceClosure)
+    assert isinstance(closure, PlanarClosure if floor == '0 0 0' else SpaceClosure)
     for crank in (0.5, 1.1, 2.0):
         found = closure.position(crank - 0.5)
         for name in ('coupler_joint', 'rocker_joint'):

@@ -17,7 +17,7 @@ from linkage_ros import load
 from linkage_ros.cli.main import main
 from linkage_ros.description import write_linkage
 from linkage_ros.dynamics import Loads, Mechanics
-from linkage_ros.kinematics import Closure, SpaceClosure, Status, usual_inputs
+from linkage_ros.kinematics import PlanarClosure, SpaceClosure, Status, usual_inputs
 from linkage_ros.resources import linkage_names
 from linkage_ros.tools.models import model_of, ModelPart, urdf_model
 import numpy as np
@@ -59,7 +59,7 @@ def states_of(closure):
 def test_a_robot_in_one_plane_has_the_states_of_the_planar_file(tmp_path, name, plane):
     rpy, axes = PLANES[plane]
     planar, robot = robot_of(tmp_path, name, rpy)
-    assert isinstance(robot, Closure)
+    assert isinstance(robot, PlanarClosure)
     assert robot.linkage.axes == axes
     assert (robot.linkage.corrections.tilted_by > 0.0) == plane.endswith('CAD')
     for state in states_of(planar):
@@ -105,7 +105,7 @@ def spatial(folder, **kinds):
 
 def test_coordinates_have_the_names_of_the_grounds_axes(tmp_path):
     closure = spatial(tmp_path)
-    assert isinstance(closure, Closure)
+    assert isinstance(closure, PlanarClosure)
     assert closure.linkage.traced == ('T',)
     closure = closure.measuring('T.z')
     position = closure.position(0.4)
@@ -146,7 +146,7 @@ def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
 
 def test_a_traced_point_on_the_axis_of_a_hinge_keeps_its_name(tmp_path):
     closure = spatial(tmp_path, traced=', A')
-    assert isinstance(closure, Closure)
+    assert isinstance(closure, PlanarClosure)
     place = closure.named_points(closure.position(0.4))['A']
     assert place == pytest.approx(
         complex(0.1 * (cos(0.4) + sin(0.4)), 0.1 + 0.1 * (cos(0.4) - sin(0.4))), abs=1e-15

@@ -29,14 +29,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, ceil, floor, inf, isnan, nan, pi, remainder, sin, sqrt, tan, tau
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names
 from linkage_ros.kinematics.analysis.monotonic_pieces import FARTHEST, monotonic_pieces
 from linkage_ros.kinematics.analysis.sweep_analysis import InputSweep
 from linkage_ros.kinematics.arithmetic import UNIT_ROUNDOFF
 from linkage_ros.kinematics.compiling import Compiled, OutputSelection, TracedMotion
-from linkage_ros.kinematics.results import LoopClosure
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
 
 _CELLS = 32
 """Cells of a table, for each turn of the crank."""
@@ -73,7 +75,7 @@ class Output(NamedTuple):
     wanted: OutputSelection  # Its value, rate and acceleration, each in a group
 
 
-def joint_output(closure: LoopClosure, name: str) -> Output:
+def joint_output(closure: Closure, name: str) -> Output:
     """Return a published joint as an output."""
     number = closure.joint_names.index(name)
 
@@ -411,9 +413,7 @@ class OutputFunction:
     ``compiled`` has all published joints; without it the output is compiled alone.
     """
 
-    def __init__(
-        self, closure: LoopClosure, output: Output, compiled: Compiled | None = None
-    ) -> None:
+    def __init__(self, closure: Closure, output: Output, compiled: Compiled | None = None) -> None:
         self._number = output.number if compiled else 0
         self._compiled = compiled or Compiled(closure, 1, output.wanted, within_limits=False)
         self.fast = self._compiled.fast
@@ -432,7 +432,7 @@ class OutputFunction:
 
 
 def crank_branches(
-    closure: LoopClosure,
+    closure: Closure,
     output: Output,
     *,
     limited: bool = True,
@@ -512,7 +512,7 @@ def _crank_distance(branch: CrankBranch, crank: float) -> float:
     return max(branch.least - crank, crank - branch.most, 0.0)
 
 
-def inverse_of(closure: LoopClosure, name: str, limited: bool = True) -> Inverse:
+def inverse_of(closure: Closure, name: str, limited: bool = True) -> Inverse:
     """
     Return an output with its branches; limits of joints cut them.
 

@@ -42,7 +42,9 @@ from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.analysis.crank_branches import CrankBranch
-    from linkage_ros.kinematics.results import LoopClosure, Near, PlanarClosure, Position
+    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.plane.closure import PlanarClosure
+    from linkage_ros.kinematics.results import Near, Position
 
 _SAME = 1e-6
 """Largest difference of joints in one assembly, in [rad] or of the linkage's size."""
@@ -57,7 +59,7 @@ _STILL, DEPENDENT = 1e-9, 1e-9
 _STEP, _MOST_MET = 0.1, 1000
 """Steps of a lattice of inputs, in [rad] or of the linkage's size; and most of its states."""
 
-Built = TypeVar('Built', bound='LoopClosure')
+Built = TypeVar('Built', bound='Closure')
 
 
 def exchange_inputs(
@@ -141,14 +143,17 @@ def _exchange_on_branch(closure: Built, name: str, branch: CrankBranch) -> Built
 
 
 def _values_at(
-    closure: LoopClosure, position: Position, known: Mapping[str, float]
+    closure: Closure, position: Position, known: Mapping[str, float]
 ) -> dict[str, float]:
     inputs = zip(closure.input_names, position.inputs, strict=True)
     return {**position, **dict(inputs), **known}
 
 
 def _meets(
-    closure: LoopClosure, found: LoopClosure, position: Position, known: Mapping[str, float]
+    closure: Closure,
+    found: Closure,
+    position: Position,
+    known: Mapping[str, float],
 ) -> bool:
     """Return whether a closure has the joints of a position of the linkage."""
     values = _values_at(closure, position, known)
@@ -161,7 +166,7 @@ def _meets(
     )
 
 
-def check_moved(closure: LoopClosure, names: Sequence[str], position: Position) -> None:
+def check_moved(closure: Closure, names: Sequence[str], position: Position) -> None:
     """Refuse names that do not say at a position how the inputs move."""
     if not position.status.has_rates:
         return
@@ -184,7 +189,7 @@ def check_moved(closure: LoopClosure, names: Sequence[str], position: Position) 
         )  # fmt: skip
 
 
-def turn_to_pose(closure: LoopClosure, values: Sequence[float]) -> tuple[float, ...]:
+def turn_to_pose(closure: Closure, values: Sequence[float]) -> tuple[float, ...]:
     """
     Return values of several inputs; angles beyond limits in the turn that is nearest to the pose.
 
@@ -204,7 +209,7 @@ def turn_to_pose(closure: LoopClosure, values: Sequence[float]) -> tuple[float, 
 
 
 def _reached_limits(
-    closure: LoopClosure, names: Sequence[str], at: Sequence[float]
+    closure: Closure, names: Sequence[str], at: Sequence[float]
 ) -> dict[str, Limits]:
     """
     Return limits of joints that have none: what those of the linkage let them reach from a state.

@@ -29,7 +29,7 @@ SAME_ANGLE = 1e-9
 class LinkageView(NamedTuple):
     """The content of a picture."""
 
-    closure: Any  # The linkage: a `Closure`, or a `SpaceClosure`
+    closure: Any  # The linkage: a `PlanarClosure`, or a `SpaceClosure`
     # The pose to draw.
     inputs: tuple[float, ...]
     position: Position

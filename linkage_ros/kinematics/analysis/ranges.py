@@ -26,7 +26,7 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.kinematics.plane.diagonals import CrankDiagonal
 from linkage_ros.kinematics.plane.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.plane.linkage import Point
-from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
+from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.step import (
     FixedPoint,
     GearedAngle,
@@ -38,6 +38,7 @@ from linkage_ros.kinematics.step import (
 from linkage_ros.progress import tell_progress
 
 if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
     from linkage_ros.kinematics.iterated.branch import Branch
     from linkage_ros.kinematics.limits import Bound
 
@@ -85,7 +86,7 @@ def golden_section(
     return min((at_one, one), (at_other, other))
 
 
-def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
+def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
     """
     Return the ranges of a single input in which every loop closes, without limits of joints.
 
@@ -127,7 +128,7 @@ def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     return tuple(InputRange(low, high) for low, high in intervals)
 
 
-def _in_turns(closure: LoopClosure, turns: int) -> Iterator[InputRange]:
+def _in_turns(closure: Closure, turns: int) -> Iterator[InputRange]:
     """Yield the ranges of an angle whose poses repeat after some turns, or never (0)."""
     limits = closure.linkage.inputs[0].limits
     far = (turns or _COPIES) * pi
@@ -158,17 +159,17 @@ def through_the_end(
     return [*others, (begin, end + turn)]
 
 
-def _iterating_steps(closure: LoopClosure) -> dict[int, Any]:
+def _iterating_steps(closure: Closure) -> dict[int, Any]:
     """Return the steps that iterate, by their numbers."""
     return {index: step for index, step in enumerate(closure.steps) if step.follows_branch}
 
 
-def is_iterated(closure: LoopClosure) -> bool:
+def is_iterated(closure: Closure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
     return any(step.iterates for step in closure.steps)
 
 
-def whole_turns(closure: LoopClosure) -> int:
+def whole_turns(closure: Closure) -> int:
     """Return the number of whole turns after which poses repeat; 0 if each turn differs."""
     if len(closure.linkage.inputs) > 1:
         return 0 if is_iterated(closure) else 1
@@ -178,12 +179,12 @@ def whole_turns(closure: LoopClosure) -> int:
     return lcm(closure.ratio_turns, *periods)
 
 
-def _iterated_branches(closure: LoopClosure) -> list[Branch | None]:
+def _iterated_branches(closure: Closure) -> list[Branch | None]:
     """Return the branch of each iterated group."""
     return [step.branch() for step in _iterating_steps(closure).values()]
 
 
-def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputRange]:
+def _on_a_branch(closure: Closure, branch: Branch | None) -> Iterator[InputRange]:
     """Yield the intervals of a branch in which the steps after it close too."""
     if branch is None:
         return
@@ -335,7 +336,7 @@ def _turning_points(
             yield golden_section(lambda x: -margin(x), values[before], values[after])[1]
 
 
-def _closing_margin(closure: LoopClosure, value: float) -> float:
+def _closing_margin(closure: Closure, value: float) -> float:
     """Return the distance of a state from the limits of its dyads; negative if it is open."""
     position = closure.close_unlimited(value)
     if not position.status.has_pose:
@@ -350,7 +351,7 @@ def _closing_margin(closure: LoopClosure, value: float) -> float:
 
 
 def _search_intervals(
-    closure: LoopClosure, low: float, high: float, samples: int
+    closure: Closure, low: float, high: float, samples: int
 ) -> list[tuple[float, float]]:
     """Return the parts of an interval in which loops close, including narrow ones."""
 
@@ -389,7 +390,7 @@ def last_inside(closes: Callable[[float], bool], inside: float, outside: float) 
 # change of its sign is narrowed down to neighbouring floats.
 
 
-def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
+def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
     """
     Return the ranges of a single input: every loop closes, every joint is within its limits.
 
@@ -403,14 +404,14 @@ def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     return ranges
 
 
-def within_own(closure: LoopClosure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
+def within_own(closure: Closure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
     """Return the parts of ranges within the limits of the single input itself."""
     (bound,) = closure.bounds.inputs
     return tuple(part for one in ranges for part in _cut_by_limits(closure, one, bound))
 
 
 def within_published(
-    closure: LoopClosure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
+    closure: Closure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
 ) -> tuple[InputRange, ...]:
     """Return the parts of ranges of the single input within limits of published joints."""
     if not closure.bounds.inputs:
@@ -418,7 +419,7 @@ def within_published(
     return tuple(part for one in ranges for part in _within_limits(closure, one, bounds))
 
 
-def _range_and_copy(closure: LoopClosure, interval: InputRange) -> Iterator[InputRange]:
+def _range_and_copy(closure: Closure, interval: InputRange) -> Iterator[InputRange]:
     """Yield a range, and the same one turn later if the poses there differ."""
     yield interval
     if not interval.turning or interval.is_whole or interval.turns != 1:
@@ -430,7 +431,7 @@ def _range_and_copy(closure: LoopClosure, interval: InputRange) -> Iterator[Inpu
         yield copy
 
 
-def turns_to_repeat(closure: LoopClosure, position: Callable[[float], Position]) -> int:
+def turns_to_repeat(closure: Closure, position: Callable[[float], Position]) -> int:
     """Return the number of turns after which all joints repeat, for an input that turns fully."""
     count = max(1, whole_turns(closure))
     once = all(joints_repeat(closure, position, 0.1 + i, count * tau) for i in range(6 * count))
@@ -438,7 +439,7 @@ def turns_to_repeat(closure: LoopClosure, position: Callable[[float], Position])
 
 
 def joints_repeat(
-    closure: LoopClosure, position: Callable[[float], Position], value: float, shift: float
+    closure: Closure, position: Callable[[float], Position], value: float, shift: float
 ) -> bool:
     """Return whether all joints are the same after a shift, apart from whole turns."""
     here, there = position(value).joints, position(value + shift).joints
@@ -451,9 +452,7 @@ def joints_repeat(
     )
 
 
-def _cut_by_limits(
-    closure: LoopClosure, interval: InputRange, bound: Bound
-) -> Iterator[InputRange]:
+def _cut_by_limits(closure: Closure, interval: InputRange, bound: Bound) -> Iterator[InputRange]:
     """Yield the parts of a range within the limits of the input; angles count with turns."""
     limits = closure.linkage.inputs[0].limits
     if not (interval.turning and interval.turns):
@@ -481,9 +480,7 @@ def _cut_by_limits(
             yield from _clip_range(copy, limits.low, limits.high, bound.name)
 
 
-def _copy_turns_later(
-    closure: LoopClosure, interval: InputRange, shift: float
-) -> InputRange | None:
+def _copy_turns_later(closure: Closure, interval: InputRange, shift: float) -> InputRange | None:
     """Return a range some turns later, or None if the linkage does not close there."""
     inside = 0.6 * interval.lowest + 0.4 * interval.highest
 
@@ -517,7 +514,7 @@ def _clip_range(interval: InputRange, low: float, high: float, name: str) -> Ite
 
 
 def _within_limits(
-    closure: LoopClosure, interval: InputRange, bounds: Sequence[Bound]
+    closure: Closure, interval: InputRange, bounds: Sequence[Bound]
 ) -> Iterator[InputRange]:
     """Yield the parts of a range in which published joints are within their limits."""
 
@@ -552,9 +549,7 @@ def _within_limits(
         )
 
 
-def _limiting_joint(
-    closure: LoopClosure, bounds: Sequence[Bound], end: float, inside: float
-) -> str:
+def _limiting_joint(closure: Closure, bounds: Sequence[Bound], end: float, inside: float) -> str:
     """Return the joint whose limits end a range."""
     step = 1e-9 * (end - inside)
     for outside in (end, end + step, end + 1e3 * step):

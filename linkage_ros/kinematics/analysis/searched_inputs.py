@@ -27,7 +27,7 @@ from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
-    from linkage_ros.kinematics.results import LoopClosure
+    from linkage_ros.kinematics.closure import Closure
 
 _LINES, _STARTS, _STARTS_ITERATED = 16, 1000, 100
 """Lines of the grid along each input, and most states; the same of links that are iterated."""
@@ -55,7 +55,7 @@ class Searched(NamedTuple):
     reach: dict[str, tuple[float, float]]  # The least and the greatest value of each joint there
 
 
-def search_inputs(closure: LoopClosure, wanted: Mapping[str, float]) -> Searched:
+def search_inputs(closure: Closure, wanted: Mapping[str, float]) -> Searched:
     """
     Return the inputs at which as many joints as inputs have values.
 
@@ -104,7 +104,7 @@ def search_inputs(closure: LoopClosure, wanted: Mapping[str, float]) -> Searched
 class _Search:
     """Errors of joints over the inputs, in [rad] and in sizes of the linkage."""
 
-    def __init__(self, closure: LoopClosure, wanted: Mapping[str, float]) -> None:
+    def __init__(self, closure: Closure, wanted: Mapping[str, float]) -> None:
         import numpy as np  # local import: as above
 
         self._closure, self._names = closure, [*wanted]

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import asin, ceil, pi, tau
 from typing import Literal, NamedTuple
 
-from linkage_ros.kinematics.plane.closure import Closure
+from linkage_ros.kinematics.plane.closure import PlanarClosure
 from linkage_ros.kinematics.plane.linkage import GROUND, Slider
 from linkage_ros.kinematics.results import Position
 
@@ -118,7 +118,7 @@ def bar_size(picture: float, shortest: float) -> float:
 class _DrawnPose(NamedTuple):
     """A linkage in a pose, with the values that the shapes need."""
 
-    closure: Closure
+    closure: PlanarClosure
     points: dict[tuple[str, str], complex]
     angles: dict[str, float]
     slides: dict[str, float]
@@ -127,7 +127,7 @@ class _DrawnPose(NamedTuple):
 
 
 def draw_shapes(
-    closure: Closure, position: Position, size: float, travels: Travels
+    closure: PlanarClosure, position: Position, size: float, travels: Travels
 ) -> list[Shape]:
     """
     Return the shapes of a linkage at a position that closes.
@@ -139,7 +139,7 @@ def draw_shapes(
 
 
 def carried_shapes(
-    closure: Closure, position: Position, size: float, travels: Travels
+    closure: PlanarClosure, position: Position, size: float, travels: Travels
 ) -> list[tuple[str, Shape]]:
     """Draw a linkage as `draw_shapes` does; return each shape with the link that carries it."""
     pose = _DrawnPose(
@@ -180,7 +180,7 @@ def carried_shapes(
     return [*drawn, *pins.values()]
 
 
-def draw_skeleton(closure: Closure, position: Position) -> list[Segment]:
+def draw_skeleton(closure: PlanarClosure, position: Position) -> list[Segment]:
     """Return the links as lines from point to point, for a pose in the background."""
     points = closure.points(position)
     blocks = closure.structure.blocks
@@ -205,14 +205,14 @@ class LinkFrame(NamedTuple):
     angle: float
 
 
-def frames_of_links(closure: Closure, position: Position) -> dict[str, LinkFrame]:
+def frames_of_links(closure: PlanarClosure, position: Position) -> dict[str, LinkFrame]:
     """Return the frames of the links, and of the blocks of sliders that are not links."""
     frames = closure.link_frames
     moving = zip(frames.links, frames.frames_at(position), strict=True)
     return {GROUND: LinkFrame(0j, 0.0)} | {link: LinkFrame(*frame) for link, frame in moving}
 
 
-def driven_links(closure: Closure) -> set[str]:
+def driven_links(closure: PlanarClosure) -> set[str]:
     """Return the links that an input moves relative to their parent."""
     driven = set()
     for given in closure.linkage.inputs:

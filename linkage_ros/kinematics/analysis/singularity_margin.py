@@ -24,7 +24,8 @@ from linkage_ros.kinematics.results import SingularInput, SingularityMargin
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure, Position
+    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import Position
 
 _SAME = 1e-9
 """Singular inputs nearer to each other than this count as one, in [rad] or [m]."""
@@ -48,7 +49,7 @@ _FARTHEST = StepMargin(0.5 * pi, 1.0, -1)
 """The margin where nothing can be singular."""
 
 
-def singularity_margin(closure: LoopClosure, position: Position) -> SingularityMargin:
+def singularity_margin(closure: Closure, position: Position) -> SingularityMargin:
     """Return the margin of a closed position to a singularity."""
     found = [*step_margins(closure, position)]
     angle = min((each.transmission_angle for each in found), default=0.5 * pi)
@@ -63,7 +64,7 @@ def singularity_margin(closure: LoopClosure, position: Position) -> SingularityM
     return SingularityMargin(angle, min(weakest.conditioning, 1.0), distance, weakest.group)
 
 
-def step_margins(closure: LoopClosure, position: Position) -> Iterator[StepMargin]:
+def step_margins(closure: Closure, position: Position) -> Iterator[StepMargin]:
     """Yield the margins of the steps of a closed position, of numbers or symbols."""
     groups = closure.step_groups
     for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
@@ -74,7 +75,7 @@ def step_margins(closure: LoopClosure, position: Position) -> Iterator[StepMargi
             yield StepMargin(0.5 * pi, step.conditioning(pose), group)
 
 
-def signed_distance(closure: LoopClosure, value: float, place: float) -> float:
+def signed_distance(closure: Closure, value: float, place: float) -> float:
     """
     Return the distance of a value of the single input from a place, in [rad] or [m].
 
@@ -90,7 +91,7 @@ def signed_distance(closure: LoopClosure, value: float, place: float) -> float:
     return remainder(value - place, period) if period else value - place
 
 
-def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
+def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
     """
     Return the toggles and change points of a single input, in ascending order.
 
@@ -126,7 +127,7 @@ def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     return tuple(sorted(found, key=attrgetter('value')))
 
 
-def _move_within(closure: LoopClosure, value: float) -> float:
+def _move_within(closure: Closure, value: float) -> float:
     """Return the input of the same pose within the ranges: for a cylinder its other length."""
     zero = closure.zero_length
     ranges = closure.closing_ranges
@@ -135,7 +136,7 @@ def _move_within(closure: LoopClosure, value: float) -> float:
     return 2.0 * zero - value
 
 
-def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
+def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
     """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
     span = step.span
     if span is None or not span.arms or closure.linkage.ratios:
@@ -148,7 +149,7 @@ def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
     return [remainder(angle / factor, tau) for angle in span.singular_angles] if factor else []
 
 
-def _singular_status(closure: LoopClosure, number: int, place: float) -> Status | None:
+def _singular_status(closure: Closure, number: int, place: float) -> Status | None:
     """Return the kind of a dyad's singular input; None if no loop closes next to it."""
     status = closure.close_unlimited(place).status
     beside = [closure.close_unlimited(place + step) for step in (-_BESIDE, _BESIDE)]

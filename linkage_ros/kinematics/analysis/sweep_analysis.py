@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
 from math import inf, isfinite, nan, pi, remainder, tau
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError, list_names, quote
 from linkage_ros.kinematics.analysis.ranges import (
@@ -33,16 +33,15 @@ from linkage_ros.kinematics.analysis.ranges import (
 from linkage_ros.kinematics.built_once import BuiltProperty
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.plane.linkage import AssemblyPose, Linkage
-from linkage_ros.kinematics.results import (
-    InputRange,
-    LoopClosure,
-    Position,
-)
+from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
 from linkage_ros.progress import tell_progress
 
 # The pose of one step of a solution, from the steps that it starts from and no others.
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
 
 _SAMPLES = 720
 _GRID, _MOST_ON_GRID = 24, 14_000
@@ -73,7 +72,7 @@ _EASY = 0.25
 """Conditioning of a good pose to show: its transmission angle is above 20 degrees."""
 
 
-def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., StepPose]:
+def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., StepPose]:
     """
     Return a function that gives the pose of a step at inputs, in [rad] and [m].
 
@@ -133,7 +132,7 @@ class InputSweep:
     ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input.
     """
 
-    def __init__(self, closure: LoopClosure, held: Sequence[float] = (0.0,)) -> None:
+    def __init__(self, closure: Closure, held: Sequence[float] = (0.0,)) -> None:
         self.closure = closure
         self._others = tuple(held[1:])
         self.input = closure.linkage.inputs[0]
@@ -260,7 +259,7 @@ class InputSweep:
         return InputRange(low, high, self.turning, by=(by[0], by[1]))
 
 
-def starts_at_pose(closure: LoopClosure) -> bool:
+def starts_at_pose(closure: Closure) -> bool:
     """Return whether the file's pose is the start, not only the start of an iteration."""
     linkage = closure.linkage
     several = len(linkage.inputs) > 1
@@ -269,7 +268,7 @@ def starts_at_pose(closure: LoopClosure) -> bool:
     )
 
 
-def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
+def usual_inputs(closure: Closure) -> tuple[float, ...]:
     """
     Return inputs at which a linkage is shown, or from which it starts.
 
@@ -301,21 +300,21 @@ def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     return (interval.lowest + (interval.highest - interval.lowest) * 2.0 / 3.0,)
 
 
-def _pose_conditioning(closure: LoopClosure, position: Position) -> float:
+def _pose_conditioning(closure: Closure, position: Position) -> float:
     if position.status is not Status.CLOSED:
         return -1.0
     return closure.singularity_margin(position).conditioning
 
 
 def grid_positions(
-    closure: LoopClosure, count: int = _GRID
+    closure: Closure, count: int = _GRID
 ) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs."""
     for inputs in inputs_on_grid(closure, count):
         yield inputs, closure.position(*inputs)
 
 
-def inputs_on_grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[float, ...]]:
+def inputs_on_grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[float, ...]]:
     """Yield a grid over all inputs: one turn each, or the reach of a slide."""
     ways, inputs_count = [], len(closure.linkage.inputs)
     most = _MOST_ITERATED if closure.grids else _MOST_ON_GRID
@@ -488,7 +487,7 @@ def _as_input_function(
 # Checks that a linkage closes, and that it can be within its limits.
 
 
-def check_closes(closure: LoopClosure) -> None:
+def check_closes(closure: Closure) -> None:
     """
     Refuse a linkage whose loops close at no value of its only input.
 
@@ -517,7 +516,7 @@ def check_closes(closure: LoopClosure) -> None:
     )
 
 
-def check_turns(closure: LoopClosure) -> None:
+def check_turns(closure: Closure) -> None:
     """Refuse a ratio of an angle that leaves the half turns in which its turns are known."""
     for step in closure.steps:
         if not isinstance(step, FollowerJoint) or step.middle is None:
@@ -537,7 +536,7 @@ def check_turns(closure: LoopClosure) -> None:
                 )
 
 
-def check_limits(closure: LoopClosure) -> None:
+def check_limits(closure: Closure) -> None:
     """
     Refuse limits between which a linkage cannot be.
 
@@ -569,7 +568,7 @@ def check_limits(closure: LoopClosure) -> None:
         )
 
 
-def _check_single(closure: LoopClosure) -> None:
+def _check_single(closure: Closure) -> None:
     ranges, bounds = closure.closing_ranges, closure.bounds
     if bounds.inputs:
         (bound,) = bounds.inputs
@@ -601,7 +600,7 @@ def _check_single(closure: LoopClosure) -> None:
 
 
 def _joint_range(
-    closure: LoopClosure, ranges: Iterable[InputRange], bound: Bound
+    closure: Closure, ranges: Iterable[InputRange], bound: Bound
 ) -> tuple[float, float]:
     """Return the range of a published joint, with the turns that bring it nearest its limits."""
     values = [value for one in ranges for value in sample_inputs(one)]
@@ -610,14 +609,14 @@ def _joint_range(
     return min(turned), max(turned)
 
 
-def _met_on_grid(closure: LoopClosure) -> bool:
+def _met_on_grid(closure: Closure) -> bool:
     return any(
         position.joints and closure.bounds.first_exceeded(inputs, position.joints) is None
         for inputs, position in grid_positions(closure)
     )
 
 
-def _limits_text(closure: LoopClosure, bound: Bound) -> str:
+def _limits_text(closure: Closure, bound: Bound) -> str:
     limits = closure.linkage.limits[bound.name]
     return f'{limits} {_joint_unit(closure.linkage, bound)}'
 

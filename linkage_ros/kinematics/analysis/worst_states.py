@@ -12,14 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.analysis.ranges import is_iterated, sample_inputs
 from linkage_ros.kinematics.analysis.singularity_margin import step_margins
 from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid, InputSweep
 from linkage_ros.kinematics.compiling import Compiled, motion_at, TracedMotion
-from linkage_ros.kinematics.results import LoopClosure, SingularityMargin
+from linkage_ros.kinematics.results import SingularityMargin
 from linkage_ros.progress import tell_progress
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
 
 
 class WorstStates(NamedTuple):
@@ -32,7 +35,7 @@ class WorstStates(NamedTuple):
     nearest: tuple[float, ...]  # Where that is
 
 
-def find_worst_states(closure: LoopClosure) -> WorstStates | None:
+def find_worst_states(closure: Closure) -> WorstStates | None:
     """Return the worst states over the range, or over a grid of several inputs; None if empty."""
     several = len(closure.linkage.inputs) > 1
     if several:

@@ -34,7 +34,7 @@ from linkage_ros.kinematics.compiling.trace import (
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure
+    from linkage_ros.kinematics.closure import Closure
 
 _MOST_PATHS = 8
 """Most paths of a linkage; where none is valid, the interpreted steps answer."""
@@ -73,7 +73,7 @@ class Compiled:
 
     def __init__(
         self,
-        closure: LoopClosure,
+        closure: Closure,
         derivatives: int = 0,
         wanted: OutputSelection = published_joints,
         within_limits: bool = True,
@@ -172,7 +172,7 @@ def _first_of(
     return first_result
 
 
-def _trial_states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
+def _trial_states(closure: Closure) -> Iterator[tuple[float, ...]]:
     """Yield inputs at which a linkage may be closed: at its pose, then in its ranges."""
     linkage = closure.linkage
     if linkage.pose is not None:

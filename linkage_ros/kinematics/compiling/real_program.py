@@ -43,7 +43,7 @@ from linkage_ros.kinematics.compiling.trace import (
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure
+    from linkage_ros.kinematics.closure import Closure
 
 _MAKES_PARTS = frozenset(('facing', 'vector'))
 
@@ -274,7 +274,7 @@ class Program(NamedTuple):
     tree: Tree  # The decisions and results for finite inputs
 
 
-def compile_program(closure: LoopClosure, derivatives: int, wanted: OutputSelection) -> Program:
+def compile_program(closure: Closure, derivatives: int, wanted: OutputSelection) -> Program:
     """
     Return the tree of a linkage, ignoring its limits.
 

@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import LoopClosure
+    from linkage_ros.kinematics.closure import Closure
 
 BLOCK = 8192
 """Number of states in a block: as many as fit into the cache."""
@@ -79,7 +79,7 @@ class SolverOutline:
     """
 
     def __init__(
-        self, closure: LoopClosure, width: int, wanted: OutputSelection = published_joints
+        self, closure: Closure, width: int, wanted: OutputSelection = published_joints
     ) -> None:
         self._closure = closure
         self._limited = wanted is published_joints

@@ -21,7 +21,8 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState, Step
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
+    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 Number = Operation | float
 """A result of a program: an operation, or a constant."""
@@ -57,7 +58,7 @@ def published_joints(motion: TracedMotion) -> Sequence[Sequence[float]]:
 
 
 def trace_path(
-    closure: LoopClosure,
+    closure: Closure,
     at: Sequence[float],
     derivatives: int,
     wanted: OutputSelection = published_joints,
@@ -89,7 +90,7 @@ def trace_path(
 
 
 def motion_at(
-    closure: LoopClosure, given: Sequence[Sequence[Any]], within_limits: bool = True
+    closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True
 ) -> TracedMotion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
@@ -147,7 +148,7 @@ def tree_below(
     return tree
 
 
-def fallback_statuses(closure: LoopClosure, path: Path) -> tuple[Tree, ...]:
+def fallback_statuses(closure: Closure, path: Path) -> tuple[Tree, ...]:
     """
     Return, for each decision of a path, the status of the linkage if the decision differs.
 

@@ -26,7 +26,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
-    from linkage_ros.kinematics.plane.closure import Closure
+    from linkage_ros.kinematics.plane.closure import PlanarClosure
 
 STARTS = 400
 _SAME = 1e-6
@@ -43,7 +43,7 @@ class Assembly(NamedTuple):
     turns: int
 
 
-def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
+def other_assemblies(closure: PlanarClosure, number: int) -> list[Assembly]:
     """
     Return the other assemblies of an iterated group at the inputs of the pose.
 
@@ -70,7 +70,7 @@ def _are_same(one: Array, other: Array) -> bool:
     return bool(np.abs(away).max() < _SAME)
 
 
-def _pose_points(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, complex]:
+def _pose_points(closure: PlanarClosure, group: Iterated, unknowns: Array) -> dict[str, complex]:
     """Return the places of the points of the group that the pose names."""
     pose = closure.linkage.pose
     assert pose is not None
@@ -86,7 +86,9 @@ def _pose_points(closure: Closure, group: Iterated, unknowns: Array) -> dict[str
     return places
 
 
-def _turns_to_reach(closure: Closure, group: Iterated, step: IteratedStep, unknowns: Array) -> int:
+def _turns_to_reach(
+    closure: PlanarClosure, group: Iterated, step: IteratedStep, unknowns: Array
+) -> int:
     """Return the number of turns after which the pose's branch reaches a solution; 0 if never."""
     if len(closure.linkage.inputs) > 1 or closure.linkage.inputs[0].slider:
         return 0

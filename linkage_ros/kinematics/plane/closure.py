@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from math import tau
 from typing import TYPE_CHECKING
 
-from linkage_ros.errors import quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, link_lengths
 from linkage_ros.kinematics.arithmetic import unit_vector
 from linkage_ros.kinematics.built_once import BuiltProperty
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limits import without_mirrored, zero_length
 from linkage_ros.kinematics.plane.checks import check_linkage
 from linkage_ros.kinematics.plane.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
@@ -33,7 +33,6 @@ from linkage_ros.kinematics.results import (
     Velocity,
 )
 from linkage_ros.kinematics.step import LinkState
-from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
     from linkage_ros import LinkagePage
@@ -41,40 +40,13 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.plane.link_frames import LinkFrames
 
 
-class Closure(StepwiseClosure):
-    """
-    A linkage, ready to be solved.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    name
-        Its name, which messages and pictures show; `load` takes it from the file.
-
-    Attributes
-    ----------
-    linkage, name
-        As given.
-    input_names
-        Names of the driven joints, in the order in which `position` takes their values.
-    joint_names
-        Names of the published joints, in the order of `Position.joints`.
-
-    Raises
-    ------
-    DefinitionError
-        If the parts do not form a linkage, or the inputs do not move all of it.
-    TypeError
-        If ``linkage`` is not a `Linkage`.
-
-    """
+class PlanarClosure(Closure):
+    """A planar linkage, ready to be solved; see `Closure`."""
 
     linkage: Linkage
+    takes = Linkage
 
     def __init__(self, linkage: Linkage, name: str = '') -> None:
-        if not isinstance(linkage, Linkage):
-            raise TypeError(f'linkage: {quote(linkage)} is not a Linkage; load() reads files')
         check_linkage(linkage)
         self.structure: Structure = assur_groups(linkage)
         planner = SolutionPlan(linkage, self.structure)
@@ -115,17 +87,17 @@ class Closure(StepwiseClosure):
             PlaneExchange,  # local import: only few ask for it
         )
 
-        return PlaneExchange(self, names, near, lambda linkage: Closure(linkage, self.name))
+        return PlaneExchange(self, names, near, lambda linkage: PlanarClosure(linkage, self.name))
 
-    def measuring(self, *names: str) -> Closure:
-        """Return the closure with these names among its joints; see `StepwiseClosure`."""
+    def measuring(self, *names: str) -> PlanarClosure:
+        """Return the closure with these names among its joints; see `Closure`."""
         if {*names} <= {*self.joint_names}:
             return self
         from linkage_ros.kinematics.analysis.measured_points import (
             with_measured,  # local import: only few ask for it
         )
 
-        return Closure(with_measured(self.linkage, names), self.name)
+        return PlanarClosure(with_measured(self.linkage, names), self.name)
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
         """

@@ -31,8 +31,9 @@ from linkage_ros.kinematics.plane.topology import Dyad, Iterated, links_of
 from linkage_ros.kinematics.step import LinkState
 
 if TYPE_CHECKING:
+    from linkage_ros.kinematics.plane.closure import PlanarClosure
     from linkage_ros.kinematics.plane.solved_links import SolvedLinks
-    from linkage_ros.kinematics.results import PlanarClosure, Position
+    from linkage_ros.kinematics.results import Position
 
 _SAME = 1e-9
 """Places nearer to each other than this, in lengths, count as one."""

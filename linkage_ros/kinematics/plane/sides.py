@@ -19,7 +19,8 @@ from linkage_ros.kinematics.plane.linkage import AssemblyPose, Linkage, links_by
 from linkage_ros.kinematics.plane.topology import Dyad, Group, Iterated, Structure
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.results import PlanarClosure, Position
+    from linkage_ros.kinematics.plane.closure import PlanarClosure
+    from linkage_ros.kinematics.results import Position
 
 SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 SIDES['RPR'] = SIDES['RRP']

@@ -27,9 +27,9 @@ from linkage_ros.kinematics.analysis.crank_branches import crank_branches, joint
 from linkage_ros.kinematics.analysis.singularity_margin import signed_distance
 from linkage_ros.kinematics.analysis.sweep_analysis import inputs_on_grid
 from linkage_ros.kinematics.batch import Array, Batch, CODES
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling import Compiled
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 import numpy as np
 
 _SAME = 1e-9
@@ -45,7 +45,7 @@ _ROUNDS = 100
 """Rounds of the search: each moves on, or halves its steps."""
 
 
-def turning_points(closure: StepwiseClosure) -> dict[str, list[float]]:
+def turning_points(closure: Closure) -> dict[str, list[float]]:
     """Return for each published joint where it turns back over a single input, in its limits."""
     found: dict[str, list[float]] = {}
     compiled = Compiled(closure, 1, within_limits=False)
@@ -63,7 +63,7 @@ def turning_points(closure: StepwiseClosure) -> dict[str, list[float]]:
     return found
 
 
-def find_standing_state(closure: StepwiseClosure) -> tuple[float, ...] | None:
+def find_standing_state(closure: Closure) -> tuple[float, ...] | None:
     """
     Return inputs at which the Jacobian of the published joints loses rank, in [rad] and [m].
 
@@ -93,7 +93,7 @@ def find_standing_state(closure: StepwiseClosure) -> tuple[float, ...] | None:
     return None
 
 
-def _smallest_singular_values(closure: StepwiseClosure, inputs: Array) -> Array:
+def _smallest_singular_values(closure: Closure, inputs: Array) -> Array:
     """
     Return the smallest singular value of the Jacobian at inputs (N, inputs).
 

@@ -16,9 +16,10 @@ from itertools import pairwise
 from math import atan2, dist, sqrt, tau
 from typing import TYPE_CHECKING
 
-from linkage_ros.errors import DefinitionError, quote
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.analysis.sweep_analysis import grid_positions
 from linkage_ros.kinematics.arithmetic import remainder
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.iterated.straight_line import has_symbols, StraightLine
 from linkage_ros.kinematics.plane.linkage import Limits, SlideJoint, turn_ratios
 from linkage_ros.kinematics.results import Acceleration, Near, Plan, Position, Velocity
@@ -44,7 +45,6 @@ from linkage_ros.kinematics.space.vectors import (
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import LinkState
-from linkage_ros.kinematics.stepwise_closure import StepwiseClosure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.space.freedom import Freedom
@@ -62,36 +62,13 @@ _STATES = 64
 """Number of states over the inputs in which redundant equations are checked."""
 
 
-class SpaceClosure(StepwiseClosure):
-    """
-    A spatial linkage, ready to be solved.
-
-    Parameters
-    ----------
-    linkage
-        The linkage.
-    name
-        Its name, which messages show; `load` takes it from the file.
-
-    Attributes
-    ----------
-    linkage, name
-        As given.
-    input_names, joint_names
-        Names of the driven and of the published joints, in the order of their values.
-
-    Raises
-    ------
-    DefinitionError
-        If the parts do not form a linkage, or the inputs do not move all of it.
-
-    """
+class SpaceClosure(Closure):
+    """A spatial linkage, ready to be solved; see `Closure`."""
 
     linkage: SpaceLinkage
+    takes = SpaceLinkage
 
     def __init__(self, linkage: SpaceLinkage, name: str = '') -> None:
-        if not isinstance(linkage, SpaceLinkage):
-            raise TypeError(f'linkage: {quote(linkage)} is not a SpaceLinkage; load() reads files')
         check_space_linkage(linkage)
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
@@ -214,7 +191,7 @@ class SpaceClosure(StepwiseClosure):
         return plan
 
     def measuring(self, *names: str) -> SpaceClosure:
-        """Return the closure with these names among its joints; see `StepwiseClosure`."""
+        """Return the closure with these names among its joints; see `Closure`."""
         if {*names} <= {*self.joint_names}:
             return self
         from linkage_ros.kinematics.space.measured_points import (

@@ -21,7 +21,8 @@ from dataclasses import replace
 from math import tau
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.plane.closure import Closure
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.plane.closure import PlanarClosure
 from linkage_ros.kinematics.plane.linkage import Linkage, RevoluteJoint
 from linkage_ros.kinematics.space.carried_points import CarriedPoints
 from linkage_ros.kinematics.space.closure import closure_in_pose, SpaceClosure
@@ -40,7 +41,7 @@ _PLANES = ('y', 'z'), ('x', 'z'), ('x', 'y')
 
 def closure_as_drawn(
     linkage: SpaceLinkage, name: str = '', *, publish_model_joints: bool = False
-) -> Closure | SpaceClosure:
+) -> Closure:
     """
     Return the closure of a linkage that closes in its pose: planar if its links move so.
 
@@ -53,14 +54,14 @@ def closure_as_drawn(
     if planar is not None:
         # A pose at a toggle is left to the closure in space.
         with suppress(DefinitionError):
-            closure = Closure(planar, name)
+            closure = PlanarClosure(planar, name)
             turns = _turns_in_pose(closure, drawn)
             if any(turns.values()):
                 joints = {
                     joint: replace(of, turns=turns[joint]) if isinstance(of, RevoluteJoint) else of
                     for joint, of in planar.joints.items()
                 }
-                closure = Closure(replace(planar, joints=joints), name)
+                closure = PlanarClosure(replace(planar, joints=joints), name)
             return closure
     spatial = closure_in_pose(linkage, name)
     if publish_model_joints:
@@ -68,7 +69,7 @@ def closure_as_drawn(
     return spatial
 
 
-def _turns_in_pose(closure: Closure, linkage: SpaceLinkage) -> dict[str, int]:
+def _turns_in_pose(closure: PlanarClosure, linkage: SpaceLinkage) -> dict[str, int]:
     """Return for each joint the whole turns that its value lacks in the pose."""
     found = closure.close_unlimited(*linkage.pose.inputs)
     if not found.status.has_rates:

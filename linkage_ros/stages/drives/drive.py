@@ -187,7 +187,7 @@ class Context:
 
     """
 
-    closure: Closure
+    closure: Any  # A `Closure`; an effect for planar linkages alone asks for one of these
     rate: float
     needs_rate: bool
     seed: str
@@ -223,12 +223,12 @@ class Context:
         return Random(f'{seed}/{effect}')
 
     @cached_property
-    def hard_limited(self) -> Closure:
+    def hard_limited(self) -> Any:  # A `Closure`
         """Return the closure without the limits at which a stop yields."""
         yielding = self.loads.applied.stops if self.loads else ()
         if not yielding:
             return self.closure
-        return type(self.closure)(self.closure.linkage.without_limits(yielding))
+        return Closure(self.closure.linkage.without_limits(yielding))
 
     @cached_property
     def mechanics(self) -> Mechanics:

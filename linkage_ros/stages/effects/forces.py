@@ -48,7 +48,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import all_finite, Closure
+from linkage_ros.kinematics import all_finite, PlanarClosure
 from linkage_ros.stages.drives import Context, CrankAtRest, CrankBehindPlay
 from linkage_ros.stages.effects.effect import MechanismEffect, MessageEffect
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stage, Writer
@@ -124,7 +124,7 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
                 'leave it out',
             )
         names = [context.prefix + forces.names[number] for number in forces.published_joints]
-        write = JointWrenchWriter(names, planar=isinstance(context.closure, Closure)).write
+        write = JointWrenchWriter(names, planar=isinstance(context.closure, PlanarClosure)).write
         if len(names) == len(forces.names):
 
             def write_forces(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:

@@ -28,13 +28,13 @@ from linkage_ros.kinematics import (
     bounding_corners,
     carried_shapes,
     Circle,
-    Closure,
     COLOURS,
     FACES,
     GROUND,
     INK,
     Input,
     links_by_point,
+    PlanarClosure,
     Polygon,
     Position,
     prepare_view,
@@ -122,7 +122,7 @@ _NOWHERE: list[Place] = [(0.0, 0.0, 0.0)]
 
 
 def marker_shapes(
-    closure: Closure,
+    closure: PlanarClosure,
     width: float,
     trail: int,
     forces: int,
@@ -204,7 +204,7 @@ class _Pile:
 
 
 def _body_markers(
-    pile: _Pile, closure: Closure, position: Position, drawn: Sequence[tuple[str, Shape]]
+    pile: _Pile, closure: PlanarClosure, position: Position, drawn: Sequence[tuple[str, Shape]]
 ) -> tuple[MarkerBody, ...]:
     """Return the markers that move with a link, each in the frame of its link."""
     points, angles = closure.points(position), closure.link_angles(position)
@@ -262,7 +262,7 @@ def _ground_markers(drawn: Sequence[Shape], size: float, lifetime: int) -> list[
     return [marker for marker in found if marker.points]
 
 
-def _traced_points(closure: Closure) -> dict[str, Key]:
+def _traced_points(closure: PlanarClosure) -> dict[str, Key]:
     """Return the key of each traced point."""
     links = links_by_point(closure.linkage.links)
     return {point: Key(links[point][0], point) for point in closure.linkage.traced}
@@ -296,7 +296,7 @@ class Arrows:
     """
 
     def __init__(
-        self, scale: float, closure: Closure, shapes: MarkerShapes, joints: Sequence[Key]
+        self, scale: float, closure: PlanarClosure, shapes: MarkerShapes, joints: Sequence[Key]
     ) -> None:
         self._closure = closure
         self._scale = scale

@@ -41,7 +41,7 @@ from random import Random
 
 from linkage_ros.description import each_part, number, part_names, Point
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, Linkage
+from linkage_ros.kinematics import Linkage, PlanarClosure
 from linkage_ros.stages.effects.effect import LinkageEffect
 
 TRUNCATED = 3.0
@@ -105,7 +105,7 @@ def _draw_deviation(random: Random) -> float:
 def _check_closes(linkage: Linkage) -> None:
     reason = 'at no value of the input'
     try:
-        closure = Closure(linkage)
+        closure = PlanarClosure(linkage)
         if len(linkage.inputs) > 1 or closure.input_ranges:
             return
     except DefinitionError as error:

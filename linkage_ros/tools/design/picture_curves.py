@@ -15,7 +15,7 @@ from math import degrees, pi, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Closure, INK, InputRange, InputSweep, Position
+from linkage_ros.kinematics import INK, InputRange, InputSweep, PlanarClosure, Position
 from linkage_ros.tools.design.design import Assembly, COUPLER, Design, DesignRequest
 from linkage_ros.tools.design.proof import (
     AchievedPosition,
@@ -51,7 +51,7 @@ class DesignPose(NamedTuple):
     wanted: DesignRequest
     met: AchievedPosition
     own: bool  # Whether it is on the design's own assembly
-    closure: Closure  # The linkage in the assembly that meets the position
+    closure: PlanarClosure  # The linkage in the assembly that meets the position
     position: Position
 
     @property

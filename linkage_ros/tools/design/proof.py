@@ -29,7 +29,7 @@ from dataclasses import replace
 from math import inf, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics import Closure, Position, Status, UNIT_ROUNDOFF
+from linkage_ros.kinematics import PlanarClosure, Position, Status, UNIT_ROUNDOFF
 from linkage_ros.tools.design.design import Assembly, COUPLER, Design, DesignRequest
 import numpy as np
 from numpy.typing import NDArray
@@ -259,12 +259,14 @@ def prove_both_sides(
     return left, right
 
 
-def closure_of(design: Design, side: Assembly) -> Closure:
+def closure_of(design: Design, side: Assembly) -> PlanarClosure:
     """Return the closure of a design on one assembly."""
-    return Closure(replace(design.four_bar, side=side).linkage())
+    return PlanarClosure(replace(design.four_bar, side=side).linkage())
 
 
-def _meet_position(closure: Closure, side: Assembly, wanted: DesignRequest) -> AchievedPosition:
+def _meet_position(
+    closure: PlanarClosure, side: Assembly, wanted: DesignRequest
+) -> AchievedPosition:
     position = closed_position(closure, wanted.crank)
     if not position.joints:
         return AchievedPosition(side, 0.0, 0.0, position.status, position.gap)
@@ -280,7 +282,7 @@ def _meet_position(closure: Closure, side: Assembly, wanted: DesignRequest) -> A
     return AchievedPosition(side, max(errors, key=abs), distance, position.status)
 
 
-def closed_position(closure: Closure, crank: float) -> Position:
+def closed_position(closure: PlanarClosure, crank: float) -> Position:
     """
     Close the loop; a crank beyond an end of the range only by rounding is set to that end.
 

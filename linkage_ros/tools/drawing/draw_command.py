@@ -48,7 +48,7 @@ from linkage_ros.description import (
 )
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
-    Closure,
+    PlanarClosure,
     prepare_view,
     read_drawn_pose,
     SpaceClosure,
@@ -144,7 +144,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def _write_parts(closure: Closure, arguments: argparse.Namespace) -> int:
+def _write_parts(closure: PlanarClosure, arguments: argparse.Namespace) -> int:
     """Write the links as parts."""
     width, hole = (
         None if typed is None else typed / 1e3 for typed in (arguments.width, arguments.hole)

@@ -19,10 +19,10 @@ from linkage_ros.kinematics import (
     bounding_corners,
     carried_shapes,
     Circle,
-    Closure,
     frames_of_links,
     LinkageView,
     LinkFrame,
+    PlanarClosure,
     Position,
     Segment,
     Shape,
@@ -59,7 +59,7 @@ def drawn_in_frames(shown: LinkageView) -> dict[str, Any]:
     }
 
 
-def pose_in_frames(closure: Closure, position: Position, size: float) -> dict[str, Any]:
+def pose_in_frames(closure: PlanarClosure, position: Position, size: float) -> dict[str, Any]:
     """
     Return the drawing of a linkage of pins without its motion: it takes a tenth of the time.
 
@@ -71,7 +71,7 @@ def pose_in_frames(closure: Closure, position: Position, size: float) -> dict[st
 
 
 def _carried_shapes(
-    closure: Closure, position: Position, size: float, drawn: Sequence[tuple[str, Shape]]
+    closure: PlanarClosure, position: Position, size: float, drawn: Sequence[tuple[str, Shape]]
 ) -> dict[str, Any]:
     frames = frames_of_links(closure, position)
     return {

@@ -26,11 +26,11 @@ from typing import Any, NamedTuple
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics import (
     bounding_corners,
-    Closure,
     convex_hull,
     frames_of_links,
     LinkageView,
     links_by_point,
+    PlanarClosure,
     prepare_view,
     symbol_size,
     usual_inputs,
@@ -56,7 +56,9 @@ class _FlatPart(NamedTuple):
     slots: Sequence[tuple[complex, complex]]
 
 
-def links_dxf(closure: Closure, *, width: float | None = None, hole: float | None = None) -> bytes:
+def links_dxf(
+    closure: PlanarClosure, *, width: float | None = None, hole: float | None = None
+) -> bytes:
     """
     Return the links as a DXF file.
 

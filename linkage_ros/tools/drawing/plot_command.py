@@ -41,7 +41,6 @@ from linkage_ros.kinematics import (
     InputSweep,
     Linkage,
     RevoluteJoint,
-    SpaceClosure,
     sweep_range,
 )
 from linkage_ros.messages import (
@@ -254,7 +253,7 @@ def crank_curves(
     which a curve begins anew, as after lost ticks.
     """
     driven = linkage.inputs[0]
-    closure = Closure(linkage) if isinstance(linkage, Linkage) else SpaceClosure(linkage)
+    closure = Closure(linkage)
     input_sweep = InputSweep(closure, cranks[0])
     about = (each for each in input_sweep.ranges if _is_within(cranks[0][0], each))
     interval = next(about, input_sweep.widest_range)

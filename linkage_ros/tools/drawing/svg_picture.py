@@ -25,7 +25,6 @@ from linkage_ros.kinematics import (
     Position,
     prepare_view,
     shape_outline,
-    SpaceClosure,
     usual_inputs,
 )
 from linkage_ros.tools.drawing.drawn_linkage import draw_linkage
@@ -35,7 +34,7 @@ _LONGER_SIDE = 420.0
 """Longer side of a picture, in pixels."""
 
 
-def svg(shown: Closure | SpaceClosure | Position) -> str:
+def svg(shown: Closure | Position) -> str:
     """
     Draw a linkage as SVG.
 
@@ -60,10 +59,10 @@ def svg(shown: Closure | SpaceClosure | Position) -> str:
 
     """
     position: Any = shown
-    if isinstance(shown, (Closure, SpaceClosure)):
+    if isinstance(shown, Closure):
         position = shown.position(*usual_inputs(shown))
     if not isinstance(position, Position):
-        raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
+        raise TypeError(f'svg: {quote(shown)} is not drawn; give a PlanarClosure or a Position')
     drawn = draw_linkage(prepare_view(position.closure, position.inputs))
     low, high = drawn.corners(2.0)
     scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)

@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import check_installed
-from linkage_ros.kinematics import StepwiseClosure
+from linkage_ros.kinematics import Closure
 from linkage_ros.tools.models.source_code import FUNCTIONS, STATUSES, Subject, write_arrays
 import numpy as np
 
@@ -61,7 +61,7 @@ class ArrayFunctions(NamedTuple):
     source: str
 
 
-def make_array_functions(closure: StepwiseClosure, package: str) -> ArrayFunctions:
+def make_array_functions(closure: Closure, package: str) -> ArrayFunctions:
     """
     Return a linkage as functions of arrays of ``numpy``, ``torch`` or ``jax``.
 

@@ -22,10 +22,10 @@ from statistics import median
 from typing import NamedTuple
 
 from linkage_ros.kinematics import (
-    Closure,
     convex_hull,
     GROUND,
     link_lengths,
+    PlanarClosure,
     SlideJoint,
 )
 from linkage_ros.tools.models.orientation import AngleSpan
@@ -66,7 +66,7 @@ class LinkBody(NamedTuple):
 
 
 def link_bodies(
-    closure: Closure, ranges: Mapping[str, AngleSpan], first_layer: int = 0
+    closure: PlanarClosure, ranges: Mapping[str, AngleSpan], first_layer: int = 0
 ) -> dict[str, LinkBody]:
     """Return the shapes of each link, above the layers that other linkages occupy."""
     linkage = closure.linkage
@@ -86,7 +86,7 @@ def link_bodies(
     return drawn
 
 
-def bar_width(closure: Closure) -> float:
+def bar_width(closure: PlanarClosure) -> float:
     """Return the width of bars, in [m]: a fraction of the typical length of links."""
     lengths = [length for length in link_lengths(closure.linkage.links) if length > 0.0]
     longest = max(lengths, default=0.0) or closure.slide_bound or 1.0
@@ -94,7 +94,7 @@ def bar_width(closure: Closure) -> float:
     return min(0.12 * common, 0.05 * longest)
 
 
-def _bar_solids(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
+def _bar_solids(closure: PlanarClosure, link: str, z: float, width: float) -> list[Solid]:
     points = {name: complex(*at) for name, at in closure.linkage.links[link].items()}
     height = 0.5 * width
     if len(points) == 1 and link != GROUND:
@@ -121,7 +121,7 @@ def _bar_solids(closure: Closure, link: str, z: float, width: float) -> list[Sol
     return bars + discs
 
 
-def _block_angle(closure: Closure, link: str) -> float:
+def _block_angle(closure: PlanarClosure, link: str) -> float:
     """Return the angle of a block along its slider, in the block's own frame."""
     for slider in closure.linkage.sliders.values():
         if slider.block == link:
@@ -137,7 +137,7 @@ def _block_angle(closure: Closure, link: str) -> float:
 
 
 def _rail_solids(
-    closure: Closure, link: str, ranges: Mapping[str, AngleSpan], z: float, width: float
+    closure: PlanarClosure, link: str, ranges: Mapping[str, AngleSpan], z: float, width: float
 ) -> list[Solid]:
     rails = []
     for name, slider in closure.linkage.sliders.items():
@@ -157,7 +157,7 @@ def _rail_solids(
 
 
 def slider_travel(
-    closure: Closure, slider: str, ranges: Mapping[str, AngleSpan]
+    closure: PlanarClosure, slider: str, ranges: Mapping[str, AngleSpan]
 ) -> tuple[float, float]:
     """Return the range of a slider's point along its line, in [m], as far as it is known."""
     for name, joint in closure.linkage.named_joints.items():

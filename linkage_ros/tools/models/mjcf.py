@@ -24,12 +24,12 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics import (
-    Closure,
     GROUND,
     Limits,
     links_by_point,
     Mass,
     NO_LIMITS,
+    PlanarClosure,
     RevoluteJoint,
     SlideJoint,
     usual_inputs,
@@ -113,7 +113,7 @@ class _Edge(NamedTuple):
     ends: tuple[str, str]
 
 
-def physical_tree(closure: Closure) -> PhysicalTree:
+def physical_tree(closure: PlanarClosure) -> PhysicalTree:
     """
     Return a linkage as a tree of pins and sliders.
 
@@ -141,7 +141,7 @@ def physical_tree(closure: Closure) -> PhysicalTree:
     return PhysicalTree(tuple(branches), tuple(_find_cuts(closure, kept)))
 
 
-def _list_edges(closure: Closure) -> Iterator[_Edge]:
+def _list_edges(closure: PlanarClosure) -> Iterator[_Edge]:
     """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
     driven = {frozenset((given.parent, given.child)) for given in linkage.driven_joints}
@@ -162,7 +162,7 @@ def _list_edges(closure: Closure) -> Iterator[_Edge]:
                 yield _Edge(rank, 'R', pin, (one, other))
 
 
-def _find_cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
+def _find_cuts(closure: PlanarClosure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
     for point, carried in links_by_point(closure.structure.links).items():
         part_of = {link: link for link in carried}
         for edge in kept:
@@ -173,7 +173,7 @@ def _find_cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, 
         yield from ((point, first, other) for other in others)
 
 
-def _joint_name(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
+def _joint_name(closure: PlanarClosure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
     """Return the name of a joint in messages, and its sign."""
     for name, joint in closure.linkage.named_joints.items():
         if isinstance(joint, SlideJoint):
@@ -194,7 +194,7 @@ class Bodies:
     def __init__(
         self, world: ET.Element, part: ModelPart, names: PrefixedNames, first_layer: int
     ) -> None:
-        closure: Closure = part.closure
+        closure: PlanarClosure = part.closure
         self._closure = closure
         self._names = names
         tree = physical_tree(closure)
@@ -312,7 +312,7 @@ class Bodies:
 
 
 def _pose_on_parent(
-    closure: Closure, branch: TreeBranch
+    closure: PlanarClosure, branch: TreeBranch
 ) -> tuple[complex, float, complex, complex]:
     """
     Return the pose of a body on its parent with its joint at 0.
@@ -335,7 +335,7 @@ def _pose_on_parent(
     return complex(*place), turn, axis, complex(*own)
 
 
-def _slot_block(closure: Closure, block: str) -> LinkBody:
+def _slot_block(closure: PlanarClosure, block: str) -> LinkBody:
     """Return the block that represents a pin in a slot."""
     name = next(slider for slider, of in closure.structure.blocks.items() if of == block)
     slider, width = closure.linkage.sliders[name], bar_width(closure)

@@ -24,10 +24,10 @@ from math import pi, remainder, tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics import (
-    Closure,
     InputRange,
     InputSweep,
     Linkage,
+    PlanarClosure,
     RevoluteJoint,
     sample_inputs,
     SlideJoint,
@@ -123,7 +123,7 @@ ROUND = AngleSpan(-pi, pi, False)
 """Range of an angle without limits."""
 
 
-def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
+def joint_spans(closure: PlanarClosure) -> dict[str, AngleSpan]:
     """Return the range of each joint that has a name in messages."""
     joints = closure.linkage.named_joints
     if len(closure.linkage.inputs) > 1:
@@ -147,7 +147,9 @@ def joint_spans(closure: Closure) -> dict[str, AngleSpan]:
     return {name: ranges[name] for name in joints}
 
 
-def _published_spans(closure: Closure, start: float, interval: InputRange) -> list[AngleSpan]:
+def _published_spans(
+    closure: PlanarClosure, start: float, interval: InputRange
+) -> list[AngleSpan]:
     import numpy as np  # local import: only the batch needs it
 
     values = np.array(sample_inputs(interval, _SAMPLES))
@@ -168,7 +170,7 @@ def _published_spans(closure: Closure, start: float, interval: InputRange) -> li
 
 
 def _joint_span(
-    row: Array, first: int, turning: bool, closure: Closure, interval: InputRange
+    row: Array, first: int, turning: bool, closure: PlanarClosure, interval: InputRange
 ) -> AngleSpan:
     low, high = int(row.argmin()), int(row.argmax())
     if turning and interval.is_whole and abs(row[-1] - row[0]) > pi:

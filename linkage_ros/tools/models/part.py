@@ -22,7 +22,7 @@ from linkage_ros.names import free_name
 class ModelPart(NamedTuple):
     """A linkage of a model, whose links and joints get a prefix; wrapped angles are in (−π, π]."""
 
-    closure: Any  # A Closure; for a URDF also a SpaceClosure
+    closure: Any  # A PlanarClosure; for a URDF also a SpaceClosure
     prefix: str = ''
     loads: Loads | None = None
     wrapped: bool = False

@@ -25,11 +25,11 @@ from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import DefinitionError, quote
 from linkage_ros.kinematics import (
-    Closure,
     GROUND,
     Linkage,
     links_by_point,
     NO_LIMITS,
+    PlanarClosure,
     Ratio,
     RevoluteJoint,
     SpaceLinkage,
@@ -357,7 +357,7 @@ def _write_visuals(link: ET.Element, name: str, body: LinkBody, origin: complex)
 
 def _write_start(
     robot: ET.Element,
-    closure: Closure,
+    closure: PlanarClosure,
     names: PrefixedNames,
     computed: Mapping[str, Mapping[str, str]],
 ) -> None:

@@ -33,7 +33,7 @@ from math import frexp
 from typing import Any, NamedTuple
 
 from flint import acb, arb, arb_mat, ctx
-from linkage_ros.kinematics import Closure, GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics import GROUND, Linkage, PlanarClosure, RevoluteJoint
 
 _PRECISIONS = (512, 1024, 2048)
 """Precisions in bits; the next is tried if one proves nothing."""
@@ -81,7 +81,7 @@ def prove(
                 linkage, [*zip(inputs, rates, accelerations, strict=True)]
             )
             found = _prove_solution(
-                equations, equations.initial_unknowns(Closure(linkage), inputs)
+                equations, equations.initial_unknowns(PlanarClosure(linkage), inputs)
             )
             if found is not None:
                 return equations.prove_joints(found)
@@ -95,7 +95,9 @@ def solve(linkage: Linkage, inputs: Sequence[float], bits: int) -> tuple[Any, ..
     before, ctx.prec = ctx.prec, bits
     try:
         equations = _ExactConstraints(linkage, [(value, 1.0, 0.0) for value in inputs])
-        found = _iterate_newton(equations, equations.initial_unknowns(Closure(linkage), inputs))
+        found = _iterate_newton(
+            equations, equations.initial_unknowns(PlanarClosure(linkage), inputs)
+        )
         if found is None:
             raise SingularError(f'{tuple(inputs)}: nothing converges')
         return equations.joint_values(found)
@@ -155,7 +157,7 @@ class _ExactConstraints:
                 )
             )
 
-    def initial_unknowns(self, closure: Closure, inputs: Sequence[float]) -> list[Any]:
+    def initial_unknowns(self, closure: PlanarClosure, inputs: Sequence[float]) -> list[Any]:
         """Return the unknowns from the closure's solution; unknown 0 is 1."""
         position = closure.position(*inputs)
         if not position.joints:

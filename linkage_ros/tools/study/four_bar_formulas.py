@@ -38,11 +38,11 @@ from typing import Any, NamedTuple
 
 from linkage_ros.kinematics import (
     assur_groups,
-    Closure,
     Driven,
     four_bars,
     GROUND,
     Linkage,
+    PlanarClosure,
     RevoluteJoint,
     written_sides,
 )
@@ -111,7 +111,7 @@ def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     constants = {link: level - arm for link, arm in arms.items()}
     return PlainFourBar(
         *found[0].lengths,
-        side=1.0 if written_sides(Closure(linkage))[closing] == 'left' else -1.0,
+        side=1.0 if written_sides(PlanarClosure(linkage))[closing] == 'left' else -1.0,
         turn=turn,
         offset=arms[crank] - level,
         terms=tuple(

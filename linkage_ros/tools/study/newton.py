@@ -20,7 +20,6 @@ from typing import Any
 
 from linkage_ros.kinematics import (
     BodyDirection,
-    Closure,
     CoincidentPoints,
     Constraint,
     End,
@@ -30,6 +29,7 @@ from linkage_ros.kinematics import (
     LinkState,
     OnLine,
     Parallel,
+    PlanarClosure,
     RevoluteJoint,
 )
 import numpy as np
@@ -46,7 +46,7 @@ class ConstraintEquations:
 
     def __init__(self, linkage: Linkage) -> None:
         self._linkage = linkage
-        self._closure = Closure(linkage)
+        self._closure = PlanarClosure(linkage)
         self._bodies = {name: k for k, name in enumerate(n for n in linkage.links if n != GROUND)}
         self._ground = {name: k for k, name in enumerate(linkage.links[GROUND])}
         self._pins = [complex(*place) for place in linkage.links[GROUND].values()]

@@ -25,10 +25,10 @@ from typing import Any, NamedTuple
 from linkage_ros.description import read_linkage, read_yaml
 from linkage_ros.errors import check_installed, LinkageError
 from linkage_ros.kinematics import (
-    Closure,
     InputSweep,
     is_iterated,
     Linkage,
+    PlanarClosure,
     RevoluteJoint,
     Status,
 )
@@ -63,7 +63,7 @@ _FAR = 0.1
 DISTANCES = tuple(10.0 ** (-k / 2.0) for k in range(4, 19))
 """Distances of hard cases from a toggle or change point: 1e-2 to 1e-9."""
 
-Near = Callable[[Closure], 'tuple[list[tuple[float, ...]], list[float]]']
+Near = Callable[[PlanarClosure], 'tuple[list[tuple[float, ...]], list[float]]']
 
 
 class SolvingMethod(NamedTuple):
@@ -99,7 +99,8 @@ def measure_solving(
     candidates: list[tuple[str, JointError, Candidate]] = []
     unproved = 0
     for index, motion in enumerate(motions):
-        linkage = motion.closure.linkage
+        closure: Any = motion.closure  # planar: solving is measured in the plane alone
+        linkage = closure.linkage
         states = [
             crank[0]
             for crank in cranks_at(motion, times)
@@ -109,13 +110,13 @@ def measure_solving(
         unproved += len(states) - len(known)
         if not known:
             continue
-        own = _scene_solver(motion.closure)
+        own = _scene_solver(closure)
         errors.append(compare_solver(linkage, own.solve, known, exact)[0])
         progress(0.2)
         if index:
             continue
         candidates.append((own.label, errors[0], _timed_candidate(own.solve, known)))
-        for solver in comparison_solvers(motion.closure):
+        for solver in comparison_solvers(closure):
             error, failed = compare_solver(linkage, solver.solve, known, exact)
             if not failed:
                 candidates.append((solver.label, error, _timed_candidate(solver.solve, known)))
@@ -200,7 +201,7 @@ def largest_distance(linkage: Linkage, joints: Sequence[Any], balls: Sequence[An
     return worst
 
 
-def _scene_solver(closure: Closure) -> SolvingMethod:
+def _scene_solver(closure: PlanarClosure) -> SolvingMethod:
     """Return what a scene solves with, as a tick does."""
     compiled = closure.compile_linkage(0)
     fast, plain = compiled.fast, compiled.run_interpreted
@@ -212,7 +213,7 @@ def _scene_solver(closure: Closure) -> SolvingMethod:
     return SolvingMethod(ITERATED if is_iterated(closure) else CLOSED_FORM, position)
 
 
-def comparison_solvers(closure: Closure) -> Iterator[SolvingMethod]:
+def comparison_solvers(closure: PlanarClosure) -> Iterator[SolvingMethod]:
     """Yield ways to solve a linkage which no scene can ask for."""
     linkage = closure.linkage
     shape = plain_four_bar(linkage)
@@ -243,7 +244,7 @@ def _solve_to_digits(linkage: Linkage) -> Solve:
     return position
 
 
-def _solve_by_spline(closure: Closure, knots: int) -> Solve | None:
+def _solve_by_spline(closure: PlanarClosure, knots: int) -> Solve | None:
     """Return a cubic spline through states over the widest range; None if it does not close."""
     from scipy.interpolate import CubicSpline  # local import: an optional dependency
 
@@ -303,7 +304,7 @@ def compare_hard_cases() -> Iterator[HardCase]:
         ('parallelogram', 'change point', _near_change_point),
     ):
         linkage = read_linkage(read_yaml(shipped_path(f'linkages/{name}.yaml'))[0])
-        closure = Closure(linkage)
+        closure = PlanarClosure(linkage)
         states, distances = near(closure)
         known, exact = exact_joints(linkage, states)
         # Next to a change point the other assembly is as near as the change point itself.
@@ -314,21 +315,21 @@ def compare_hard_cases() -> Iterator[HardCase]:
             yield HardCase(f'{place} of {name}', solver.label, error.worst, failed, len(known))
 
 
-def _near_toggle(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
+def _near_toggle(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
     interval = InputSweep(closure).widest_range
     assert interval is not None, 'it has one'
     unit = 1.0 if interval.turning else closure.slide_bound
     return _closing_states(closure, interval.highest, [-unit * distance for distance in DISTANCES])
 
 
-def _near_change_point(closure: Closure) -> tuple[list[tuple[float, ...]], list[float]]:
+def _near_change_point(closure: PlanarClosure) -> tuple[list[tuple[float, ...]], list[float]]:
     places = [x.value for x in closure.singular_inputs if x.status is Status.CHANGE_POINT]
     offsets = [*(-distance for distance in DISTANCES), *reversed(DISTANCES)]
     return _closing_states(closure, min(places, key=abs), offsets)
 
 
 def _closing_states(
-    closure: Closure, place: float, offsets: Sequence[float]
+    closure: PlanarClosure, place: float, offsets: Sequence[float]
 ) -> tuple[list[tuple[float, ...]], list[float]]:
     kept = [o for o in offsets if closure.position(place + o).status is Status.CLOSED]
     return [(place + offset,) for offset in kept], [abs(offset) for offset in kept]

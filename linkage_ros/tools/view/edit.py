@@ -36,10 +36,10 @@ from linkage_ros.errors import (
 from linkage_ros.kinematics import (
     assembly_sides,
     assur_groups,
-    Closure,
     GROUND,
     Linkage,
     links_by_point,
+    PlanarClosure,
     RevoluteJoint,
     usual_inputs,
     without_drawn_pose,
@@ -68,7 +68,7 @@ class EditResult(NamedTuple):
 class _ShownLinkage(NamedTuple):
     """The linkage before the edit, in the pose that the page shows."""
 
-    closure: Closure
+    closure: PlanarClosure
     inputs: tuple[float, ...]
     frames: dict[str, tuple[complex, float]]
     pins: dict[str, complex]
@@ -99,7 +99,7 @@ def edit_text(text: str, edit: Mapping[str, Any], name: str = _NAME) -> EditResu
             'edit', f'{quote(dict(edit))} is not an edit', f'send {list_names(_KINDS)}'
         )
     written, _ = written_linkage(parse_yaml(text.encode(), name))
-    closure = Closure(written)
+    closure = PlanarClosure(written)
     shown = _shown_linkage(closure, edit.get('inputs'))
     change = _KINDS[kind](shown, edit)
     pins, inputs = change.pins or shown.pins, change.inputs or shown.inputs
@@ -120,7 +120,7 @@ def pin_of(error: LinkageError, text: str) -> str | None:
     return next((part for part in reversed(str(where).split('.')) if part in names), None)
 
 
-def _shown_linkage(closure: Closure, given: Any) -> _ShownLinkage:
+def _shown_linkage(closure: PlanarClosure, given: Any) -> _ShownLinkage:
     count = len(closure.linkage.inputs)
     inputs = _default_inputs(closure) if given is None else read_numbers('inputs', given, count)
     position = closure.position(*inputs)
@@ -138,7 +138,7 @@ def _shown_linkage(closure: Closure, given: Any) -> _ShownLinkage:
     )
 
 
-def _default_inputs(closure: Closure) -> tuple[float, ...]:
+def _default_inputs(closure: PlanarClosure) -> tuple[float, ...]:
     if len(closure.linkage.inputs) == 1 and not closure.closing_ranges:
         raise _open_error()
     return usual_inputs(closure)
@@ -405,7 +405,7 @@ def _in_pose(
         assembly: dict[str, Any] = dict(zip(sides, chosen, strict=True))
         one = replace(linkage, assembly=assembly)
         try:
-            closure = Closure(one)
+            closure = PlanarClosure(one)
             position = closure.position(*inputs)
             points = closure.points(position) if position.status.has_pose else {}
         except DefinitionError:

@@ -23,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from linkage_ros.bag import read_run_metadata, RunMetadata
 from linkage_ros.description import Scene, SceneLinkage
 from linkage_ros.errors import LinkageError, quote
-from linkage_ros.kinematics import check_planar, Closure, GROUND
+from linkage_ros.kinematics import check_planar, GROUND, PlanarClosure
 from linkage_ros.messages import CrankSample, MalformedError
 from linkage_ros.replay import read_announced, recorded_scene
 from linkage_ros.tools.view.model import model_of
@@ -46,7 +46,7 @@ class FollowedRun(NamedTuple):
     scene: Scene  # The scene
     metadata: RunMetadata  # The run's account of itself: its topics
     drawn_linkage: SceneLinkage  # The first linkage, which is drawn
-    closure: Closure  # The closure of that one
+    closure: PlanarClosure  # The closure of that one
     # The linkage whose crank or effort comes from a topic; None if there is none.
     topic_driven: SceneLinkage | None
     model: dict[str, Any]  # What a page gets
@@ -120,7 +120,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
         scene, account = recorded_scene(announced), read_run_metadata(announced)
         shown = scene.linkages[0]
         check_planar(scene.name, shown.linkage)
-        closure = Closure(shown.linkage)
+        closure = PlanarClosure(shown.linkage)
         model = model_of(closure, scene.name)
     except (ValueError, ArithmeticError, MalformedError) as error:
         raise LinkageError(topic, f'is not valid: {quote(str(error))}', 'name another') from None
@@ -132,7 +132,7 @@ def read_run(message: bytes, topic: str) -> FollowedRun:
 
 
 def _beside_model(
-    scene: Scene, closure: Closure, topic_driven: SceneLinkage | None
+    scene: Scene, closure: PlanarClosure, topic_driven: SceneLinkage | None
 ) -> dict[str, Any]:
     """Return what a page shows of a scene beside the model of its first linkage."""
     shown = scene.linkages[0]
@@ -164,7 +164,7 @@ def _beside_model(
     }
 
 
-def _range_of_effort(closure: Closure) -> float:
+def _range_of_effort(closure: PlanarClosure) -> float:
     """Return the greatest effort of a slider, in [N·m] or [N]; a greater one can be typed."""
     limit = closure.linkage.inputs[0].limits.effort
     return limit if isfinite(limit) else _USUAL_EFFORT

@@ -31,13 +31,13 @@ from linkage_ros.description import (
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import (
     assembly_sides,
-    Closure,
     driven_links,
     GROUND,
     InputSweep,
     is_iterated,
     Linkage,
     links_by_point,
+    PlanarClosure,
     prepare_view,
     Status,
     usual_inputs,
@@ -103,7 +103,7 @@ def build_model(
     return found
 
 
-def model_of(closure: Closure, name: str = '') -> dict[str, Any]:
+def model_of(closure: PlanarClosure, name: str = '') -> dict[str, Any]:
     """Return the model of a linkage without a file, without its other assemblies."""
     inputs = usual_inputs(closure)
     drawn = drawn_in_frames(prepare_view(closure, inputs))
@@ -117,7 +117,7 @@ def _quick_model(
     written: Linkage, name: str, text: str, content: Section, shown: ViewState
 ) -> dict[str, Any] | None:
     """Return the model of a linkage as it is shown; None if it does not close, or slides."""
-    closure = Closure(written, name)
+    closure = PlanarClosure(written, name)
     if written.sliders or closure.bounds or len(shown.inputs) != len(written.inputs):
         return None
     position = closure.position(*shown.inputs)
@@ -128,7 +128,7 @@ def _quick_model(
 
 
 def _model_json(
-    closure: Closure, name: str, text: str, units: Units, inputs: tuple[float, ...],
+    closure: PlanarClosure, name: str, text: str, units: Units, inputs: tuple[float, ...],
     drawn: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     linkage = closure.linkage
@@ -188,7 +188,7 @@ def _model_json(
     }
 
 
-def program_of(closure: Closure) -> str | None:
+def program_of(closure: PlanarClosure) -> str | None:
     """Return the program of a linkage; None if it is solved by iteration."""
     subject = Subject(closure, closure.name, closure.name, 2, closure.joint_names, frames=True)
     try:
@@ -197,7 +197,7 @@ def program_of(closure: Closure) -> str | None:
         return None
 
 
-def _range_poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
+def _range_poses(closure: PlanarClosure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
     """Return poses over the range of the first input, the others held."""
     sweep = InputSweep(closure, inputs)
     values = {inputs[0]}
@@ -208,7 +208,7 @@ def _range_poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, 
     return [{'inputs': list(state), **compute_pose(closure, state)} for state in states]
 
 
-def _point_distances(closure: Closure) -> Iterator[dict[str, Any]]:
+def _point_distances(closure: PlanarClosure) -> Iterator[dict[str, Any]]:
     """Yield the distances of points of a link, those that a file gives by coordinates."""
     for link, points in closure.linkage.links.items():
         pairs = list(combinations(points, 2))
@@ -224,7 +224,7 @@ def _point_distances(closure: Closure) -> Iterator[dict[str, Any]]:
             }
 
 
-def _other_assemblies(closure: Closure, content: Section) -> list[dict[str, Any]]:
+def _other_assemblies(closure: PlanarClosure, content: Section) -> list[dict[str, Any]]:
     """Return the other assemblies in which the linkage closes."""
     try:
         found = find_closures(content, closure.name)
@@ -235,7 +235,7 @@ def _other_assemblies(closure: Closure, content: Section) -> list[dict[str, Any]
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 
 
-def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
+def _analyse_linkage(closure: PlanarClosure, content: Section) -> dict[str, Any]:
     """Return ranges, toggles, quality over the first input, and warnings."""
     sweep = InputSweep(closure, usual_inputs(closure))
     values: list[float] = []
@@ -258,7 +258,7 @@ def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
     }
 
 
-def _quality_at(closure: Closure, sweep: InputSweep, value: float) -> tuple[float, float]:
+def _quality_at(closure: PlanarClosure, sweep: InputSweep, value: float) -> tuple[float, float]:
     """Return transmission angle and conditioning at an input; infinite if they are unknown."""
     position = sweep.position_at(value)
     if not position.joints:
@@ -269,7 +269,9 @@ def _quality_at(closure: Closure, sweep: InputSweep, value: float) -> tuple[floa
     return margin.transmission_angle, margin.conditioning
 
 
-def _linkage_warnings(closure: Closure, content: Section, angles: list[float]) -> Iterator[str]:
+def _linkage_warnings(
+    closure: PlanarClosure, content: Section, angles: list[float]
+) -> Iterator[str]:
     for note in linkage_notes(closure.linkage, content):
         yield str(note)
     if angles and min(angles) < _POOR:
@@ -285,7 +287,7 @@ def _finite_or_none(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def compute_pose(closure: Closure, inputs: Sequence[float]) -> dict[str, Any]:
+def compute_pose(closure: PlanarClosure, inputs: Sequence[float]) -> dict[str, Any]:
     """Return a pose as the program would, if a linkage has none; rates at a first input of 1."""
     position = closure.position(*inputs)
     found: dict[str, Any] = {

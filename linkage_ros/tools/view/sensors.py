@@ -114,8 +114,9 @@ class Sensors:
         read = dict(zip(scene_linkage.joint_names, self._reading.joints, strict=True))
         values = dict(zip(scene_linkage.input_names, inputs, strict=True)) | read
         arrays = {name: np.array([value]) for name, value in values.items()}
+        closure: Any = scene_linkage.closure  # planar: the page shows others without sensors
         frames = link_poses(
-            scene_linkage.closure, scene_linkage.prefix, arrays, scene_linkage.input_names
+            closure, scene_linkage.prefix, arrays, scene_linkage.input_names
         ).frames[0]
         finite = bool(np.isfinite(frames).all())
         # A fault of a sensor may publish NaN, which JSON does not hold.

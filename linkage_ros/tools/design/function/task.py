@@ -28,7 +28,7 @@ from math import degrees, floor, isfinite, log10, nan, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import quote, SynthesisError
-from linkage_ros.kinematics import Closure, InputSweep
+from linkage_ros.kinematics import InputSweep, PlanarClosure
 from linkage_ros.tools.design.design import Design, ROCKER
 from linkage_ros.tools.design.function.expression import Array, Expression, formula_name
 from linkage_ros.tools.design.pairs.freudenstein import exact_four_bar
@@ -401,7 +401,7 @@ def structural_error(
     ``wanted`` returns the rocker's angles for crank angles, in [rad], (n,) each. The range may
     decrease; the design's positions are among the samples.
     """
-    closure = Closure(design.four_bar.linkage())
+    closure = PlanarClosure(design.four_bar.linkage())
 
     def errors_at(crank: Array) -> Array:
         return _wrap_angles(_rocker_of(closure, crank.ravel()) - wanted(crank.ravel())).reshape(
@@ -420,7 +420,7 @@ def structural_error(
     )
 
 
-def _rocker_of(closure: Closure, crank: Array) -> Array:
+def _rocker_of(closure: PlanarClosure, crank: Array) -> Array:
     row = list(closure.linkage.joints).index(f'{ROCKER}_joint')
     angles: Array = closure.solve(crank, derivatives=0).positions[row]
     return angles
@@ -468,7 +468,7 @@ def _rms_error(crank: Array, error: Array) -> float:
     return float(np.sqrt(np.sum(squares[closed] * by[closed]) / np.sum(by[closed])))
 
 
-def _opens_at(closure: Closure, low: float, high: float) -> float | None:
+def _opens_at(closure: PlanarClosure, low: float, high: float) -> float | None:
     """Return the angle, on the way from one to another, at which the loop opens, or None."""
     interval = InputSweep(closure).range_about(low)
     if interval is None:

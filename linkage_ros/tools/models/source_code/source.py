@@ -27,9 +27,9 @@ from linkage_ros import __version__
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     Bound,
-    Closure,
     Grid,
     Linkage,
+    PlanarClosure,
     RevoluteJoint,
     ROUNDING,
     SHRINK,
@@ -112,7 +112,7 @@ class Subject(NamedTuple):
 
     """
 
-    closure: Closure
+    closure: PlanarClosure
     name: str
     file: str
     derivatives: int
@@ -289,7 +289,7 @@ def compile_subject(subject: Subject) -> Program:
     return compile_program(closure, subject.derivatives, wanted_numbers)
 
 
-def frame_values(closure: Closure, motion: TracedMotion) -> list[list[Any]]:
+def frame_values(closure: PlanarClosure, motion: TracedMotion) -> list[list[Any]]:
     """Return x, y and angle of the frame of each link that moves, and their rates if known."""
     of = closure.link_frames
     groups = [of.frames_at(motion.position)]
@@ -494,7 +494,7 @@ def _used_constants(roots: Sequence[Any]) -> Iterator[float]:
                 yield argument
 
 
-def _length_names(closure: Closure) -> dict[float, str]:
+def _length_names(closure: PlanarClosure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
     named: dict[float, set[str]] = defaultdict(set)
     for link, points in _places_of(closure.linkage).items():

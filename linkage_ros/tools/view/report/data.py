@@ -32,9 +32,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import (
-    Closure,
     frames_of_links,
     GROUND,
+    PlanarClosure,
     prepare_view,
     separate_blocks,
     SpaceClosure,
@@ -87,7 +87,7 @@ class Poses(NamedTuple):
 
 
 def link_poses(
-    closure: Closure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
+    closure: PlanarClosure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
 ) -> Poses:
     """
     Return the poses of the links.
@@ -146,7 +146,7 @@ def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found
     return found
 
 
-def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
+def _by_closing(closure: PlanarClosure, inputs: Sequence[Numbers]) -> _Found:
     links = (
         *closure.linkage.links,
         *(block.name for block in separate_blocks(closure.linkage, closure.structure)),
@@ -170,7 +170,7 @@ def _place_of(found: _Found, link: str, point: tuple[float, float]) -> Places:
     return place + complex(*point) * way
 
 
-def _loop_gaps(closure: Closure, found: _Found, count: int) -> Numbers:
+def _loop_gaps(closure: PlanarClosure, found: _Found, count: int) -> Numbers:
     linkage = closure.linkage
     worst = np.zeros(count)
     carriers: dict[str, list[str]] = {}
@@ -317,7 +317,7 @@ def _linkages_json(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[
     for linkage in linkages:
         closure: Any = linkage.closure
         drawing: dict[str, Any] | None = None
-        if isinstance(closure, Closure):
+        if isinstance(closure, PlanarClosure):
             poses = link_poses(closure, linkage.prefix, frames.values, linkage.inputs)
         else:
             poses, drawing = _spatial_poses(closure, [frames.values[n] for n in linkage.inputs])

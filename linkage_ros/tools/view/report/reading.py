@@ -28,7 +28,7 @@ from linkage_ros.bag import (
 )
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Closure, CODES, Status
+from linkage_ros.kinematics import Closure, CODES, PlanarClosure, SpaceClosure, Status
 from linkage_ros.messages import JOINT_STATE_TYPE, WRENCHES
 from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.tools.drawing import SpaceDrawing
@@ -276,12 +276,7 @@ class SceneRun:
         self._has_limits = any(scene_linkage.linkage.limits for scene_linkage in scene.linkages)
         self._tells_toggles = len(scene.linkages) == 1 and 'velocity' in scene.linkages[0].effects
         self._health = RecordedDiagnostics(self._event_tracks, from_beginning)
-        bodies = sum(
-            len(each.closure.structure.links)
-            if isinstance(each.closure, Closure)
-            else SpaceDrawing(each.closure).count
-            for each in self._linkages[:MOST_LINKAGES]
-        )
+        bodies = sum(_count_bodies(each.closure) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
         self._curves = SceneCurves(scene, topics, bodies, window)
         period = round(1e9 / scene.rate) if scene.rate else 0
@@ -420,3 +415,11 @@ class SceneRun:
         """Return which joint states contain a linkage."""
         present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
         return present
+
+
+def _count_bodies(closure: Closure) -> int:
+    """Return how many bodies of a linkage are drawn."""
+    if isinstance(closure, PlanarClosure):
+        return len(closure.structure.links)
+    assert isinstance(closure, SpaceClosure)
+    return SpaceDrawing(closure).count

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from operator import mul
-from typing import Any, TYPE_CHECKING, TypeVar
+from typing import Any, ClassVar, TYPE_CHECKING, TypeVar
 
 from linkage_ros.errors import escape_unprintable, list_names, quote
 from linkage_ros.kinematics.analysis.ranges import closing_ranges, input_ranges
@@ -26,7 +26,7 @@ from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.built_once import BUILD_LOCK, BuiltProperty
 from linkage_ros.kinematics.doubles import HUGE, SHRINK, to_double
 from linkage_ros.kinematics.limits import Bounds, limit_status
-from linkage_ros.kinematics.plane.linkage import RevoluteJoint
+from linkage_ros.kinematics.plane.linkage import JointedLinkage, RevoluteJoint
 from linkage_ros.kinematics.results import (
     Acceleration,
     InputRange,
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 _FILLED = 2
 """Most inputs of a grid whose cells within limits are made before the first state."""
 
-Own = TypeVar('Own', bound='StepwiseClosure')
+Own = TypeVar('Own', bound='Closure')
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -83,20 +83,37 @@ def _multiply_pin(pin: Any, factor: float) -> Any:
     return pin * factor if type(pin) is float else complex(pin.real * factor, pin.imag * factor)
 
 
-class StepwiseClosure:
+class Closure:
     """
-    A linkage, ready to be solved; its kind makes the steps.
+    A linkage, ready to be solved: a `PlanarClosure` or a `SpaceClosure`, as the linkage is.
+
+    Parameters
+    ----------
+    linkage
+        The linkage: a `Linkage` or a `SpaceLinkage`.
+    name
+        Its name, which messages and pictures show; `load` takes it from the file.
 
     Attributes
     ----------
     linkage, name
-        The linkage and its name.
+        As given.
     input_names
         Names of the driven joints, in the order in which `position` takes their values.
     joint_names
         Names of the published joints, in the order of `Position.joints`.
 
+    Raises
+    ------
+    DefinitionError
+        If the parts do not form a linkage, or the inputs do not move all of it.
+    TypeError
+        If ``linkage`` is not a linkage of this kind.
+
     """
+
+    takes: ClassVar[type[JointedLinkage]]
+    """The kind of its linkages."""
 
     gap_unit: str = 'm'
     """Unit of the gap of an open position."""
@@ -113,6 +130,23 @@ class StepwiseClosure:
 
     _terms: tuple[tuple[int, int, float, float], ...]
     """For each published joint i, j, factor, constant: it is factor·(x[i] − x[j]) + constant."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, linkage: JointedLinkage, name: str = '') -> None: ...
+
+    def __new__(cls, linkage: JointedLinkage, _name: str = '') -> Closure:  # noqa: PYI034
+        """Make a closure of the kind that the linkage needs."""
+        kinds: tuple[type[Closure], ...] = (cls,)
+        if cls is Closure:
+            from linkage_ros import PlanarClosure, SpaceClosure  # local import: they are closures
+
+            kinds = PlanarClosure, SpaceClosure
+        for kind in kinds:
+            if isinstance(linkage, kind.takes):
+                return super().__new__(kind)
+        wanted = list_names((kind.takes.__name__ for kind in kinds), ' or ')
+        raise TypeError(f'linkage: {quote(linkage)} is not a {wanted}; load() reads files')
 
     def _set_linkage(self, linkage: Any, name: str, scale: float) -> None:
         """Set what follows from the linkage alone; ``scale`` is in [m]."""
@@ -147,7 +181,7 @@ class StepwiseClosure:
     def _repr_svg_(self) -> str:
         from linkage_ros import svg  # local import: only a notebook asks for pictures
 
-        return svg(self)  # type: ignore[arg-type]
+        return svg(self)
 
     def position(self, *inputs: float) -> Position:
         """
