@@ -180,7 +180,7 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: lr.load_scene('dem'), lr.FileError, "did you mean 'demo'?"),
     (lambda: FIVE_BAR.position(1, None), TypeError, 'inputs: None is not a number; solve()'),
     (lambda: FOUR_BAR.position(1j), TypeError, 'inputs: 1j is not a number; solve()'),
-    (lambda: lr.Closure('four_bar'), TypeError, "'four_bar' is not a Linkage; load() reads"),
+    (lambda: lr.Closure('four_bar'), TypeError, "'four_bar' is not a Linkage or SpaceL"),
     (lambda: lr.svg('four_bar'), TypeError, "svg: 'four_bar' is not drawn; give a Closure or a"),
     (lambda: POSITION['rocker'], KeyError, "'rocker' is not a published joint; use coupler_joint"),
     (lambda: POSITION[1], KeyError, '1 is not a published joint; use coupler_joint, rocker_joint'),

@@ -62,7 +62,7 @@ def svg(shown: Closure | Position) -> str:
     if isinstance(shown, Closure):
         position = shown.position(*usual_inputs(shown))
     if not isinstance(position, Position):
-        raise TypeError(f'svg: {quote(shown)} is not drawn; give a PlanarClosure or a Position')
+        raise TypeError(f'svg: {quote(shown)} is not drawn; give a Closure or a Position')
     drawn = draw_linkage(prepare_view(position.closure, position.inputs))
     low, high = drawn.corners(2.0)
     scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)
