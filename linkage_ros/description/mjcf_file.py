@@ -32,14 +32,16 @@ from linkage_ros.kinematics import (
     Vector,
 )
 
-_NAMES_FILES = ('include', 'plugin', 'extension', 'model', 'attach')
-"""Elements that read files or run code."""
+_NOT_PLAIN = (
+    'include', 'plugin', 'extension', 'model', 'attach', 'replicate', 'composite', 'flexcomp',
+)  # fmt: skip
+"""Elements that read files, run code or stand for many others."""
 
 _NOT_READ = (
     'asset', 'sensor', 'contact', 'visual', 'statistic', 'actuator', 'deformable',
     'custom', 'size', 'option', 'geom', 'camera', 'light', 'skin', 'mesh', 'hfield', 'texture',
-    'material', 'spatial', 'pair', 'flexcomp', 'composite', 'motor', 'position', 'velocity',
-    'general', 'damper', 'cylinder', 'muscle', 'adhesion', 'intvelocity', 'equality', 'replicate',
+    'material', 'spatial', 'pair', 'motor', 'position', 'velocity',
+    'general', 'damper', 'cylinder', 'muscle', 'adhesion', 'intvelocity', 'equality',
 )  # fmt: skip
 """Elements, also in defaults, without which bodies, joints and sites are the same."""
 
@@ -57,9 +59,9 @@ def read_mjcf(root: ET.Element, file: str) -> RobotGraph:
     except ModuleNotFoundError:
         remedy = "pip install 'linkage_ros[mjcf]'"
         raise FileError(file, '', 'is a model of MuJoCo, whose library reads it', remedy) from None
-    for tag in _NAMES_FILES:
+    for tag in _NOT_PLAIN:
         if root.find(f'.//{tag}') is not None:
-            remedy = 'write one file without others: mj_saveLastXML'
+            remedy = 'write a plain file: mj_saveLastXML'
             raise FileError(file, '', f'has an element <{tag}>', remedy)
     equality = [*root.findall('equality/*')]
     driven = {
@@ -87,12 +89,11 @@ def read_mjcf(root: ET.Element, file: str) -> RobotGraph:
     return _ModelReader(mujoco, model, file, driven, weighed, unread).read(root.get('model', ''))
 
 
-def _remove(element: ET.Element, tags: tuple[str, ...]) -> None:
-    for child in [*element]:
-        if child.tag in tags:
-            element.remove(child)
-        else:
-            _remove(child, tags)
+def _remove(root: ET.Element, tags: tuple[str, ...]) -> None:
+    for element in [*root.iter()]:
+        for child in [*element]:
+            if child.tag in tags:
+                element.remove(child)
 
 
 class _ModelReader:

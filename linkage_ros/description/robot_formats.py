@@ -33,15 +33,23 @@ def read_as_urdf(file: Path) -> bytes:
         return _with_closings(file)
     name = str(file)
     root = parse_robot(data, name) if file.suffix.lower() != '.urdf' else None
-    if root is not None and root.tag == 'sdf':
+    try:
+        return data if root is None else _convert(root, name) or data
+    except RecursionError:
+        raise FileError(name, '', 'is nested too deeply', 'use fewer levels') from None
+
+
+def _convert(root: ET.Element, name: str) -> bytes:
+    """Return a robot in another format as a URDF; b'' if it is in none."""
+    if root.tag == 'sdf':
         from linkage_ros.description.sdf_file import read_sdf  # local import: few robots
 
         return urdf_of(read_sdf(root, name))
-    if root is not None and root.tag == 'mujoco':
+    if root.tag == 'mujoco':
         from linkage_ros.description.mjcf_file import read_mjcf  # local import: few robots
 
         return urdf_of(read_mjcf(root, name))
-    return data
+    return b''
 
 
 def _with_closings(file: Path) -> bytes:

@@ -22,7 +22,7 @@ from math import atan2, copysign, hypot, isinf
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.description.urdf_file import UNREAD
+from linkage_ros.description.urdf_file import MOST_JOINTS, UNREAD
 from linkage_ros.errors import FileError, list_names
 from linkage_ros.kinematics import (
     Limits,
@@ -114,6 +114,9 @@ def _find_tree(
     tree: list[GraphJoint] = []
     # A ball rather closes a loop: in a tree it is three hinges.
     joints = sorted(graph.joints, key=lambda joint: joint.kind == 'ball')
+    if len(joints) > MOST_JOINTS:
+        reason = f'has {len(joints)} joints'
+        raise FileError(graph.file, '', reason, f'keep the part with the loops: {MOST_JOINTS}')
     while len(places) <= len(graph.links):
         left = [one for one in joints if not {one.parent, one.child} <= places.keys()]
         joint = next((one for one in left if one.parent in places), None)

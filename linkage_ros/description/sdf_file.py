@@ -91,7 +91,7 @@ class _SdfReader:
             first = self._model.get('canonical_link') or next(iter(links))
             if first not in links:
                 self._refuse('', f'canonical_link={quote(first)} is not a link', 'name a link')
-            place = self._frame(first, ()).origin
+            place = self._frame(first).origin
             joints.insert(0, GraphJoint(f'{WORLD}_to_{first}', 'fixed', WORLD, first, place))
         masses = {name: self._read_mass(name, part) for name, part in links.items()}
         return RobotGraph(self._file, self._model.get('name', ''), masses, joints)
@@ -121,24 +121,31 @@ class _SdfReader:
             turns = [*map(radians, turns)]
         return frame_of((x, y, z), (turns[0], turns[1], turns[2]))
 
-    def _frame(self, name: str, seen: tuple[str, ...]) -> SpaceFrame:
+    def _frame(self, name: str) -> SpaceFrame:
         """Return the frame of a link, joint or frame in that of the model."""
-        if name in self._frames:
-            return self._frames[name]
-        if name not in self._parts:
-            remedy = did_you_mean(name, self._parts, 'name a link, a joint or a frame')
-            self._refuse('', f'there is no frame {quote(name)}', remedy)
-        if name in seen:
-            self._refuse(name, 'its pose is relative to itself', 'name another frame')
+        way: dict[str, SpaceFrame] = {}
+        base = name
+        while base not in self._frames:
+            if base in way:
+                self._refuse(base, 'its pose is relative to itself', 'name another frame')
+            if base not in self._parts:
+                remedy = did_you_mean(base, self._parts, 'name a link, a joint or a frame')
+                self._refuse('', f'there is no frame {quote(base)}', remedy)
+            way[base], base = self._pose_and_base(base)
+        frame = self._frames[base]
+        for part, pose in reversed(way.items()):
+            frame = self._frames[part] = compose_frames(frame, pose)
+        return frame
+
+    def _pose_and_base(self, name: str) -> tuple[SpaceFrame, str]:
+        """Return the pose of a part, and the frame to which it is relative."""
         part, where = self._parts[name], f'{self._parts[name].tag} {name}'
         pose = part.find('pose')
         base = {
             'link': _MODEL, 'joint': _text(part, 'child'), 'frame': part.get('attached_to', ''),
         }[part.tag]  # fmt: skip
         base = (pose.get('relative_to', '') if pose is not None else '') or base or _MODEL
-        outer = self._frame(base, (*seen, name))
-        self._frames[name] = compose_frames(outer, self._pose(pose, where))
-        return self._frames[name]
+        return self._pose(pose, where), base
 
     def _read_joint(self, name: str, part: ET.Element, links: dict[str, ET.Element]) -> GraphJoint:
         where, kind = f'joint {name}', part.get('type', '')
@@ -147,7 +154,7 @@ class _SdfReader:
         parent, child = (
             self._link_of(_text(part, end), where, end, links) for end in ('parent', 'child')
         )
-        own = self._frame(name, ())
+        own = self._frame(name)
         axes = [
             self._read_axis(axis, own, where)
             for axis in map(part.find, ('axis', 'axis2'))
@@ -188,7 +195,7 @@ class _SdfReader:
         in_model = _text(axis, 'use_parent_model_frame') in ('1', 'true')
         if in_model or self._version < _JOINT_AXES_SINCE:
             named = named or _MODEL
-        frame = self._frame(named, ()) if named else own
+        frame = self._frame(named) if named else own
         return frame.turn(direction_of((x, y, z)))
 
     def _read_limits(self, limit: ET.Element | None, where: str) -> Limits:
@@ -236,7 +243,7 @@ class _SdfReader:
         (mass,) = self._numbers(_text(inertial, 'mass'), where, 1)
         if mass <= 0.0:
             return None
-        frame = compose_frames(self._frame(name, ()), self._pose(inertial.find('pose'), where))
+        frame = compose_frames(self._frame(name), self._pose(inertial.find('pose'), where))
         keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
         xx, xy, xz, yy, yz, zz = (
             self._numbers(_text(inertial, f'inertia/{key}') or '0', where, 1)[0] for key in keys

@@ -75,7 +75,7 @@ PLACE = re.compile(rf'(.+?)\.({_NUMBER}),({_NUMBER}),({_NUMBER})')
 """A place on a link: LINK.x,y,z."""
 
 _LARGEST_FILE = 10_000_000
-_MOST_JOINTS = 2000
+MOST_JOINTS = 2000
 _MOST_LOOPS = 200
 
 
@@ -223,9 +223,9 @@ class _UrdfReader:
             if name not in made_up or made_up[name] is not None:
                 limits = self._read_limits(element, name, made_up.get(name))
             joints[name] = self._read_joint(element, name, links)._replace(limits=limits)
-        if len(joints) > _MOST_JOINTS:
+        if len(joints) > MOST_JOINTS:
             reason = f'has {len(joints)} joints'
-            raise self._file_error('', reason, f'keep the part with the loops: {_MOST_JOINTS}')
+            raise self._file_error('', reason, f'keep the part with the loops: {MOST_JOINTS}')
         self._check_mimics(joints)
         base, ordered = self._order_joints(links, joints)
         said = [] if start is None else [each for each in start if each.get('name') in joints]

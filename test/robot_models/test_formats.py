@@ -45,6 +45,21 @@ def test_sdf_has_the_states_of_the_urdf():
     assert 'm2' not in limits  # 1e16 is none
 
 
+def test_a_frame_of_sdf_may_be_relative_to_many_others(tmp_path):
+    frames = ''.join(
+        f'<frame name="f{k}"><pose relative_to="f{k + 1}">1e-4 0 0 0 0 0</pose></frame>'
+        for k in range(1500)
+    )
+    text = (ROBOTS / 'ankle.sdf').read_text('utf-8')
+    text = text.replace('<frame name="hip_height"><pose>', f'{frames}<frame name="f1500"/>'
+                        '<frame name="hip_height"><pose relative_to="f0">')  # fmt: skip
+    (tmp_path / 'far.sdf').write_text(text)
+    closure = load(tmp_path / 'far.sdf', ANKLE)
+    # The hip stands at 0.3 in the model; the ground is the model's.
+    at = closure.linkage.hinges['pitch'].at
+    assert at == pytest.approx((0.45, 0.1, -0.4), abs=1e-12)
+
+
 def test_sdf_has_its_masses_in_the_pose_of_its_model():
     mass = load(ROBOTS / 'ankle.sdf', ANKLE).linkage.masses['rod2']
     # 0.1 below rod2 on the shin, and turned by 0.4 about x; the shin is turned in the model.
@@ -238,11 +253,11 @@ REFUSED = {
     'no axis': ('r.sdf', SDF.format(LINK + HINGE.replace('0 0 1', '0 0 0')),
                 'r.sdf: joint j: its axis is 0 0 0; write 0 0 1, for example'),
     'another file': ('r.xml', BODY.format('<include file="/etc/passwd"/>'),
-                     ('r.xml: has an element <include>; write one file without others: '
-                     'mj_saveLastXML')),
+                     ('r.xml: has an element <include>; write a plain file: mj_saveLastXML')),
     'a plugin': ('r.xml', BODY.format('<extension><plugin plugin="a"/></extension>'),
-                 ('r.xml: has an element <plugin>; write one file without others: '
-                  'mj_saveLastXML')),
+                 ('r.xml: has an element <plugin>; write a plain file: mj_saveLastXML')),
+    'bodies by number': ('r.xml', BODY.format('<worldbody><replicate count="3"/></worldbody>'),
+                         'r.xml: has an element <replicate>; write a plain file: mj_saveLastXML'),
     'no model of MuJoCo': ('r.xml', BODY.replace('name="j"', 'nam="j"').format(''),
                            ('r.xml: is refused by MuJoCo (XML Error: Schema violation: '
                            "unrecognized attribute: 'nam'); correct the file")),
@@ -250,6 +265,11 @@ REFUSED = {
         '<equality><weld body1="b" relpose="0 0 1 1 0 0 0"/></equality>'),
         ('r.xml: weld closing_1: holds its bodies 1 from their pose in the file; leave relpose '
         'out, or write the pose in which it holds')),
+    'too many joints': ('r.sdf', SDF.format(LINK + ''.join(
+        HINGE.replace('"j"', f'"j{number}"') for number in range(2001))),
+        'r.sdf: has 2002 joints; keep the part with the loops: 2000'),
+    'deep nesting': ('r.xml', BODY.format('<a>' * 5000 + '</a>' * 5000),
+                     'r.xml: is nested too deeply; use fewer levels'),
     'closings without a URDF': ('r.yaml', 'closed_loop: [[a, b]]',
                                 ('r.yaml: closed_loop: closes loops of no URDF; write the URDF '
                                 'beside it as r.urdf')),
