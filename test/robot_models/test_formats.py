@@ -89,6 +89,7 @@ def ankle_with_closings(folder):
     """Write the ankle with rods of one joint each, and the file that says what they are."""
     text = (ROBOTS / 'ankle.urdf').read_text('utf-8')
     begin, end = text.index('<joint name="rod1_y"'), text.index('<joint name="m2"')
+    after = text.index('<joint name="rod2_y"')
     parts = [
         text[:begin],
         joint(
@@ -96,7 +97,7 @@ def ankle_with_closings(folder):
         ),
         joint('rod1_tip_joint', 'fixed', 'rod1', 'rod1_tip', '-0.013 -0.0015 -0.156'),
         joint('bolted', 'revolute', 'shin', 'cover', '0 0 0'),
-        text[end : text.index('<joint name="rod2_y"')],
+        text[end:after],
         joint('rod2_start', 'revolute', 'bar2', 'rod2', '0 -0.0165 -0.004'),
         joint('rod2_socket', 'revolute', 'rod2', 'rod2_tip', '-0.018 0.0015 -0.221'),
         joint('rod2_tip_joint', 'fixed', 'rod2_tip', 'rod2_eye', '0 0 0'),
@@ -151,7 +152,7 @@ def mujoco_gap(model, data, closure, inputs):
                 turn = turn @ rotation(axis, values[f'{name}_{letter}'])
             quaternion = np.zeros(4)
             mujoco.mju_mat2Quat(quaternion, (body.T @ turn @ body).reshape(-1))
-            data.qpos[address : address + 4] = quaternion
+            data.qpos[slice(address, address + 4)] = quaternion
         else:
             data.qpos[address] = values[name]
     mujoco.mj_forward(model, data)
@@ -264,7 +265,7 @@ REFUSED = {
     'a weld that is open': ('r.xml', BODY.format(
         '<equality><weld body1="b" relpose="0 0 1 1 0 0 0"/></equality>'),
         ('r.xml: weld closing_1: holds its bodies 1 from their pose in the file; leave relpose '
-        'out, or write the pose in which it holds')),
+         'out, or write the pose in which it holds')),
     'too many joints': ('r.sdf', SDF.format(LINK + ''.join(
         HINGE.replace('"j"', f'"j{number}"') for number in range(2001))),
         'r.sdf: has 2002 joints; keep the part with the loops: 2000'),
@@ -272,7 +273,7 @@ REFUSED = {
                      'r.xml: is nested too deeply; use fewer levels'),
     'closings without a URDF': ('r.yaml', 'closed_loop: [[a, b]]',
                                 ('r.yaml: closed_loop: closes loops of no URDF; write the URDF '
-                                'beside it as r.urdf')),
+                                 'beside it as r.urdf')),
 }  # fmt: skip
 
 

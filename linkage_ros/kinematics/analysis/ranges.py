@@ -314,7 +314,8 @@ def interval_about(
         inside = [*takewhile(closes, way)] or [*takewhile(closes, back[:1])]
         if not inside:
             return None
-        outside = way[len(inside) :] if inside[0] in way else way
+        count = len(inside)
+        outside = way[count:] if inside[0] in way else way
         ends.append(last_inside(closes, inside[-1], outside[0]) if outside else inside[-1])
     low, high = ends
     return (low, high) if low <= place <= high else None

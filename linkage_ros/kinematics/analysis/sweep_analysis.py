@@ -38,10 +38,10 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import FollowerJoint, LinkState, PLACED, StepPose
 from linkage_ros.progress import tell_progress
 
-# The pose of one step of a solution, from the steps that it starts from and no others.
-
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
+
+# The pose of one step of a solution, from the steps that it starts from and no others.
 
 _SAMPLES = 720
 _GRID, _MOST_ON_GRID = 24, 14_000
