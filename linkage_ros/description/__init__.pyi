@@ -87,6 +87,7 @@ from linkage_ros.description.parameters import (
     whole_number as whole_number,
 )
 from linkage_ros.description.robot_formats import read_as_urdf as read_as_urdf
+from linkage_ros.description.robot_pose import roll_pitch_yaw as roll_pitch_yaw
 from linkage_ros.description.scene import (
     LEAST_FLUSH_PERIOD as LEAST_FLUSH_PERIOD,
     RecordParameters as RecordParameters,

@@ -94,18 +94,17 @@ def load(linkage: str | PathLike[str], robot: Mapping[str, Any] | None = None) -
 
 def read_content(file: Path, robot: Mapping[str, Any] | None = None) -> tuple[Section, bytes]:
     """Return the content of a file, also of a robot, and its bytes."""
-    content, data = Section(str(file), '', {}), b''
     if file.suffix.lower() not in ROBOTS:
         content, data = read_yaml(file)
-        if CLOSINGS not in content and robot:
-            raise FileError(file, '', 'is not a robot', f'leave out {list_names(robot)}')
-    if file.suffix.lower() in ROBOTS or CLOSINGS in content:
-        content = urdf_content(file, robot or {})
-        return content, content.named_data
-    if 'urdf' in content:
-        remedy = 'name the URDF itself, or write linkage: {urdf: FILE} for a scene'
-        raise content.error('urdf', 'is no key of a linkage', remedy)
-    return content, data
+        if CLOSINGS not in content:
+            if robot:
+                raise FileError(file, '', 'is not a robot', f'leave out {list_names(robot)}')
+            if 'urdf' in content:
+                remedy = 'name the URDF itself, or write linkage: {urdf: FILE} for a scene'
+                raise content.error('urdf', 'is no key of a linkage', remedy)
+            return content, data
+    content = urdf_content(file, robot or {})
+    return content, content.named_data
 
 
 def linkage_content(file: Path, robot: Mapping[str, Any] | None = None) -> Section:

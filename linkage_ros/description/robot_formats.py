@@ -18,7 +18,7 @@ from linkage_ros.description.closings_file import add_closings, urdf_beside
 from linkage_ros.description.file_kinds import CLOSINGS, YAML
 from linkage_ros.description.robot_graph import urdf_of
 from linkage_ros.description.urdf_file import parse_robot, read_urdf_file
-from linkage_ros.description.yaml_file import read_yaml
+from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import FileError
 
 
@@ -30,7 +30,7 @@ def read_as_urdf(file: Path) -> bytes:
     """
     data = read_urdf_file(file)
     if file.suffix.lower() in YAML and CLOSINGS.encode() in data:
-        return _with_closings(file)
+        return _with_closings(file, data)
     name = str(file)
     root = parse_robot(data, name) if file.suffix.lower() != '.urdf' else None
     try:
@@ -52,11 +52,11 @@ def _convert(root: ET.Element, name: str) -> bytes:
     return b''
 
 
-def _with_closings(file: Path) -> bytes:
+def _with_closings(file: Path, data: bytes) -> bytes:
     urdf = urdf_beside(file)
     if urdf is None:
         remedy = f'write the URDF beside it as {file.with_suffix(".urdf").name}'
         raise FileError(file, CLOSINGS, 'closes loops of no URDF', remedy)
     root = parse_robot(read_urdf_file(urdf), str(urdf))
-    add_closings(root, read_yaml(file)[0])
+    add_closings(root, parse_yaml(data, str(file)))
     return bytes(ET.tostring(root, 'utf-8'))

@@ -18,10 +18,11 @@ loops. The frame of each link lies at its joint, and has in the pose the axes of
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, hypot, isinf
+from math import isinf
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
+from linkage_ros.description.robot_pose import roll_pitch_yaw
 from linkage_ros.description.urdf_file import MOST_JOINTS, UNREAD
 from linkage_ros.errors import FileError, list_names
 from linkage_ros.kinematics import (
@@ -38,7 +39,6 @@ from linkage_ros.kinematics import (
 WORLD = 'world'
 
 _AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_UPRIGHT = 1e-12
 _LOOPS = {
     'revolute': 'revolute', 'continuous': 'revolute', 'prismatic': 'prismatic', 'fixed': 'fixed',
     'ball': 'spherical', 'universal': 'universal',
@@ -170,7 +170,7 @@ def _add_one(root: ET.Element, joint: GraphJoint, origin: Vector) -> None:
     if joint.value and joint.kind == 'prismatic':
         origin = minus(origin, scale(joint.value, joint.axis))
     elif joint.value:
-        turned = rpy_of([turn_about(joint.axis, -joint.value, axis) for axis in _AXES])
+        turned = roll_pitch_yaw(*(turn_about(joint.axis, -joint.value, axis) for axis in _AXES))
     ET.SubElement(made, 'origin', xyz=_text(origin), rpy=_text(turned))
     if joint.kind != 'fixed':
         ET.SubElement(made, 'axis', xyz=_text(joint.axis))
@@ -185,16 +185,6 @@ def _add_one(root: ET.Element, joint: GraphJoint, origin: Vector) -> None:
     if joint.follows is not None:
         of, factor, offset = joint.follows
         ET.SubElement(made, 'mimic', joint=of, multiplier=repr(factor), offset=repr(offset))
-
-
-def rpy_of(axes: Sequence[Vector]) -> Vector:
-    """Return roll, pitch and yaw, in [rad], of a frame with these axes, as URDF has them."""
-    x, y, z = axes
-    level = hypot(x[0], x[1])
-    pitch = atan2(-x[2], level)
-    if level < _UPRIGHT:
-        return atan2(copysign(y[0], pitch * y[0]), y[1]), pitch, 0.0
-    return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])
 
 
 def _add_inertial(link: ET.Element, mass: SpatialMass, place: Vector) -> None:

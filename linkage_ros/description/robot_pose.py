@@ -56,6 +56,9 @@ _NUDGES = (0.0, 0.3, 1.0, 2.0)
 
 _SEED = 20
 
+_UPRIGHT = 1e-12
+"""Cosine of the pitch below which roll and yaw are one angle."""
+
 LINE = 'line'
 """What closes a loop by frames SLIDER_on_LINK on the x axis of SLIDER_line_on_LINK."""
 
@@ -341,6 +344,15 @@ def compose_frames(outer: SpaceFrame, inner: SpaceFrame) -> SpaceFrame:
     """Return a frame that is given in another one."""
     x, y, z = map(outer.turn, inner[:3])
     return SpaceFrame(x, y, z, outer.place(inner.origin))
+
+
+def roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:
+    """Return the angles about fixed axes that turn the ground's axes to these."""
+    cosine = hypot(x[0], x[1])
+    pitch = atan2(-x[2], cosine)
+    if cosine < _UPRIGHT:  # Roll and yaw turn about one axis.
+        return atan2(-z[1], y[1]), pitch, 0.0
+    return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])
 
 
 def frame_of(xyz: Vector, rpy: Vector) -> SpaceFrame:

@@ -17,9 +17,9 @@ hang on joints of their own, see `with_rod_joints`.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, hypot
 from xml.etree import ElementTree as ET
 
+from linkage_ros.description import roll_pitch_yaw
 from linkage_ros.kinematics import (
     direction_of,
     GROUND,
@@ -50,9 +50,6 @@ SPACE_HEAD = """\
 A spatial linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are as in the
 published joint states. Lengths in [m], angles in [rad]. Limits that the linkage does not give are
 made up. Each loop_joint says where two links meet."""
-
-_UPRIGHT = 1e-3
-"""Cosine of the pitch below which roll and yaw are one angle."""
 
 
 class SpaceTree:
@@ -144,15 +141,6 @@ class SpaceTree:
         one = self._frames[links[0]]
         for tag, link in zip(('link1', 'link2'), links, strict=True):
             frame = self._frames[link]
-            rpy = format_numbers(*_roll_pitch_yaw(*map(frame.resolve, one[:3])))
+            rpy = format_numbers(*roll_pitch_yaw(*map(frame.resolve, one[:3])))
             xyz = format_numbers(*frame.locate(place))
             ET.SubElement(loop, tag, link=own_name(link), xyz=xyz, rpy=rpy)
-
-
-def _roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:
-    """Return the angles about fixed axes that turn the ground's axes to these."""
-    cosine = hypot(x[0], x[1])
-    pitch = atan2(-x[2], cosine)
-    if cosine < _UPRIGHT:  # Roll and yaw turn about one axis.
-        return atan2(-z[1], y[1]), pitch, 0.0
-    return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])
