@@ -177,7 +177,7 @@ def place(kind: str, name: str) -> str:
         lines.append(f'Works on {works_on}.')
     else:
         works_on = next(_WORKS_ON[b.__name__] for b in BASES if issubclass(owner, b))
-        lines.append(f'{_neighbours(name)}. Works on {works_on}.')
+        lines.append(f'Works on {works_on}.')
         if owner.publishes_with:
             lines.append(f'Needs {_listed(owner.publishes_with)}, published with it.')
         elif needs := needed_effects(name):
@@ -187,15 +187,6 @@ def place(kind: str, name: str) -> str:
     source = Path(str(module.__file__)).relative_to(DOCS.parent).as_posix()
     lines.append(f'In [{source}](../../{source}).')
     return '\n'.join(lines)
-
-
-def _neighbours(name: str) -> str:
-    names = list(EFFECTS)
-    number = names.index(name)
-    beside = [f'after `{names[number - 1]}`'] if number else []
-    if number + 1 < len(names):
-        beside.append(f'before `{names[number + 1]}`')
-    return f'Number {number + 1} of {len(names)}, {" and ".join(beside)}'
 
 
 def _summary(kind: str, name: str) -> str:
