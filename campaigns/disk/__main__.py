@@ -118,7 +118,7 @@ def filling_table(filled: Sequence[Filled]) -> Table:
                 f'{one.disk}; {one.storage}',
                 one.filler,
                 outcome.verdict,
-                *(f'{n:,}' for n in (outcome.offered, outcome.recorded, outcome.let_go)),
+                *(f'{n:,}' for n in (outcome.offered, outcome.recorded, outcome.discarded)),
                 f'{one.least_free / 1e3:,.0f}',
                 f'{one.free / 1e3:,.0f}',
                 '; '.join(outcome.faults) or 'none',

@@ -71,7 +71,7 @@ class Recorded:
         return sum(counts[1] for counts in self.counts)
 
     @property
-    def let_go(self) -> int:
+    def discarded(self) -> int:
         """Return the number of messages that are counted as removed by the ring."""
         return sum(counts[3] for counts in self.counts)
 
@@ -183,7 +183,7 @@ class Outcome:
     faults: list[str] = field(default_factory=list)
     offered: int = 0
     recorded: int = 0
-    let_go: int = 0
+    discarded: int = 0
 
 
 class Expectation:
@@ -237,7 +237,7 @@ def judge(
     recovered = recovered or folder.with_name(f'{folder.name}_recovered')
     if done is None:
         return Outcome(faults=['did not end'])
-    outcome = Outcome(offered=done.offered, recorded=done.recorded, let_go=done.let_go)
+    outcome = Outcome(offered=done.offered, recorded=done.recorded, discarded=done.discarded)
     if done.escaped:
         outcome.faults.append(f'escaped: {done.escaped}')
         return outcome
@@ -283,11 +283,11 @@ def _is_line(error: str, folder: Path) -> bool:
 def _counts(done: Recorded) -> list[str]:
     """Return the faults of the counts, topic by topic."""
     faults = []
-    for index, (received, recorded, dropped, let_go, waiting) in enumerate(done.counts):
+    for index, (received, recorded, dropped, discarded, waiting) in enumerate(done.counts):
         offered = len(range(index, done.offered, len(TOPICS)))
         if received != offered:
             faults.append(f'{offered} offered, {received} received')
-        if received != recorded + dropped + let_go or waiting or min(recorded, dropped) < 0:
+        if received != recorded + dropped + discarded or waiting or min(recorded, dropped) < 0:
             faults.append(f'the counts do not add up: {done.counts[index]}')
     return faults
 
@@ -302,7 +302,7 @@ def _complete(done: Recorded, folder: Path, expectation: Expectation) -> list[st
         return [f'reports no failure, but cannot be read: {error}']
     if run is None:
         return ['a false message']
-    if (run.start, run.stop) != (done.let_go, done.offered) or len(run) != done.recorded:
+    if (run.start, run.stop) != (done.discarded, done.offered) or len(run) != done.recorded:
         faults.append(f'reports no failure, but holds {run} of {done.offered}')
     if UNFINISHED in bag.custom or FAILURE in bag.custom:
         faults.append('reports no failure, but its metadata do')
@@ -313,7 +313,7 @@ def _ended_early(
     outcome: Outcome, done: Recorded, folder: Path, expectation: Expectation, target: Path
 ) -> None:
     """Judge the bag of a recording that reports a failure."""
-    counted = range(done.let_go, done.let_go + done.recorded)
+    counted = range(done.discarded, done.discarded + done.recorded)
     run: range | None = range(0)
     try:
         bag = read_bag(folder, allow_truncated=True)

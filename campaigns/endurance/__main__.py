@@ -119,7 +119,7 @@ def dds_tables(run: DdsRun) -> list[Table]:
         verdicts.rows.append(_verdict('linkage_node', run.samples))
     messages = _messages(f'{title}, messages')
     for topic, received in run.counts.get('received', {}).items():
-        numbers = [run.counts[kind][topic] for kind in ('recorded', 'dropped', 'let_go')]
+        numbers = [run.counts[kind][topic] for kind in ('recorded', 'dropped', 'discarded')]
         messages.rows.append([topic, f'{received:,}', *(f'{number:,}' for number in numbers)])
     ticks = Table(f'{title}, ticks', ('', ''), [(k, run.ticks.get(k, '')) for k in _TICKS])
     replayed = run.replayed

@@ -48,7 +48,7 @@ def shortcomings(folder: Path) -> list[str]:
         recorded = counts['recorded'][topic]
         if recorded != messages[topic]:
             faults.append(f'{topic}: {recorded} counted, {messages[topic]} in the bag')
-        if received != recorded + counts['dropped'][topic] + counts['let_go'][topic]:
+        if received != recorded + counts['dropped'][topic] + counts['discarded'][topic]:
             faults.append(f'{topic}: the counts do not add up')
         if counts['dropped'][topic]:
             faults.append(f'{topic}: {counts["dropped"][topic]} dropped')

@@ -115,7 +115,7 @@ def _phases(outcomes: Sequence[Outcome]) -> Table:
     for phase, group in [*groups, ('all', list(outcomes))]:
         offered, found, removed = (
             sum(getattr(outcome, name) for outcome in group)
-            for name in ('offered', 'found', 'let_go')
+            for name in ('offered', 'found', 'discarded')
         )
         left = Counter(each for outcome in group for each in outcome.leftovers)
         counts = [len(group), offered, found, removed, offered - found - removed]

@@ -57,7 +57,7 @@ class Outcome:
     # Numbers of messages: offered to the recorder, in the bag, and in files that the ring removed.
     offered: int = 0
     found: int = 0
-    let_go: int = 0
+    discarded: int = 0
     loss: int = 0  # Age at the kill of the oldest lost message [ns]; 0 for none
     # Age of the oldest message that no flush had brought to the disk: the greatest loss by a power
     # cut at this instant [ns].
@@ -116,9 +116,9 @@ def _read(outcome: Outcome, folder: Path, marks: Marks) -> list[BagMessage] | No
         return None
     outcome.found = len(messages)
     counts = json.loads(bag.custom.get(DISCARDED, '{}'))
-    outcome.let_go = sum(counts.values())
-    end = outcome.let_go + len(messages)
-    if not _is_run(messages, outcome.let_go, marks):
+    outcome.discarded = sum(counts.values())
+    end = outcome.discarded + len(messages)
+    if not _is_run(messages, outcome.discarded, marks):
         verdict = f'{FAULT}a false message'
     elif end < marks.safe:
         verdict = f'{FAULT}{marks.safe - end} flushed messages lost'
@@ -152,7 +152,7 @@ def _measure(outcome: Outcome, marks: Marks, killed: int) -> None:
     def age(number: int) -> int:
         return killed - marks.times[number // len(TOPICS)] if number < marks.offered else 0
 
-    first = outcome.let_go + outcome.found
+    first = outcome.discarded + outcome.found
     outcome.loss, outcome.power_loss = age(first), age(marks.safe)
     if outcome.loss:
         begin = killed - outcome.loss
@@ -222,7 +222,7 @@ def _recovered(
     # The ring had not yet removed an old file, or the next file was not yet in the metadata.
     first = _first(ours, marks)
     end = first + len(ours)
-    holds_all = first <= outcome.let_go and end >= outcome.let_go + outcome.found
+    holds_all = first <= outcome.discarded and end >= outcome.discarded + outcome.found
     if holds_all and _is_run(ours, first, marks):
         return 'the same and older messages, from an old file of the ring'
     return f'{FAULT}other messages'

@@ -42,7 +42,7 @@ _PREFIX = 'linkage_ros.'
 STATS_RECORD = f'{_PREFIX}account'
 """Name of the metadata record with the `TopicCounts` at the end of a bag's last file."""
 
-DISCARDED = f'{_PREFIX}let_go'
+DISCARDED = f'{_PREFIX}discarded'
 """Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
 
 FAILURE = f'{_PREFIX}failure'
@@ -265,7 +265,7 @@ def last_records(
             'received': {topic.name: topic.received for topic in account},
             'recorded': {topic.name: topic.recorded for topic in account},
             'dropped': {topic.name: topic.dropped for topic in account},
-            'let_go': {topic.name: topic.discarded for topic in account},
+            'discarded': {topic.name: topic.discarded for topic in account},
         }
         records[STATS_RECORD] = {word: json.dumps(by_topic) for word, by_topic in counts.items()}
     return records
@@ -275,7 +275,7 @@ def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
     """
     Return the counts by topic in a bag's ``custom_data``; empty if missing or damaged.
 
-    They are of the kind 'received', 'dropped' or 'let_go'.
+    They are of the kind 'received', 'dropped' or 'discarded'.
     """
     try:
         counts = json.loads(custom[f'{_PREFIX}{word}'])

@@ -240,7 +240,7 @@ def recorded_events(
 
 def missing_start_reason(bag: Bag, run: RunMetadata) -> str:
     """Return why the first messages of a run are not in its bag; '' if they are."""
-    discarded = sum(counts_in(bag.custom, 'let_go').values())
+    discarded = sum(counts_in(bag.custom, 'discarded').values())
     if discarded:
         return f'its first {discarded} messages were removed for newer ones'
     if run.begun == MID_RUN:

@@ -200,7 +200,7 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
         metadata = serialized_metadata(within)
     run = read_raw_metadata(bag)
     # Only bags that have metadata left out say so.
-    discarded = counts_in(bag.custom, 'let_go')
+    discarded = counts_in(bag.custom, 'discarded')
     counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
     return {
         'bag': str(bag.path),
@@ -231,7 +231,7 @@ def bag_json(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, A
                 'qos_understood': topic.qos.understood,
                 'received': counted['received'].get(topic.name),
                 'dropped': counted['dropped'].get(topic.name),
-                'let_go': discarded.get(topic.name, 0)
+                'discarded': discarded.get(topic.name, 0)
                 if discarded or counted['received']
                 else None,
             }

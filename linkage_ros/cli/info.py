@@ -111,8 +111,8 @@ def bag_tables(
     """Yield the description of a bag as tables, with the lengths of its scene's linkages."""
     yield _facts_table(account['bag'], _bag_facts(account))
     counters = [
-        Column('>discarded' if word == 'let_go' else f'>{word}', word, form=_count_text)
-        for word in ('received', 'dropped', 'let_go')
+        Column(f'>{word}', word, form=_count_text)
+        for word in ('received', 'dropped', 'discarded')
         if word == 'dropped' or _sum_counters(account, word)
     ]
     columns = (*_TOPIC, *counters, Column('QoS', 'qos'))
@@ -146,7 +146,7 @@ def _bag_facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
     received, dropped, discarded = (
-        _sum_counters(account, word) for word in ('received', 'dropped', 'let_go')
+        _sum_counters(account, word) for word in ('received', 'dropped', 'discarded')
     )
     if received is not None:
         yield 'received', str(received)

@@ -294,7 +294,7 @@ def test_what_a_file_says_holds_where_the_metadata_are_lost(tmp_path, topics):
     recording.write(45)
     recording.writer.close({'seed': '7'})
     said = read_bag(recording.writer.folder).custom
-    assert 'linkage_ros.let_go' in said
+    assert 'linkage_ros.discarded' in said
     (recording.writer.folder / 'metadata.yaml').unlink()
     assert read_bag(recording.writer.folder).custom == said
 

@@ -170,7 +170,7 @@ def test_each_topic_numbers_its_messages_through_all_files(tmp_path, topics, mes
 
 
 @pytest.mark.parametrize('keep', [1, 2, 3, 100])
-def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
+def test_a_ring_keeps_the_last_files_and_counts_what_it_discarded(
     tmp_path, topics, messages, readers, keep
 ):
     storage = Storage(split_seconds=1.0, keep_files=keep)
@@ -192,12 +192,12 @@ def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
     assert sum(counts.recorded for counts in summary.topics) == len(there)
     custom = information(tmp_path / 'run')['custom_data']
     if keep < 6:
-        assert json.loads(custom['linkage_ros.let_go']) == {
+        assert json.loads(custom['linkage_ros.discarded']) == {
             t.name: t.discarded for t in summary.topics
         }
         assert summary.topics[0].discarded > 0
     else:
-        assert 'linkage_ros.let_go' not in custom
+        assert 'linkage_ros.discarded' not in custom
 
 
 def account_of(file):
@@ -319,7 +319,7 @@ def test_a_kill_at_any_step_leaves_all_that_was_flushed(tmp_path, topics, messag
         assert found[-1] + 1 >= int(flushed.read_text())
         said = information(folder)
         assert said['relative_file_paths'] == [file.name for file in bag.files]
-        discarded = json.loads((said['custom_data'] or {}).get('linkage_ros.let_go', '{}'))
+        discarded = json.loads((said['custom_data'] or {}).get('linkage_ros.discarded', '{}'))
         if UNFINISHED in (said['custom_data'] or {}):
             assert sum(discarded.values()) == found[0]
             # It promises no more than there is.

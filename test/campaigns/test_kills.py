@@ -82,7 +82,7 @@ def test_the_loss_is_the_age_of_the_oldest_missing_message(tmp_path: Path, marks
     marks.safe = 90
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1105 * MS)
     assert outcome.faults == []
-    assert (outcome.found, outcome.let_go) == (120, 0)
+    assert (outcome.found, outcome.discarded) == (120, 0)
     # Message 120 was offered at 1060 ms, message 90 at 1045 ms.
     assert (outcome.loss, outcome.power_loss) == (45 * MS, 60 * MS)
     # The last tick began at 1099 ms, and then none for 6 ms.
@@ -95,7 +95,7 @@ def test_messages_removed_by_the_ring_are_not_lost(tmp_path: Path, marks: Marks)
     record(tmp_path / 'bag', marks, 200, Storage(split_seconds=0.02, keep_files=2))
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1100 * MS)
     # Files of 20 ticks; of the five the last two are kept.
-    assert (outcome.let_go, outcome.found) == (120, 80)
+    assert (outcome.discarded, outcome.found) == (120, 80)
     assert (outcome.faults, outcome.loss) == ([], 0)
 
 

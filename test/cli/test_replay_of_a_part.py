@@ -147,12 +147,12 @@ def facts(capsys: pytest.CaptureFixture[str], bag: Path) -> tuple[str, dict[str,
     return text, json.loads(capsys.readouterr().out)
 
 
-def test_info_tells_what_was_let_go(tmp_path, capsys) -> None:
+def test_info_tells_what_was_discarded(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, '')
     ring = rewritten(bag, 'ring', storage=RING)
     text, account = facts(capsys, ring)
     gone = len(list(read_bag(bag).messages())) - account['messages']
-    assert sum(topic['let_go'] for topic in account['topics']) == gone > 100
+    assert sum(topic['discarded'] for topic in account['topics']) == gone > 100
     assert any(line.split()[:2] == ['beginning', 'its'] for line in text.splitlines())
     assert f'{gone}, in files that newer ones replaced' in text
     assert '  discarded  ' in text
@@ -185,11 +185,11 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
      '[' * 100_000, '{"/joint_states": 1e400}', 'nonsense'],
 )  # fmt: skip
 def test_counts_that_are_none_are_not_told(tmp_path, capsys, counts) -> None:
-    custom = {f'linkage_ros.{word}': counts for word in ('received', 'dropped', 'let_go')}
+    custom = {f'linkage_ros.{word}': counts for word in ('received', 'dropped', 'discarded')}
     bag = rewritten(recorded(tmp_path, ''), 'odd', custom=custom)
     _, account = facts(capsys, bag)
     states = account['topics'][0]
-    assert (states['received'], states['dropped'], states['let_go']) == (None, None, None)
+    assert (states['received'], states['dropped'], states['discarded']) == (None, None, None)
     assert told(capsys, bag)[1]['beginning_missing'] is None
     assert account['unfinished'] is None
 

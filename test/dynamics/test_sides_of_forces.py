@@ -9,10 +9,10 @@
 """
 On which link a published wrench acts, and with which sign: each link is cut free.
 
-What `docs/reference/efforts.md` says of the names of `~/pin_forces` is written out here as a reader of
-the linkage file would do it. With it the forces on each link are added up, and held against mass
-times acceleration, the accelerations being differences of places. Nothing of the package's ways to
-the forces is used: not its list of joints, and not its matrix.
+What `docs/reference/efforts.md` says of the names of `~/pin_forces` is written out here as a
+reader of the linkage file would do it. With it the forces on each link are added up, and held
+against mass times acceleration, the accelerations being differences of places. Nothing of the
+package's ways to the forces is used: not its list of joints, and not its matrix.
 """
 
 from cmath import rect

@@ -72,7 +72,7 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
         assert sum(1 for _ in reader.messages()) == sum(found.values())
     custom = information['custom_data']
     received, dropped, gone = (
-        json.loads(custom[f'linkage_ros.{word}']) for word in ('received', 'dropped', 'let_go')
+        json.loads(custom[f'linkage_ros.{word}']) for word in ('received', 'dropped', 'discarded')
     )
     for topic, count in found.items():
         assert received[topic] == count + dropped[topic] + gone[topic]
