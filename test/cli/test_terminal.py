@@ -152,7 +152,7 @@ def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
             'check ankle_motors',
             {'cells of links that close only together made', 'starts of other assemblies tried'},
         ),
-        ('solve ankle_motors --at 10 10', {'cells of links that close only together made'}),
+        ('solve ankle_motors --at 10 10', {'steps planned'}),
         ('draw class_3 -o x.svg', {'turns of a branch followed'}),
         ('compile ankle_motors -o x.c', {'cells of links that close only together made'}),
     ],

@@ -78,6 +78,7 @@ from linkage_ros.kinematics.space.vectors import (
     ZERO,
 )
 from linkage_ros.kinematics.step import FollowerJoint, GearedAngle, GroupDescription, LinkState
+from linkage_ros.progress import tell_progress
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.iterated.iterated_step import IteratedStep
@@ -170,6 +171,7 @@ class SpacePlan:
             )
         self.steps.append(step)
         self.step_groups.append(len(self.groups))
+        tell_progress('steps planned', len(self.steps))
 
     @property
     def next_pin(self) -> int:
