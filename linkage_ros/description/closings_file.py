@@ -83,7 +83,7 @@ def add_closings(robot: ET.Element, content: Section) -> None:
             ET.SubElement(loop, tag, link=frames[frame], rpy='0 0 0')
     for name, kind in zip(changed, kinds, strict=True):
         if name not in joints:
-            ET.SubElement(robot, UNREAD, of=f'{kind} of {name}, which is no joint')
+            ET.SubElement(robot, UNREAD, of=f'{kind} of {name}, which is not a joint')
         elif kind == _FIXED:
             joints[name].set('type', 'fixed')
         else:

@@ -101,7 +101,7 @@ def read_content(file: Path, robot: Mapping[str, Any] | None = None) -> tuple[Se
                 raise FileError(file, '', 'is not a robot', f'leave out {list_names(robot)}')
             if 'urdf' in content:
                 remedy = 'name the URDF itself, or write linkage: {urdf: FILE} for a scene'
-                raise content.error('urdf', 'is no key of a linkage', remedy)
+                raise content.error('urdf', 'is not a key of a linkage', remedy)
             return content, data
     content = urdf_content(file, robot or {})
     return content, content.named_data

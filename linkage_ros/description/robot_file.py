@@ -269,7 +269,7 @@ class _Robot:
             raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
         for loop in self._loops:
             if loop.kind not in (*LOOP_KINDS.values(), LINE):
-                reason = f'{quote(loop.kind)} is no type of what closes a loop'
+                reason = f'{quote(loop.kind)} is not a type of loop'
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
         for joint in map(self._urdf.joints.__getitem__, kept):
@@ -322,7 +322,7 @@ class _Robot:
             directed = found is None and kind == 'fixed'
             ends.append(LoopEnd(link, (x, y, z), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), directed))
         if len(ends) != 2:
-            raise DefinitionError('close', f'{quote(asked)} is no pair', 'write FRAME=FRAME')
+            raise DefinitionError('close', f'{quote(asked)} is not a pair', 'write FRAME=FRAME')
         body, other = (self._tree.body(end.link) for end in ends)
         if body == other:
             reason = f'{quote(asked)} is within {quote(body)}, in which nothing moves'

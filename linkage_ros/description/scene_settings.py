@@ -46,7 +46,7 @@ def apply_settings(content: Section, settings: Sequence[str]) -> bytes:
         # On one line no value can add further keys.
         if not (equal and parts) or '.'.join(parts) != key or not setting.isprintable():
             raise _setting_error(
-                setting, f'{quote(setting)} is no setting', 'write KEY=VALUE: rate=500'
+                setting, f'{quote(setting)} is not a setting', 'write KEY=VALUE: rate=500'
             )
         within: Any = content.mapping
         outer = ''

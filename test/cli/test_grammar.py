@@ -303,15 +303,15 @@ def test_a_setting_of_one_of_several_linkages_that_is_wrong_is_named(
 
 
 WRONG = {
-    'rate': "'rate' is no setting; write KEY=VALUE: rate=500",
-    '=3': "'=3' is no setting; write KEY=VALUE",
+    'rate': "'rate' is not a setting; write KEY=VALUE: rate=500",
+    '=3': "'=3' is not a setting; write KEY=VALUE",
     'rate=-1': 'rate: -1 is out of bounds; write a finite number, at least 0',
     'rate=fast': "rate: 'fast' is not a number",
     'rtae=1': "rtae: unknown key; did you mean 'rate'?",
     'rate.hz=1': 'rate is 100; name a key in a mapping',
     'rate=[': 'is not valid YAML',
-    'rate=1\nseed: 2': "'rate=1\\nseed: 2' is no setting",
-    'rate=\udc80': "'rate=\\udc80' is no setting",
+    'rate=1\nseed: 2': "'rate=1\\nseed: 2' is not a setting",
+    'rate=\udc80': "'rate=\\udc80' is not a setting",
     'drive.sine.amplitud=1': "drive.sine.amplitud: unknown key; did you mean 'amplitude'?",
     'drive.topic.max_age=1': 'drive.topic: is a second drive',
     'effects.noise.joints={x: {white: 1}}': 'effects.noise.joints.x',

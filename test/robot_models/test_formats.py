@@ -123,7 +123,7 @@ def test_closings_beside_a_urdf_have_the_states_of_one_that_says_them(tmp_path):
     names = {'m1': 'm1', 'm2': 'm2', 'rod1_y': 'rod1_start_Y', 'rod1_x': 'rod1_start_X',
              'rod2_y': 'rod2_start_Y', 'rod2_x': 'rod2_start_X'}  # fmt: skip
     assert_same_states(closure, names)
-    assert 'SPHERICAL of gone, which is no joint (not read)' in closure.linkage.left_out
+    assert 'SPHERICAL of gone, which is not a joint (not read)' in closure.linkage.left_out
 
 
 def test_a_bag_has_such_a_robot_as_one_urdf(tmp_path):

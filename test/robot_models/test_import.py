@@ -500,7 +500,7 @@ def test_a_file_that_holds_the_keys_of_a_robot_is_no_linkage(tmp_path, capsys, c
     file.write_text(f'urdf: {ROBOTS / "ankle.urdf"}\ninput: [pitch, roll]\n')
     assert main([command, str(file)]) == 2
     err = capsys.readouterr().err
-    line = 'urdf: is no key of a linkage; name the URDF itself, or write linkage: {urdf: FILE} for'
+    line = 'urdf: is not a key of a linkage; name the URDF itself, or write linkage: {urdf: FILE}'
     assert line in err or 'is neither a scene nor a linkage; write linkage: FILE for a' in err
 
 

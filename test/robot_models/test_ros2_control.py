@@ -367,7 +367,7 @@ REFUSED = {
     '5 are published, of which 1 can be commanded; name 1 of right_knuckle_joint': ['gripper'],
     '2 for 1 input; name 1 different joint': [
         'gripper', '--driven-by', 'left_finger_joint', '--driven-by', 'right_finger_joint'],
-    'left_fnger_joint: is no joint, and describes no point': [
+    'left_fnger_joint: is not a joint, and describes no point': [
         'gripper', '--driven-by', 'left_fnger_joint'],
     'branch 1: there are 2 inputs, and no branches; leave it out': [
         'ankle_motors', '--branch', '1', '--driven-by', 'pitch', '--driven-by', 'roll'],
@@ -474,7 +474,7 @@ def test_a_package_is_written_whole_or_not_at_all(count, force, tmp_path, capsys
 @pytest.mark.parametrize('name', ['Arm', '9arm', 'my-arm', 'a__b', 'arm_'])
 def test_a_package_has_a_name_that_ros_allows(name, tmp_path, capsys):
     assert main(['compile', 'ankle_motors', '--ros2-control', str(tmp_path / name)]) == 2
-    assert 'is no name of a ROS package; use lower-case letters' in capsys.readouterr().err
+    assert 'is not a name of a ROS package; use lower-case letters' in capsys.readouterr().err
 
 
 def test_a_folder_that_exists_is_not_written_into_without_force(tmp_path, capsys):

@@ -61,12 +61,12 @@ def test_keys_with_dots_are_reached(kind, scene):
 REFUSED = {
     'loads.forces.rocker.B.constant=7': "loads.forces.rocker: there is no point 'rocker'; did you",
     'loads.forces."crank.A".constat=7': 'loads.forces.crank.A.constat: unknown key; did you mean',
-    'loads.forces."crank.A=7': 'is no setting; write KEY=VALUE',
-    'loads.forces."crank.A"x=7': 'is no setting; write KEY=VALUE',
-    'loads.forces."".x=7': 'is no setting; write KEY=VALUE',
-    'loads..forces=7': 'is no setting; write KEY=VALUE',
-    '.=7': 'is no setting; write KEY=VALUE',
-    '=7': 'is no setting; write KEY=VALUE',
+    'loads.forces."crank.A=7': 'is not a setting; write KEY=VALUE',
+    'loads.forces."crank.A"x=7': 'is not a setting; write KEY=VALUE',
+    'loads.forces."".x=7': 'is not a setting; write KEY=VALUE',
+    'loads..forces=7': 'is not a setting; write KEY=VALUE',
+    '.=7': 'is not a setting; write KEY=VALUE',
+    '=7': 'is not a setting; write KEY=VALUE',
 }
 
 

@@ -72,7 +72,7 @@ def _add_measured(linkage: Linkage, name: str) -> Linkage:
         coordinates = (f'{point}.{axis}' for point in linkage.traced for axis in linkage.axes)
         known = [*(given.joint for given in linkage.inputs), *linkage.joints, *coordinates]
         raise DefinitionError(
-            name or quote(name), 'is no joint, and describes no point, distance or angle',
+            name or quote(name), 'is not a joint, and describes no point, distance or angle',
             did_you_mean(
                 name, known, f'name one of {list_names(known)}, or P.x, A-B, LINK.angle'
             ),

@@ -169,7 +169,7 @@ def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> N
     free = [link for link in freedom.free if link in linkage.link_names]
     if free:
         # At a toggle equations are redundant that are needed elsewhere.
-        away = 'draw a pose that is no toggle, ' if freedom.redundant else ''
+        away = 'draw a pose that is not at a toggle, ' if freedom.redundant else ''
         stay = 'stay' if len(free) > 1 else 'stays'
         raise DefinitionError(
             'input', f'{given}: {list_names(free)} {stay} free',

@@ -55,7 +55,7 @@ def with_measured(linkage: SpaceLinkage, names: Sequence[str]) -> SpaceLinkage:
         else:
             remedy = f'name one of {list_names(known)}, or P.x, A-B'
             raise DefinitionError(
-                name or quote(name), 'is no joint, and describes no point or distance',
+                name or quote(name), 'is not a joint, and describes no point or distance',
                 did_you_mean(name, known, remedy),
             )  # fmt: skip
     return linkage

@@ -145,7 +145,7 @@ def _write_transmission(arguments: argparse.Namespace, closure: Any, file: Path)
     name = folder.resolve().name
     if not _PACKAGE.fullmatch(name):
         raise LinkageError(
-            folder, f'{quote(name)} is no name of a ROS package',
+            folder, f'{quote(name)} is not a name of a ROS package',
             'use lower-case letters, digits and _, as in gripper_transmission',
         )  # fmt: skip
     if os.path.lexists(folder) and not (arguments.force and folder.is_dir()):

@@ -383,5 +383,5 @@ def test_a_spatial_linkage_is_driven_by_any_of_its_joints():
         assert back.joints == pytest.approx(given, abs=1e-14)
     with pytest.raises(lr.DefinitionError, match='1 for 2 inputs; name 2 different joints'):
         motors.driven_by('pitch')
-    with pytest.raises(lr.DefinitionError, match=r"rol: is no joint.* did you mean 'roll'"):
+    with pytest.raises(lr.DefinitionError, match=r"rol: is not a joint.* did you mean 'roll'"):
         motors.driven_by('pitch', 'rol')
