@@ -8,6 +8,7 @@
 """Forces in space: against Lagrange multipliers in absolute coordinates, and the work done."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from random import Random
 import re
@@ -64,6 +65,7 @@ def rod_of(random, one, other):
     return SpatialMass(0.3, tuple((one + share * along).tolist()), tuple(more.tolist()))
 
 
+@cache
 def weighed(name):
     """Return a closure of a linkage in space with masses other than the file's."""
     closure = closure_of(name)
@@ -77,6 +79,7 @@ def weighed(name):
     return SpaceClosure(replace(linkage, masses=masses), name)
 
 
+@cache
 def spring_of(closure, damping=0.0):
     """Return a spring from the ground to a link that moves, and the closure with its ends."""
     linkage, size = closure.linkage, closure.scale
