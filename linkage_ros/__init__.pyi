@@ -12,6 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+# Read first: load, Closure, Linkage, SpaceLinkage, Position, Status, load_scene, Scene, Pipeline,
+# Tick, read_bag, Bag, svg, generate_function, Design, LinkageError.
+
 # What `linkage_ros` exports, for type checkers: at run time a name is imported when it is used.
 
 from linkage_ros.bag.reader import Bag as Bag, BagMessage as BagMessage, read_bag as read_bag

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: read_bag, Bag, BagMessage, Topic, QosProfile, BagWriter, Storage, Recorder,
+# RecordingSummary, SnapshotMemory, recover_bag, Salvage, recorded_events, RunMetadata.
+
 from linkage_ros.bag.bag_file import (
     compression_type as compression_type,
     COMPRESSIONS as COMPRESSIONS,

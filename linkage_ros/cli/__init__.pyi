@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: COMMANDS, find_command, Parser, parser_of, read_inputs, Result, Table, Column,
+# Quantity, DisplayUnits, BagReading, open_bag, show_progress.
+
 from linkage_ros.cli.arguments import (
     add_at as add_at,
     add_bag as add_bag,

@@ -6,6 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: load, read_linkage, read_any_closure, read_urdf, read_as_urdf, write_linkage,
+# load_scene, Scene, SceneLinkage, Section, Number, Name, Point, RowsOf, read_parameters,
+# linkage_notes, Units, parse_yaml.
+
 from linkage_ros.description.confinement import Confinement as Confinement
 from linkage_ros.description.file_access import (
     atomic_write as atomic_write,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: Mechanics, AppliedForces, AppliedLoads, Loads, Friction, Motor, Motion, METHODS,
+# Reactions, JointReaction, TwoMasses, Winding.
+
 from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
 from linkage_ros.dynamics.dry_friction import settle_forces as settle_forces
 from linkage_ros.dynamics.equation import (

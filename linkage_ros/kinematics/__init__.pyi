@@ -6,6 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: Closure, PlanarClosure, SpaceClosure, Linkage, SpaceLinkage, JointedLinkage,
+# RevoluteJoint, SlideJoint, Slider, SpatialJoint, Status, Position, Velocity, Acceleration,
+# InputRange, SingularityMargin, RRRDyad, Driven, Structure, evaluate_constraints.
+
 from linkage_ros.kinematics.analysis.crank_branches import CrankBranch as CrankBranch
 from linkage_ros.kinematics.analysis.curves import (
     Curve as Curve,

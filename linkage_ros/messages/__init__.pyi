@@ -6,6 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: JointStateReader, JointStateWriter, CrankSample, Rejection, SampleRouter,
+# parse_declaration, pack_message, parse_message, MessageContent, JointTrajectoryWriter,
+# JointWrenchWriter, MarkerArrayWriter.
+
 from linkage_ros.messages.input_samples import input_reader as input_reader
 from linkage_ros.messages.joint_state import (
     arrays_of as arrays_of,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: LinkageNode, run_linkage_node, RunState, RunRecording, Warnings, make_statuses,
+# CommandRelay, CrankSource.
+
 from linkage_ros.node.conditions import (
     RunState as RunState,
     Warnings as Warnings,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: replay_ticks, ReplayedTick, verify_replay, ReplayVerification, Comparison,
+# Deviation, Counterfactual, simulate_run, Study, ParameterSweep, Statistics.
+
 from linkage_ros.replay.compare import (
     Comparison as Comparison,
     Deviation as Deviation,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: Pipeline, Tick, LinkagePipeline, LinkageState, InterpretedTick, TickLoop,
+# TakeMessage, Counts, RunTopic.
+
 from linkage_ros.tick.interpreted_tick import InterpretedTick as InterpretedTick, Tick as Tick
 from linkage_ros.tick.linkage_pipeline import LinkagePipeline as LinkagePipeline
 from linkage_ros.tick.linkage_state import LinkageState as LinkageState

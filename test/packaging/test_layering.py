@@ -13,6 +13,7 @@ from collections import defaultdict
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+import re
 import sys
 
 from linkage_ros import workbench
@@ -259,6 +260,17 @@ def test_a_face_lists_what_others_import(root):
                     used[node.module] |= {alias.name for alias in node.names}
     public = {face: {*names} for face, names in FACES.items() if face != PACKAGE}
     assert {face: names - used[face] for face, names in public.items() if names - used[face]} == {}
+
+
+def test_a_long_face_says_what_to_read_first(root):
+    for face, names in FACES.items():
+        stub = root.joinpath(*face.split('.'), '__init__.pyi').read_text('utf-8')
+        first = re.search(r'^# Read first: (.*?)\.$', stub, re.MULTILINE | re.DOTALL)
+        assert first or len(names) <= 20, face
+        if first:
+            told = first[1].replace('\n#', '').split(', ')
+            assert len(told) <= 20
+            assert {*told} <= {*names}
 
 
 def test_no_imports_run_in_a_circle(our_imports):

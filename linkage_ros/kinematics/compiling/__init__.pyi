@@ -6,6 +6,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: motion_at, Tape, Operation, Tree, Path, Compiled, compile_program, Program.
+
 from linkage_ros.kinematics.compiling.linkage import (
     Compiled as Compiled,
     CompiledAnswer as CompiledAnswer,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: Drive, DRIVES, drive_class, CrankState, Crank, TopicDrive, TorqueDrive,
+# ConstantRateDrive, ProfileDrive, BagDrive.
+
 from linkage_ros.stages.drives.bag import BagDrive as BagDrive
 from linkage_ros.stages.drives.chirp import Chirp as Chirp, ChirpDrive as ChirpDrive
 from linkage_ros.stages.drives.compiled_drive import compile_drive as compile_drive

@@ -6,6 +6,10 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: EFFECTS, effect_class, Effect, MechanismEffect, SensorEffect, MessageEffect,
+# ForceEffect, SensorReading, SensorStage, WriterStage, MechanismState, VelocityEffect,
+# NoiseEffect, DelayEffect.
+
 from linkage_ros.stages.effects.angle_unwrap import (
     Continuous as Continuous,
     first_values as first_values,

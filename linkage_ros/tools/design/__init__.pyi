@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: Design, DesignRequest, FourBar, FunctionTask, PathTask, Pose, three_pairs,
+# fixed_pivots, generate_path, Assessment, assess, prove, draw_design.
+
 from linkage_ros.tools.design.dead_centres import (
     crank_rockers as crank_rockers,
     DeadCentreTask as DeadCentreTask,

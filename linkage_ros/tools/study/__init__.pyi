@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: measure_budget, Budget, Price, Knob, NeedAnswer, Setting, measure_age_in_use,
+# measure_drive_step, measure_deliberate, measure_solving, price_scenes, motions_of, budget_table.
+
 from linkage_ros.tools.study.age import (
     CARRY as CARRY,
     errors_in_use as errors_in_use,

@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: serve, Server, Route, RequestHandler, build_model, model_of, edit_text, EditResult,
+# LiveBridge, page_html, bag_page, LinkagePage.
+
 from linkage_ros.tools.view.conversation import Conversation as Conversation, UserFile as UserFile
 from linkage_ros.tools.view.edit import (
     edit_text as edit_text,

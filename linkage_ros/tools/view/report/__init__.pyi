@@ -6,6 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
+# Read first: read_run, ReportedRun, LinkageRun, page_data, run_html, ReportHeader, EventTrack,
+# Decimation, BoundedCurves.
+
 from linkage_ros.tools.view.report.blocks import (
     Blocks as Blocks,
     Progress as Progress,
