@@ -146,6 +146,26 @@ def test_both_carry_an_estimated_acceleration(name):
     check(file.read_bytes(), f'{drive}\neffects: {{velocity: {{}}, acceleration: {{}}}}')
 
 
+@pytest.mark.parametrize(
+    ('name', 'effects', 'loads'),
+    [
+        ('four_bar', 'effort: {measured: true, joints: [rocker_joint]}', ''),
+        ('four_bar', 'effort: {measured: true}', ''),
+        (
+            'four_bar',
+            'effort: {measured: true, joints: [coupler_joint]}, pin_forces: {}',
+            'loads: {efforts: {rocker_joint: {over_time: [[0, 0], [1, 2]]}}}\n',
+        ),
+        ('five_bar', 'effort: {measured: true, joints: [left_elbow, right_elbow]}', ''),
+        ('space/ankle_motors', 'effort: {measured: true, joints: [pitch, roll]}', ''),
+    ],
+)
+def test_both_carry_the_same_measured_efforts(name, effects, loads):
+    linkage = (ROOT / 'config' / 'linkages' / f'{name}.yaml').read_bytes()
+    linkage = re.sub(rb', limits: [^}]*', b'', linkage)
+    check(linkage, f'{DRIVES["carried"]}\n{loads}effects: {{{effects}}}', looked=20)
+
+
 @pytest.mark.parametrize('effects', FORCES)
 def test_both_bear_the_same_loads_on_joints_and_points(effects):
     linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()

@@ -11,7 +11,7 @@ Relay commands of other joints than the inputs to the inputs, as a ROS 2 node.
 
 The scene names the joints, drive: {topic: {joint: NAME, branch: N}}, or --joint does. JointState
 on joint_commands goes to crank_commands, JointTrajectory on joint_trajectory to
-crank_trajectory. It ends by Ctrl-C.
+crank_trajectory, with efforts that do the same work. It ends by Ctrl-C.
 """
 
 from __future__ import annotations

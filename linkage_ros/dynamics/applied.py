@@ -466,9 +466,9 @@ class AppliedForces:
         """
         Yield each load, where it acts and how strong, in [N·m] or [N].
 
-        ``given`` is as in `given_after`; empty for the begin, and the wrenches now.
+        ``given`` begins as `given_after`; empty for the begin, and the wrenches now.
         """
-        seconds, *numbers = given or self.given_after(0.0)
+        seconds, *numbers = given[: self.given_count] or self.given_after(0.0)
         for joint, spring in self._springs:
             rate = joint.lever(velocity, position, ())
             stretch = _spring_stretch(joint, spring, position)

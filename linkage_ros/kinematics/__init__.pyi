@@ -10,6 +10,7 @@
 # RevoluteJoint, SlideJoint, Slider, SpatialJoint, Status, Position, Velocity, Acceleration,
 # InputRange, SingularityMargin, RRRDyad, Driven, Structure, evaluate_constraints.
 
+from linkage_ros.kinematics.analysis.carried_efforts import CarriedEfforts as CarriedEfforts
 from linkage_ros.kinematics.analysis.crank_branches import CrankBranch as CrankBranch
 from linkage_ros.kinematics.analysis.curves import (
     Curve as Curve,

@@ -421,7 +421,7 @@ class Closure:
         Return the derivatives of the published joints by the inputs, (joints, inputs).
 
         Without masses and friction its transpose turns efforts of the joints into efforts of the
-        inputs that balance them.
+        inputs that do the same work, as `carry_efforts`.
 
         Parameters
         ----------
@@ -438,6 +438,44 @@ class Closure:
 
         units = np.eye(len(self.input_names)).tolist()
         return np.array([self.velocity(position, *unit).joints for unit in units]).T
+
+    def carry_efforts(
+        self, position: Position, efforts: Mapping[str, float], to: Sequence[str] = ()
+    ) -> tuple[float, ...]:
+        """
+        Return efforts that do the same work as given ones, without masses and friction.
+
+        Parameters
+        ----------
+        position
+            A position that this closure found.
+        efforts
+            Efforts of joints and inputs by their names, in [N·m] or [N].
+        to
+            Names of as many other joints as there are inputs; without them, the inputs.
+
+        Returns
+        -------
+        efforts : tuple
+            In the order of ``to``, in [N·m] or [N]; empty where they are not determined, as at a
+            toggle, or where a joint stands though the inputs move.
+
+        Raises
+        ------
+        DefinitionError
+            If a name is no joint and no input, or ``to`` has more or fewer than there are inputs.
+        TypeError
+            If the position is one of another linkage.
+
+        """
+        from linkage_ros.kinematics.analysis.carried_efforts import (
+            CarriedEfforts,  # local import: few ask for it
+        )
+
+        self._check_own('position', position)
+        numbers = [to_double(name, effort) for name, effort in efforts.items()]
+        wanted = to or self.input_names
+        return CarriedEfforts(self, [*efforts], wanted).carry_from(position, numbers)
 
     def _huge_velocity(self, position: Position, rates: tuple[float, ...]) -> Velocity:
         """Return the velocity at rates of which one is huge: infinite where it overflows."""

@@ -17,11 +17,17 @@ from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Reje
 from linkage_ros.messages.sample_router import SampleRouter
 
 
-def input_reader(inputs: Sequence[str]) -> Callable[[bytes], CrankSample | Rejection]:
-    """Return a function that reads the inputs that a serialized JointState names."""
+def input_reader(
+    inputs: Sequence[str], with_efforts: bool = False
+) -> Callable[[bytes], CrankSample | Rejection]:
+    """
+    Return a function that reads the inputs that a serialized JointState names.
+
+    ``with_efforts``: whether a sample has their efforts too.
+    """
     if len(inputs) == 1:
-        return JointStateReader(inputs).read
-    return _SeveralInputs(inputs).read
+        return JointStateReader(inputs, with_efforts).read
+    return _SeveralInputs(inputs, with_efforts).read
 
 
 class _SeveralInputs:
@@ -29,22 +35,24 @@ class _SeveralInputs:
 
     __slots__ = ('_readers', '_router')
 
-    def __init__(self, inputs: Sequence[str]) -> None:
-        self._readers = [JointStateReader((name,)) for name in inputs]
+    def __init__(self, inputs: Sequence[str], with_efforts: bool) -> None:
+        self._readers = [JointStateReader((name,), with_efforts) for name in inputs]
         self._router = SampleRouter({index: (name,) for index, name in enumerate(inputs)})
 
     def read(self, data: bytes) -> CrankSample | Rejection:
         """Return a sample of the named inputs, NaN for the others, or why it is rejected."""
         # A message that names none is rejected by any reader.
         named = self._router.find_receivers(data) or (0,)
-        angles, rates = [nan] * len(self._readers), [nan] * len(self._readers)
+        angles, rates, efforts = ([nan] * len(self._readers) for _ in range(3))
         stamp, mask = 0, 0
         for index in named:
             sample = self._readers[index].read(data)
             if isinstance(sample, Rejection):
                 return sample
-            stamp, (angles[index],), rate, _ = sample
+            stamp, (angles[index],), rate, _, effort = sample
             if rate is not None:
                 (rates[index],) = rate
+            if effort is not None:
+                (efforts[index],) = effort
             mask |= 1 << index
-        return CrankSample(stamp, tuple(angles), tuple(rates), mask)
+        return CrankSample(stamp, tuple(angles), tuple(rates), mask, tuple(efforts))

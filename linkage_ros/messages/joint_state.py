@@ -83,6 +83,8 @@ class CrankSample(NamedTuple):
     # Rates, in [rad/s] or [m/s]; None if the message has no velocities, NaN where one is absent.
     rates: tuple[float, ...] | None
     named: int = -1  # Bit i: the message names input i; the values of the others are NaN
+    # Efforts, in [N·m] or [N], where they are wanted; None if the message has none.
+    efforts: tuple[float, ...] | None = None
 
     def merged_over(self, earlier: CrankSample | None) -> CrankSample:
         """Return the sample, with an earlier one's values of inputs that it leaves out."""
@@ -109,20 +111,23 @@ class JointStateReader:
     ----------
     joints
         Names of one or more joints. A message may have them in any order, among others.
+    with_efforts
+        Whether a sample has the efforts of the joints too.
 
     """
 
-    __slots__ = ('_joints', '_known')
+    __slots__ = ('_joints', '_known', '_with_efforts')
 
-    def __init__(self, joints: Sequence[str]) -> None:
+    def __init__(self, joints: Sequence[str], with_efforts: bool = False) -> None:
         self._joints = tuple(joint.encode() for joint in joints)
         self._known: tuple[Any, ...] | None = None
+        self._with_efforts = with_efforts
 
     def read(self, data: bytes) -> CrankSample | Rejection:
         """Return the sample of the joints, in the given order, or the reason for its rejection."""
         known = self._known
         if known is not None:
-            size, unpack_from, pick_fixed, fixed, pick_positions, pick_rates = known
+            size, unpack_from, pick_fixed, fixed, pick_positions, pick_rates, *more = known
             if len(data) >= size:
                 values = unpack_from(data)
                 if pick_fixed(values) == fixed:
@@ -131,8 +136,11 @@ class JointStateReader:
                     if seconds < 0 or nanoseconds >= NANOSECONDS:
                         return Rejection.STAMP_INVALID
                     stamp = seconds * NANOSECONDS + nanoseconds
-                    return CrankSample(stamp, pick_positions(values), pick_rates(values) or None)
-        layout = _sample_pattern(data, self._joints)
+                    positions, rates = pick_positions(values), pick_rates(values) or None
+                    if not more:
+                        return CrankSample(stamp, positions, rates)
+                    return CrankSample(stamp, positions, rates, -1, more[0](values) or None)
+        layout = _sample_pattern(data, self._joints, self._with_efforts)
         if isinstance(layout, Rejection):
             return layout
         self._known = *layout[:4], *layout.picks
@@ -149,7 +157,9 @@ def arrays_of(data: bytes) -> tuple[str, list[bytes], list[NumberArray]] | Rejec
     return byte_order(data), fields['name'], arrays
 
 
-def _sample_pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
+def _sample_pattern(
+    data: bytes, joints: Sequence[bytes], with_efforts: bool
+) -> Pattern | Rejection:
     arrays_or_reason = arrays_of(data)
     if isinstance(arrays_or_reason, Rejection):
         return arrays_or_reason
@@ -167,7 +177,7 @@ def _sample_pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection
     places = [8 * names.index(joint) for joint in joints]
     groups = [
         [array.first + place for place in places] if array.length else []
-        for array in (positions, rates)
+        for array in (positions, rates, efforts)[: 2 + with_efforts]
     ]
     return compile_pattern(data, arrays, groups)
 

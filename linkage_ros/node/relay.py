@@ -16,9 +16,10 @@ in                     type                                  out
 ``joint_trajectory``   ``trajectory_msgs/JointTrajectory``   ``crank_trajectory``
 =====================  ====================================  ======================
 
-Given positions, velocities and accelerations are converted; efforts are left out. A command
-that no inputs reach is not sent; nor is a trajectory with such a point. With several inputs a
-message names all of the joints that are commanded instead.
+Given positions, velocities, accelerations and efforts are converted; efforts as those that do the
+same work, without masses and friction. A command that no inputs reach is not sent; nor is a
+trajectory with such a point. With several inputs a message names all of the joints that are
+commanded instead.
 """
 
 from __future__ import annotations
@@ -91,14 +92,15 @@ class CommandRelay:
         places = [list(message.name).index(name) for name in names]
         rows = [
             [array[place] for place in places] if len(array) == len(message.name) else []
-            for array in (message.position, message.velocity)
+            for array in (message.position, message.velocity, message.effort)
         ]
-        positions, velocities, _ = _input_arrays(lines, names, *rows, [])
+        positions, velocities, _, efforts = _input_arrays(lines, names, *rows[:2], [], rows[2])
         return JointState(
             header=message.header,
             name=[name for line in lines for name in line.inputs],
             position=positions,
             velocity=velocities,
+            effort=efforts,
         )
 
     def turn_trajectory(self, message: JointTrajectory) -> JointTrajectory:
@@ -112,9 +114,8 @@ class CommandRelay:
         lines, points = self._lines_of(names), []
         for number, point in enumerate(message.points, 1):
             try:
-                found = _input_arrays(
-                    lines, names, point.positions, point.velocities, point.accelerations
-                )
+                rows = point.positions, point.velocities, point.accelerations, point.effort
+                found = _input_arrays(lines, names, *rows)
             except RefusedError as error:
                 raise RefusedError(f'point {number} of {len(message.points)}: {error}') from None
             points.append(
@@ -122,6 +123,7 @@ class CommandRelay:
                     positions=found[0],
                     velocities=found[1],
                     accelerations=found[2],
+                    effort=found[3],
                     time_from_start=point.time_from_start,
                 )
             )
@@ -142,11 +144,11 @@ class CommandRelay:
 def _input_arrays(
     lines: Sequence[_Line], names: Sequence[str], *rows: Sequence[float]
 ) -> list[list[float]]:
-    """Return positions, velocities and accelerations of inputs, as far as they are given."""
-    positions, velocities, accelerations = rows
+    """Return positions, velocities, accelerations and efforts of inputs, as far as given."""
+    positions, *others = rows
     if len(positions) != len(names):
         raise RefusedError(f'{len(positions)} positions for {len(names)} joints')
-    if not {len(velocities), len(accelerations)} <= {0, len(names)}:
+    if not {len(row) for row in others} <= {0, len(names)}:
         raise RefusedError('arrays of unequal length')
     given = [dict(zip(names, row, strict=False)) for row in rows]
     motions = [
@@ -167,9 +169,13 @@ class _Line(NamedTuple):
     inputs: tuple[str, ...]
 
     def motion_at(
-        self, values: list[float], rates: list[float], accelerations: list[float]
+        self,
+        values: list[float],
+        rates: list[float],
+        accelerations: list[float],
+        efforts: list[float],
     ) -> ExchangedMotion:
-        """Return the inputs, with rates and accelerations: NaN where those of a joint are."""
+        """Return the inputs with rates, accelerations and efforts: NaN where a joint's are."""
         exchange = self.exchange
         position = exchange.find_position(values)
         if position is None or position.status is Status.LIMITED:
@@ -181,11 +187,17 @@ class _Line(NamedTuple):
             )
             raise RefusedError(f'{places} is not reached: {self._reason(position)}')
         motion = exchange.motion_at(position, rates, accelerations)
+        if efforts and all(map(isfinite, efforts)):
+            if not (found := exchange.efforts_at(motion.inputs, efforts)):
+                raise RefusedError(
+                    f'an effort of {list_names(self.joints)} comes to none of the inputs there'
+                )
+            motion = motion._replace(efforts=found)
         if position.status is Status.TOGGLE:
             if any(isfinite(one) and one for one in (*rates, *accelerations)):
                 joints = list_names(self.joints)
                 raise RefusedError(f'{joints} turns back there: the crank has no rate')
-            return ExchangedMotion(motion.inputs, tuple(rates), tuple(accelerations))
+            return motion._replace(rates=tuple(rates), accelerations=tuple(accelerations))
         return motion
 
     def _reason(self, position: Position | None) -> str:

@@ -201,14 +201,15 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
         return None
     if not all(each.is_compiled for each in acting):
         return None
-    loads = linkage.changing_loads if any(each.needs_forces for each in acting) else None
+    loads = linkage.changing_loads if any(each.computes_forces for each in acting) else None
+    efforts_taken = len(linkage.drive.efforts) if linkage.context.takes_efforts else 0
     outputs = None
     if 2 in derivatives:
         of = [*acting, linkage.published_fields, linkage.writes_forces]
         of += [linkage.context.loads, linkage.context.friction]
         outputs = _OutputSelection(of, linkage)
     compiled = linkage.closure.compile_linkage(
-        len(derivatives), outputs, loads.given_count if loads else 0
+        len(derivatives), outputs, (loads.given_count if loads else 0) + efforts_taken
     )
     # Where the forces have no solution, a compiled path has fewer values.
     if len({tuple(map(len, path.outputs)) for path in compiled.paths}) != 1:
@@ -227,6 +228,9 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     if loads is not None:
         bound['loads'] = loads
         lines += [*_fall_back_unless('loads.begin >= 0', leave), 'given = loads.given_at(now)']
+    if efforts_taken:
+        bound['sampled'] = linkage.drive
+        lines.append(f'given = {"" if loads is None else "given + "}sampled.efforts')
     mechanism, groups = _mechanism_lines(compiled, leave)
     lines += mechanism.lines
     bound |= mechanism.bound
@@ -243,7 +247,8 @@ def compile_linkage(linkage: LinkagePipeline) -> CompiledTick | None:
     if linkage.running is not None:
         bound['running'] = linkage.running
         lines += _unwrap_lines(linkage.running.places, joints, leave)
-    crank, given = 'crank' if exerts else f'({_CRANK_FIELDS})', '()' if loads is None else 'given'
+    crank = 'crank' if exerts else f'({_CRANK_FIELDS})'
+    given = '()' if loads is None and not efforts_taken else 'given'
     reading = joints, rates, accelerations, efforts
     each = len(reactions) // len(linkage.context.reactions.joints) if reactions else 1
     wrenches = [*zip(*[iter(reactions)] * each, strict=True)]

@@ -114,6 +114,8 @@ class LinkagePipeline:
             dependent=scene.dependent_joints,
             effects=frozenset(scene_linkage.effects),
             moves_by_rates=wanted.moves_by_rates,
+            takes_efforts=any(each.takes_efforts for each in wanted.effects.values()),
+            instead_of_inputs=scene_linkage.instead_of_inputs,
         )
         self._build_drive(wanted, injection)
         self._build_mechanism(wanted, injection)
@@ -124,6 +126,12 @@ class LinkagePipeline:
         """Build what gives the crank state: the drive, its messages and the effects on it."""
         drive: Drive
         name, drive = self.scene_linkage.drive
+        if self.context.takes_efforts and not drive.is_measured:
+            raise DefinitionError(
+                'effects.effort.measured',
+                f'the drive {name} takes no samples with efforts',
+                'write drive: {topic: {}}',
+            )
         self.topic = drive.listens_to
         """Topic of the drive; '' for none."""
         self.drive: Crank = drive.build(self.context)
@@ -241,6 +249,8 @@ class LinkagePipeline:
             return LinkageState(self.solve_mechanism, crank, reading, solution=(position, None))
         # The time of the loads begins here: a bag does not know of ticks before the first pose.
         given = self.changing_loads.given_at(now) if self.changing_loads is not None else ()
+        if self.context.takes_efforts:
+            given += self.drive.efforts
         motion = self._mechanism_motion(crank, position, given)
         reading = self._apply_sensors(now, self.observe(now, motion))
         return LinkageState(self.solve_mechanism, crank, reading, (), given, (position, motion))

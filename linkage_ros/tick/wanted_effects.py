@@ -59,7 +59,7 @@ def choose_effects(scene_linkage: SceneLinkage) -> WantedEffects:
     }
     for name in needs.union(*map(needed_effects, needs)):
         effects.setdefault(name, effect_class(name)())
-    computes_forces = drive.gives_torque or any(each.needs_forces for each in effects.values())
+    computes_forces = drive.gives_torque or any(e.computes_forces for e in effects.values())
     _refuse_idle(scene_linkage, computes_forces)
     ordered = {name: effects[name] for name in in_order(effects)}
     return WantedEffects(named, ordered, computes_forces, moves_by_rates)

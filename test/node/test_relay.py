@@ -13,6 +13,7 @@ from math import nan
 from linkage_ros import DefinitionError, load
 from linkage_ros.description import load_scene
 from linkage_ros.node import CommandRelay, PARAMETERS, RefusedError
+import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -48,6 +49,19 @@ def test_commands_of_joints_in_plane_and_space_become_those_of_all_inputs(name, 
     assert [*turned.positions] == pytest.approx(start, abs=1e-11)
     assert [*turned.velocities] == pytest.approx([0.3] * len(start), abs=1e-9)
     assert [*turned.accelerations] == pytest.approx([-0.2] * len(start), abs=1e-8)
+    # Efforts do the same work on either side, at the motion and at each input's own.
+    efforts = [1.0 - 0.6 * k for k in range(len(joints))]
+    state = JointState(name=joints, position=rows[0], velocity=rows[1], effort=efforts)
+    turned = relay.turn_state(state)
+    power = np.dot(efforts, rows[1])
+    assert np.dot(turned.effort, turned.velocity) == pytest.approx(power, rel=1e-9, abs=1e-12)
+    one.effort = efforts
+    (found,) = relay.turn_trajectory(JointTrajectory(joint_names=joints, points=[one])).points
+    assert found.effort == turned.effort
+    for k in range(len(start)):
+        moved = closure.velocity(position, *(float(i == k) for i in range(len(start))))
+        work = np.dot(efforts, [moved[joint] for joint in joints])
+        assert turned.effort[k] == pytest.approx(work, rel=1e-8, abs=1e-12)
     with pytest.raises(RefusedError, match='is not reached: '):
         relay.turn_state(JointState(name=joints, position=[9.0] * len(joints)))
     if len(joints) > 1:
@@ -121,6 +135,28 @@ def test_what_has_no_crank_is_not_sent(relay, message, reason):
 def test_standing_where_the_joint_turns_back_is_a_crank(relay):
     (found,) = relay.turn_trajectory(trajectory(point(END, 0.0, 0.0))).points
     assert list(found.velocities) == [0.0]
+
+
+def test_an_effort_has_no_lever_on_the_crank_where_the_joint_turns_back(relay):
+    found = relay.turn_state(JointState(name=['rocker_joint'], position=[END], effort=[2.0]))
+    assert list(found.effort) == pytest.approx([0.0], abs=1e-6)
+    message = JointState(name=['rocker_joint'], position=[1.2], effort=[nan])
+    assert np.isnan(relay.turn_state(message).effort).all()
+
+
+def test_efforts_at_a_toggle_of_the_crank_are_not_sent():
+    closure = load('double_rocker')
+    joint = closure.joint_names[-1]
+    end = closure.input_ranges[0].highest
+    at = closure.position(end)[joint]
+    (number,) = [one.number for one in closure.branches(joint) if abs(one.most - end) < 1e-9]
+    drive = f'drive={{topic: {{joint: {joint}, branch: {number}}}}}'
+    relay = CommandRelay(load_scene('double_rocker', settings=(drive,)))
+    message = JointState(name=[joint], position=[at])
+    assert relay.turn_state(message).position == pytest.approx([end], abs=1e-7)
+    message.effort = [1.0]
+    with pytest.raises(RefusedError, match=f'an effort of {joint} comes to none of the inputs'):
+        relay.turn_state(message)
 
 
 def test_an_empty_trajectory_stops_the_crank_too(relay):

@@ -21,7 +21,13 @@ from math import isfinite, nan, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, CrankBranch, Position, turn_to_pose
+from linkage_ros.kinematics import (
+    CarriedEfforts,
+    Closure,
+    CrankBranch,
+    Position,
+    turn_to_pose,
+)
 from linkage_ros.messages import CrankSample, JointStateReader, Rejection
 from linkage_ros.stages.drives.drive import LARGEST
 
@@ -32,11 +38,12 @@ _SAME = 1e-6
 
 
 class ExchangedMotion(NamedTuple):
-    """Inputs with their rates and accelerations; NaN where they have none, or none are given."""
+    """Inputs with what they have; NaN where they have none, or none is given."""
 
     inputs: Values
     rates: Values
     accelerations: Values
+    efforts: Values
 
 
 class ExchangedInputs:
@@ -61,6 +68,7 @@ class ExchangedInputs:
         self._names = closure.input_names
         self._rows = [self._measured.joint_names.index(name) for name in joints]
         self._turns = [self._measured.turning[row] for row in self._rows]
+        self._carried = CarriedEfforts(self._measured, joints, self._names)
 
     def find_position(self, values: Sequence[float]) -> Position | None:
         """Return the position of the exchanged linkage at values; None if there is none."""
@@ -88,7 +96,7 @@ class ExchangedInputs:
     ) -> ExchangedMotion:
         """Return the inputs at a position with rates and accelerations of the joints."""
         none = (nan,) * len(self._names)
-        found = ExchangedMotion(self._inputs_of(position), none, none)
+        found = ExchangedMotion(self._inputs_of(position), none, none, none)
         if not (position.status.has_rates and rates and all(map(isfinite, rates))):
             return found
         velocity = self.inverse.velocity(position, *rates)
@@ -101,6 +109,10 @@ class ExchangedInputs:
         known = dict(zip(self.inverse.input_names, accelerations, strict=True))
         known |= dict(zip(self.inverse.joint_names, acceleration.joints, strict=True))
         return found._replace(accelerations=tuple(known[name] for name in self._names))
+
+    def efforts_at(self, inputs: Sequence[float], efforts: Sequence[float]) -> Values:
+        """Return the efforts of the inputs for those of the joints; empty if undetermined."""
+        return self._carried.carry_from(self._measured.close_unlimited(*inputs), efforts)
 
     def joints_at(self, inputs: Sequence[float], rates: Sequence[float]) -> tuple[Values, Values]:
         """Return the joints and their rates at inputs; beyond the branch, those at its end."""
@@ -127,20 +139,24 @@ class DependentSampleReader:
 
     __slots__ = ('_exchange', '_read')
 
-    def __init__(self, exchange: ExchangedInputs, joints: Sequence[str]) -> None:
+    def __init__(
+        self, exchange: ExchangedInputs, joints: Sequence[str], with_efforts: bool = False
+    ) -> None:
         self._exchange = exchange
-        self._read = JointStateReader(joints).read
+        self._read = JointStateReader(joints, with_efforts).read
 
     def read(self, data: bytes) -> CrankSample | Rejection:
         """Return the sample of the inputs, or the reason for its rejection."""
         sample = self._read(data)
         if isinstance(sample, Rejection):
             return sample
-        stamp, values, rates, _ = sample
+        stamp, values, rates, _, efforts = sample
         if not all(-LARGEST <= value <= LARGEST for value in values):
             return sample  # The drive says why not.
         position = self._exchange.find_position(values)
         if position is None:
             return Rejection.NO_CRANK
         motion = self._exchange.motion_at(position, rates or ())
-        return CrankSample(stamp, motion.inputs, motion.rates if rates else None)
+        if efforts is not None:
+            efforts = self._exchange.efforts_at(motion.inputs, efforts) or None
+        return CrankSample(stamp, motion.inputs, motion.rates if rates else None, -1, efforts)

@@ -109,6 +109,11 @@ class Crank(Protocol):
         return (0,)
 
     @property
+    def efforts(self) -> tuple[float, ...]:
+        """Efforts of the inputs in the newest samples, in [N·m] or [N]; NaN for none."""
+        return ()
+
+    @property
     def max_age(self) -> int:
         """Age of the newest sample above which a warning is due, in [ns]; 0 for never."""
 
@@ -184,6 +189,10 @@ class Context:
     moves_by_rates
         Whether the crank moves at its rates; an input that is held between samples stands still,
         whatever its rate.
+    takes_efforts
+        Whether the efforts in samples of the crank are wanted.
+    instead_of_inputs
+        Joints that samples name instead of the inputs; none if the inputs.
 
     """
 
@@ -197,6 +206,8 @@ class Context:
     dependent: frozenset[str] = frozenset()
     effects: frozenset[str] = frozenset()
     moves_by_rates: bool = True
+    takes_efforts: bool = False
+    instead_of_inputs: tuple[str, ...] = ()
 
     @property
     def joints(self) -> tuple[str, ...]:

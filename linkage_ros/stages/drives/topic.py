@@ -146,8 +146,8 @@ class TopicDrive(Drive):
 
             exchange = ExchangedInputs(context.closure, self.joint, self.branch)
             names = [context.prefix + joint for joint in self.joint]
-            return DependentSampleReader(exchange, names).read
-        return input_reader(context.inputs_in_messages)
+            return DependentSampleReader(exchange, names, context.takes_efforts).read
+        return input_reader(context.inputs_in_messages, context.takes_efforts)
 
 
 def sample_inputs(
@@ -177,6 +177,7 @@ class SampledCrank(FormulaCrank):
         '_max_lead',
         '_needs_rate',
         '_slides',
+        'efforts',
         'jump',
         'max_age',
         'sample',
@@ -190,6 +191,8 @@ class SampledCrank(FormulaCrank):
     """The newest good sample with rates: its stamp, in [ns], angle, rate, acceleration."""
     jump: float
     """Greatest change from one sample to the next, in [rad] or [m]."""
+    efforts: _Values
+    """Effort in the newest good sample, in [N·m] or [N]; NaN if it has none."""
 
     def __init__(self, use: TopicDrive, needs_rate: bool, *, slides: bool = False) -> None:
         self._carry_forward = use.carry_forward
@@ -204,6 +207,7 @@ class SampledCrank(FormulaCrank):
         """Stamp and angles of the newest good sample."""
         self.sample = None
         self.jump = 0.0
+        self.efforts = _NO_RATE
 
     @property
     def stamp(self) -> int:
@@ -212,7 +216,7 @@ class SampledCrank(FormulaCrank):
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """Take a sample at a time [ns], or return why it is rejected; then nothing changes."""
-        stamp, angles, rates, _ = sample
+        stamp, angles, rates, _, efforts = sample
         if rates is None:
             rates = _NO_RATE
         complete = -LARGEST <= angles[0] <= LARGEST and -LARGEST <= rates[0] <= LARGEST
@@ -231,6 +235,7 @@ class SampledCrank(FormulaCrank):
             jump = abs(angles[0] - last[0])
             if jump > self.jump:
                 self.jump = jump
+        self.efforts = efforts or _NO_RATE
         if not complete:
             known = self._mean_rate(stamp, angles[0]) if self._needs_rate else _ZERO
             if known is None:
@@ -337,18 +342,23 @@ class SampledInputs(FormulaCrank):
         return None if state is None else (self.stamp, *state[:3])
 
     @property
+    def efforts(self) -> _Values:
+        """Effort of each input in its newest good sample, in [N·m] or [N]; NaN if it has none."""
+        return tuple([crank.efforts[0] for crank in self._cranks])
+
+    @property
     def jump(self) -> float:
         """Greatest change of the first input from one sample to the next, in [rad] or [m]."""
         return self._cranks[0].jump
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """Take a sample at a time [ns]; or return why no input takes it: then nothing changes."""
-        stamp, angles, rates, named = sample
+        stamp, angles, rates, named, efforts = sample
         indices = [index for index in range(len(angles)) if named >> index & 1]
         self._newest_inputs = ()
         parts = [
-            CrankSample(stamp, (angles[index],), None if rates is None else (rates[index],))
-            for index in indices
+            CrankSample(stamp, (angles[i],), rates and (rates[i],), 1, efforts and (efforts[i],))
+            for i in indices
         ]
         for part in parts:
             why = _find_rejection(part.angles, part.rates or _NO_RATE)

@@ -109,6 +109,16 @@ class Effect(ABC):
     after: ClassVar[str] = ''
     sample: ClassVar[str] = '{}'
 
+    @property
+    def computes_forces(self) -> bool:
+        """Return whether masses, loads and friction matter to it with these parameters."""
+        return self.needs_forces
+
+    @property
+    def takes_efforts(self) -> bool:
+        """Return whether it starts from efforts in the samples of the drive."""
+        return False
+
     def needs_here(self, _named: Collection[str], *, moves_by_rates: bool) -> tuple[str, ...]:
         """Return the effects that it starts from, beside the named ones of its scene."""
         return self.needs

@@ -28,6 +28,10 @@ the effort of that drive is for its own inertia only: drive_inertia·φ̈, with 
 
 At a toggle neither rates nor efforts exist.
 
+With ``measured`` masses and loads play no part: the efforts are those in the samples of the
+inputs, or those that do the same work as efforts in samples of other joints, and ``joints`` have
+the efforts to which these come there. See `linkage_ros.kinematics.analysis.carried_efforts`.
+
 `pin_forces`: forces between the links of a linkage in their joints.
 
 They are computed for the rigid linkage, by Newton's and Euler's equations of every link; see
@@ -45,10 +49,12 @@ message.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from linkage_ros.description import flag, name_or_names
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import all_finite, PlanarClosure
+from linkage_ros.kinematics import all_finite, CarriedEfforts, PlanarClosure
 from linkage_ros.stages.drives import Context, CrankAtRest, CrankBehindPlay
 from linkage_ros.stages.effects.effect import MechanismEffect, MessageEffect
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stage, Writer
@@ -57,6 +63,16 @@ from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Stag
 @dataclass(frozen=True, slots=True)
 class EffortEffect(MechanismEffect):
     """Effort of the drive, in JointState.effort of the input where that is published."""
+
+    measured: bool = flag(
+        'efforts are those in the samples of the drive topic, not those for masses and loads',
+        False,
+    )
+    joints: tuple[str, ...] = name_or_names(
+        'with measured, as many joints as there are inputs, at which the efforts of the inputs '
+        'are published, too, as those that do the same work; absent, the joints of the samples',
+        'a joint',
+    )
 
     needs = ('acceleration',)
     needs_forces = True
@@ -67,8 +83,24 @@ class EffortEffect(MechanismEffect):
         'set publish_input: true, or name pin_forces',
     )
 
+    @property
+    def computes_forces(self) -> bool:
+        """Return whether masses, loads and friction matter to it with these parameters."""
+        return not self.measured
+
+    @property
+    def takes_efforts(self) -> bool:
+        """Return whether it starts from efforts in the samples of the drive."""
+        return self.measured
+
     def stage(self, context: Context) -> Stage:
-        """Build the stage."""
+        """Build the stage; raise `DefinitionError` if the joints do not fit."""
+        if self.measured:
+            return _measured_effort_stage(self.joints, context)
+        if self.joints:
+            raise DefinitionError(
+                'effects.effort.joints', 'has no effort to start from', 'add measured: true'
+            )
         efforts_of = context.mechanics.drive_efforts
         if context.friction and context.friction.load_dependent_joint:
             efforts_of = context.reactions.drive_efforts
@@ -137,6 +169,38 @@ class PinForcesEffect(MechanismEffect, MessageEffect):
             return write(now, [found[n] for n in forces.published_joints]) if found else b''
 
         return write_certain
+
+
+def _measured_effort_stage(named: Sequence[str], context: Context) -> Stage:
+    """Return the stage for efforts in samples."""
+    closure = context.closure
+    published, inputs = closure.joint_names, closure.input_names
+    count = len(inputs)
+    if not named and {*context.instead_of_inputs} <= {*published}:
+        named = context.instead_of_inputs
+    carried = None
+    if named:
+        try:
+            carried = CarriedEfforts(closure, inputs, named)
+        except DefinitionError as error:
+            raise DefinitionError(
+                'effects.effort.joints', f'{error.where}: {error.reason}', error.remedy
+            ) from None
+
+    def measured_effort(motion: MechanismState) -> MechanismState:
+        efforts = motion.given[-count:]
+        if not (motion.position.status.has_rates and all_finite(efforts)):
+            return motion
+        at = dict.fromkeys(published, 0.0)
+        if carried is not None:
+            found = carried.carry_from(motion.position, efforts)
+            if not found:
+                return motion
+            at |= dict(zip(named, found, strict=True))
+        at |= dict(zip(inputs, efforts, strict=True))
+        return motion._replace(efforts=tuple([at[name] for name in published]))
+
+    return measured_effort
 
 
 def _at_rest(effort: Stage) -> Stage:

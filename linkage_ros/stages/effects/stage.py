@@ -41,7 +41,8 @@ class MechanismState(NamedTuple):
         Displacement of the published joints under load, in [rad] or [m]; empty for none.
     given
         What gives the loads that change: the time since the first pose, in [s], and the numbers
-        of the wrenches; empty without such loads.
+        of the wrenches; then the efforts of the inputs in the samples, if these are wanted, NaN
+        where there are none; else empty.
 
     """
 

@@ -137,7 +137,7 @@ def leave_out(scene: Scene, names: frozenset[str]) -> Scene:
 def _without_effects(scene_linkage: SceneLinkage, names: frozenset[str]) -> SceneLinkage:
     effects = {name: own for name, own in scene_linkage.effects.items() if name not in names}
     has_forces = scene_linkage.drive[1].gives_torque or any(
-        each.needs_forces for each in effects.values()
+        each.computes_forces for each in effects.values()
     )
     return replace(
         scene_linkage, effects=effects, loads=scene_linkage.loads if has_forces else None
