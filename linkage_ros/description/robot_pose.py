@@ -15,6 +15,7 @@ changes. So is a pose sought in which they close (the method of Levenberg and Ma
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import chain, product
 from math import atan2, hypot, remainder, tau
 from random import Random
@@ -355,6 +356,7 @@ def roll_pitch_yaw(x: Vector, y: Vector, z: Vector) -> Vector:
     return atan2(y[2], z[2]), pitch, atan2(x[1], x[0])
 
 
+@lru_cache(1024)
 def frame_of(xyz: Vector, rpy: Vector) -> SpaceFrame:
     """Return the frame of an origin of a URDF: roll, pitch and yaw about fixed axes."""
     x, y, z = GROUND_FRAME[:3]

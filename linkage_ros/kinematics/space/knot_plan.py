@@ -133,15 +133,20 @@ class KnotPlanner:
         """Return the smallest set of joints that closes; None if there is none."""
         rods = [(rod, self._unknown_joints(rod)) for rod in self._find_rods()]
         rods = [(rod, joints) for rod, joints in rods if joints]
+        names = sorted(frozenset().union(*(joints for _, joints in rods)))
+        slopes = [self._slopes(rod, names) for rod, _ in rods]
         supports = list(dict.fromkeys(joints for _, joints in rods))
         number = count()
         waiting = [(len(joints), next(number), joints) for joints in sorted(supports, key=len)]
         seen = set(supports)
         while waiting:
             size, _, joints = heappop(waiting)
-            chosen = self._independent_rods([rod for rod, own in rods if own <= joints], joints)
-            if len(chosen) == size:
-                return self._make_plan(joints, chosen)
+            own = [number for number, (_, moved) in enumerate(rods) if moved <= joints]
+            columns = [number for number, name in enumerate(names) if name in joints]
+            if len(own) >= size:
+                chosen = _independent_rows([[slopes[n][k] for k in columns] for n in own])
+                if len(chosen) == size:
+                    return self._make_plan(joints, [rods[own[n]][0] for n in sorted(chosen)])
             for other in supports:
                 union = joints | other
                 if other & joints and union not in seen and len(seen) < _MOST_SETS:
@@ -184,6 +189,16 @@ class KnotPlanner:
         names = (self._tree[link][0] for end in rod[:2] for link in self._chain(end.link))
         return frozenset(name for name in names if name not in self._plan.coordinates)
 
+    def _count_unknown(self, link: str) -> int:
+        """Return how many unknown joints a link of the tree depends on."""
+        coordinates = self._plan.coordinates
+        return sum(self._tree[one][0] not in coordinates for one in self._chain(link))
+
+    def _tells(self, rod: PlannedRod) -> bool:
+        """Return whether unknown joints change the length of a rod in the pose."""
+        slopes = self._slopes(rod, sorted(self._unknown_joints(rod)))
+        return max(map(abs, slopes), default=0.0) > _INDEPENDENT
+
     def _find_rods(self) -> Iterator[PlannedRod]:
         """Yield what closes the tree, in the order of the file."""
         plan = self._plan
@@ -197,10 +212,14 @@ class KnotPlanner:
                     beside, at = PlannedEnd(start, point, axis), PlannedEnd(link, point, ZERO)
                     yield PlannedRod(beside, at, Rod(1.0), f'ball {point}')
         for link in self._linkage.link_names:
-            if link not in plan.frames and link not in self._tree:
-                for one, other in combinations(plan.carried[link], 2):
-                    size = dist(plan.places[one], plan.places[other])
-                    yield from self._rod_between(one, other, Rod(size), link)
+            for one, other in (
+                combinations(plan.carried[link], 2) if link not in plan.frames else ()
+            ):
+                size = dist(plan.places[one], plan.places[other])
+                for found in self._rod_between(one, other, Rod(size), link, (link,)):
+                    # A link of the tree is a rod past it only where other joints meet its points.
+                    if link not in self._tree or self._tells(found):
+                        yield found
         for name, points in self._linkage.struts.items():
             if name in plan.coordinates:
                 one, other = (plan.same[point] for point in points)
@@ -220,31 +239,10 @@ class KnotPlanner:
             carriers = self._plan.carriers[point]
             links = [link for link in carriers if link in self._tree and link not in sides]
             if self._plan.is_known(point) or links:
-                link = '' if self._plan.is_known(point) else links[0]
+                link = '' if self._plan.is_known(point) else min(links, key=self._count_unknown)
                 ends.append(PlannedEnd(link, point, ZERO))
         if len(ends) == 2:
             yield PlannedRod(ends[0], ends[1], rod, f'{by} from {one} to {other}')
-
-    def _independent_rods(
-        self, rods: list[PlannedRod], joints: frozenset[str]
-    ) -> list[PlannedRod]:
-        """Return rods that are independent in the pose; each time the one that tells most."""
-        names = sorted(joints)
-        rows = [self._slopes(rod, names) for rod in rods]
-        chosen: set[int] = set()
-        while len(chosen) < min(len(names), len(rods)):
-            best, pivot = _INDEPENDENT, -1
-            for number, row in enumerate(rows):
-                if number not in chosen and (size := _inner(row, row) ** 0.5) > best + _BETTER:
-                    best, pivot = size, number
-            if pivot < 0:
-                break
-            chosen.add(pivot)
-            unit = [each / best for each in rows[pivot]]
-            rows = [
-                [a - _inner(row, unit) * b for a, b in zip(row, unit, strict=True)] for row in rows
-            ]
-        return [rod for number, rod in enumerate(rods) if number in chosen]
 
     def _slopes(self, rod: PlannedRod, names: list[str]) -> list[float]:
         """Return the slopes of a rod's length by joints, in the pose."""
@@ -263,5 +261,19 @@ class KnotPlanner:
         return list(found.values())
 
 
-def _inner(one: list[float], other: list[float]) -> float:
-    return sum(a * b for a, b in zip(one, other, strict=True))
+def _independent_rows(rows: list[list[float]]) -> set[int]:
+    """Return the numbers of rows that are independent; each time the one that tells most."""
+    import numpy as np  # local import: few linkages have knots
+
+    left, chosen = np.array(rows), set[int]()
+    while len(chosen) < min(left.shape):
+        best, pivot = _INDEPENDENT, -1
+        for number, size in enumerate(np.sqrt((left * left).sum(axis=1)).tolist()):
+            if number not in chosen and size > best + _BETTER:
+                best, pivot = size, number
+        if pivot < 0:
+            break
+        chosen.add(pivot)
+        unit = left[pivot] / best
+        left = left - (left * unit).sum(axis=1)[:, None] * unit
+    return chosen
