@@ -86,10 +86,10 @@ _ROUNDED_VALUE = 1e-12
 """Rounding of a joint that loops move, in [rad] or relative to the size."""
 
 _MOST_JOINTS, _MOST_LOOPS = 100, 20
-"""Most joints in loops, and most loops: a pose is sought in seconds."""
+"""Most joints and loops that move together: a pose is sought in seconds."""
 
 _NEAR_ZERO, _MOST_TOLD = 1e-9, 6
-"""Least value of a joint that a remedy tells, and the most joints."""
+"""Least value of a joint that a remedy tells, and the most joints or sets of inputs."""
 
 _MOST_TRIED = 20
 """Most choices of mimics that are tried."""
@@ -133,24 +133,30 @@ def read_robot_closure(
     slides = [joint.name for joint in urdf.joints.values() if joint.kind == 'prismatic']
     given = read_parameters(content, ROBOT, {'slide': slides})
 
-    def close(without: Sequence[str]) -> Closure:
+    def close(robot: _Robot, without: Sequence[str]) -> Closure:
         linkage = robot.linkage(publish_inputs, without)
         closure = closure_as_drawn(linkage, name, publish_model_joints=publish_model_joints)
         check_limits(closure)
         return closure
 
+    robot: _Robot | None = None
     try:
         robot = _Robot(urdf, given['input'], given['at'], given['close'], given['near'])
+        robot.check_driven()
         errors: list[DefinitionError] = []
         for without in robot.needless_choices(publish_inputs):
             try:
-                return close(without)
+                return close(robot, without)
             except DefinitionError as error:  # noqa: PERF203
                 errors.append(error)
         # The first is without all; the next the likeliest of as many as are needed.
         raise errors[:2][-1]
     except DefinitionError as error:
         section, _, part = error.where.partition('.')
+        if section == 'input' and robot and not given['input'] and (sets := robot.input_sets()):
+            written = [' '.join(f'--input {name}' for name in names) for names in sets]
+            remedy = f'write {", or ".join(written)}; in a scene input: [{", ".join(sets[0])}]'
+            raise content.error('', error.reason, remedy) from None
         if section in ('input', 'at', 'close', 'pose'):
             key = 'at' if section == 'pose' else section
             where = key if key in content else ''
@@ -206,7 +212,7 @@ class _Robot:
         """Joints that follow others in loops, which may move them as well."""
         kept, known = (set().union(*(one for one, _ in of)) for of in (chosen, groups))
         self._moving = [name for name in moving if name in kept]
-        self._check(moving, known, kept, told)
+        self._check(moving, known, chosen, told)
         children = {urdf.joints[name].child for name in self._moving}
         mounts = {tree.body(urdf.joints[name].parent) for name in self._moving} - children
         tree.mount = mounts.pop() if len(mounts) == 1 else urdf.root
@@ -237,7 +243,11 @@ class _Robot:
         return {joint.name for joint in chain(*ways) if joint.kind != 'fixed'}
 
     def _check(
-        self, moving: list[str], known: set[str], kept: set[str], told: Mapping[str, float]
+        self,
+        moving: list[str],
+        known: set[str],
+        chosen: Sequence[tuple[set[str], list[UrdfLoop]]],
+        told: Mapping[str, float],
     ) -> None:
         """Refuse names of no joint, inputs in no loop, and what cannot be in a loop."""
         if not known:
@@ -251,31 +261,55 @@ class _Robot:
             if name not in moving:
                 remedy = did_you_mean(name, moving, f'name one of {list_names(moving)}')
                 raise DefinitionError(key, f'there is no moving joint {quote(name)}', remedy)
-        for name in self._driven or ('',):
+        for name in self._driven:
             if name not in known:
-                reason = 'the robot does not say which joint drives it'
                 remedy = f'name one of {list_names(name for name in moving if name in known)}'
-                if name:
-                    reason = f'{quote(name)} is in no loop'
-                else:
-                    remedy += ': input: JOINT in a scene, --input JOINT'
-                raise DefinitionError('input', reason, remedy)
+                raise DefinitionError('input', f'{quote(name)} is in no loop', remedy)
             if name in self._ratios and name not in self._needless:
                 leaders = list_names(map(quote, self._ratios[name].terms))
                 reason = f'{quote(name)} follows {leaders}'
                 raise DefinitionError('input', reason, f'drive {leaders}')
-        if len(kept) > _MOST_JOINTS or len(self._loops) > _MOST_LOOPS:
-            reason = f'has {len(kept)} joints in {len(self._loops)} loops that move together'
-            raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
+        for names, loops in chosen:
+            if len(names) > _MOST_JOINTS or len(loops) > _MOST_LOOPS:
+                reason = f'has {len(names)} joints in {len(loops)} loops that move together'
+                raise self._error('', reason, f'keep {_MOST_JOINTS} and {_MOST_LOOPS} at most')
         for loop in self._loops:
             if loop.kind not in (*LOOP_KINDS.values(), LINE):
                 reason = f'{quote(loop.kind)} is not a type of loop'
                 remedy = f'write one of {list_names(filter(None, LOOP_KINDS))}'
                 raise self._error(f'loop {loop.name}', reason, remedy)
-        for joint in map(self._urdf.joints.__getitem__, kept):
+        for joint in (self._urdf.joints[name] for names, _ in chosen for name in names):
             if joint.kind not in MOVING:
                 reason, remedy = f'type {joint.kind} cannot be in a loop', list_names(MOVING)
                 raise self._error(f'joint {joint.name}', reason, f'write {remedy} or fixed')
+
+    def check_driven(self) -> None:
+        """Refuse a robot of which nothing says what drives it."""
+        if not self._driven:
+            reason = 'the robot does not say which joint drives it'
+            remedy = f'name one of {list_names(self._moving)}: input: JOINT in a scene, '
+            raise DefinitionError('input', reason, f'{remedy}--input JOINT')
+
+    def input_sets(self) -> list[tuple[str, ...]]:
+        """
+        Return sets of joints that could drive it; none where there are too many.
+
+        They are those of fewest kinds of motors, as the limits of effort and rate tell them.
+        """
+        from linkage_ros.kinematics import find_input_sets  # local import: it loads numpy
+
+        joints = self._urdf.joints
+        limits = {name: joints[name].limits for name in self._moving if name not in self._ratios}
+        names = [name for name, of in limits.items() if min(of.effort, of.velocity) < inf]
+        names = names or [*limits]
+        try:
+            linkage = self.linkage(False, self._needless, tuple(names))
+        except DefinitionError:
+            return []
+        found = find_input_sets(linkage, CarriedPoints(linkage, unit_of(linkage)), names)
+        kinds = [len({(limits[k].effort, limits[k].velocity) for k in one}) for one in found]
+        least = [one for one, count in zip(found, kinds, strict=True) if count == min(kinds)]
+        return least if len(least) <= _MOST_TOLD else []
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)
@@ -387,10 +421,17 @@ class _Robot:
 
     # The linkage
 
-    def linkage(self, publish_inputs: bool, without: Sequence[str]) -> SpaceLinkage:
-        """Return the linkage in the pose, in which its loops close, without some ratios."""
+    def linkage(
+        self, publish_inputs: bool, without: Sequence[str], instead: tuple[str, ...] = ()
+    ) -> SpaceLinkage:
+        """
+        Return the linkage in the pose, in which its loops close, without some ratios.
+
+        It has other inputs if these are given ``instead``.
+        """
+        driven = instead or self._driven
         ratios = {name: of for name, of in self._ratios.items() if name not in without}
-        free = [name for name in self._moving if name not in (*self._driven, *ratios)]
+        free = [name for name in self._moving if name not in (*driven, *ratios)]
         told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
         pose = self._pose
         values = pose.move(told, {}, self._ratios)
@@ -405,7 +446,7 @@ class _Robot:
             (open_by, 'm', _MET * pose.size), (turned_by, 'rad', _MET),
         ):  # fmt: skip
             if apart > most or (self._near and not pose.is_within_limits(values)):
-                near = pose.find_near(values, self._driven, ratios)
+                near = pose.find_near(values, driven, ratios)
                 if near is None or not self._near:
                     reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
                     raise DefinitionError('at', reason, self._remedy_of(near, ratios))
@@ -437,14 +478,14 @@ class _Robot:
         for loop in self._loops:
             self._add_loop(loop, [on[end.link] for end in loop.ends], frames, made)
         traced = tuple(self._add_traced(on, frames, made))
-        published = [k for k in self._moving if k in found and k not in self._driven]
+        published = [k for k in self._moving if k in found and k not in driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
         left_out += [f'mimic of {name}' for name in without]
         linkage = SpaceLinkage(
             *made,
             struts={},
-            driven=self._driven,
-            published=(*(self._driven if publish_inputs else ()), *published),
+            driven=driven,
+            published=(*(driven if publish_inputs else ()), *published),
             ratios={name: of for name, of in ratios.items() if name in found},
             traced=traced,
             left_out=(*left_out, *(f'{tag} (not read)' for tag in self._urdf.unread)),

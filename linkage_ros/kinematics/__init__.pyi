@@ -200,6 +200,7 @@ from linkage_ros.kinematics.space.closure import (
 from linkage_ros.kinematics.space.freedom import (
     balls_of as balls_of,
     find_freedom as find_freedom,
+    find_input_sets as find_input_sets,
     Freedom as Freedom,
 )
 from linkage_ros.kinematics.space.linkage import (

@@ -360,7 +360,7 @@ def test_what_is_no_linkage(name):
 @pytest.mark.parametrize(
     ('told', 'line'),
     [
-        ({}, 'r.urdf: the robot does not say which joint drives it; name one of j, k: .*'),
+        ({}, 'r.urdf: the robot does not say which joint drives it; write --input j; .*'),
         ({'input': 'k'}, "r.urdf: input: 'k' follows 'j'; drive 'j'"),
     ],
 )
@@ -372,7 +372,7 @@ def test_what_joints_that_mimic_follow_has_to_be_said(told, line):
 
 
 def test_what_drives_it_has_to_be_said():
-    with pytest.raises(FileError, match='which joint drives it; name one of motor_joint, bar_j'):
+    with pytest.raises(FileError, match='drives it; write --input motor_joint, or --input bar_j'):
         gripper(input=[])
     with pytest.raises(FileError, match="no moving joint 'motor'; did you mean 'motor_joint'"):
         gripper(input='motor')

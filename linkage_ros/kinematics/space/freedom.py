@@ -16,7 +16,9 @@ if its dimensions meet them everywhere.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from math import comb
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, list_names
@@ -36,6 +38,9 @@ _ROUNDED = 1e-4
 
 _MOVES = 1e-7
 """Motions of links above this are none of rounding."""
+
+_MOST_SETS = 5000
+"""Most sets of inputs that are tried."""
 
 
 class Freedom(NamedTuple):
@@ -159,6 +164,28 @@ def find_freedom(linkage: SpaceLinkage, carried: CarriedPoints) -> Freedom:
     # Rounded dimensions miss redundant equations: then the range decides whether they are met.
     exact, rounded = judge(_RANK), judge(_ROUNDED)
     return rounded if exact.dependent and not (rounded.free or rounded.dependent) else exact
+
+
+def find_input_sets(
+    linkage: SpaceLinkage, carried: CarriedPoints, names: Sequence[str]
+) -> list[tuple[str, ...]]:
+    """
+    Return the sets of joints, of these names, that would move all of a linkage as its inputs.
+
+    The inputs that it has do not matter. Of more than `_MOST_SETS` sets none is returned.
+    """
+    equations = _MotionEquations(linkage, carried)
+    values, rows = np.linalg.svd(_least_rows(equations.constraints))[1:]
+    rank, motions = _rank_and_motions(values, rows, _ROUNDED)
+    mobility = equations.size - rank - len(carried.rods)
+    if not 0 < mobility <= len(names) or comb(len(names), mobility) > _MOST_SETS:
+        return []
+    rates = np.vstack([_without_unit(equations.rate(name)) for name in names]) @ motions
+    return [
+        tuple(names[number] for number in chosen)
+        for chosen in combinations(range(len(names)), mobility)
+        if np.linalg.svd(rates[[*chosen]], compute_uv=False)[-1] > _ROUNDED
+    ]
 
 
 def check_freedom(linkage: SpaceLinkage, plan: SpacePlan, freedom: Freedom) -> None:
