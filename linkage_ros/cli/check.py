@@ -40,6 +40,7 @@ from linkage_ros.kinematics import (
     conditioning_curves,
     Driven,
     Dyad,
+    find_reached_values,
     find_standing_state,
     find_worst_states,
     four_bars,
@@ -122,7 +123,7 @@ def _describe_linkage(
     rows = [(number, *one) for number, one in enumerate(groups, 1)]
     tables = [Table('Solved in this order', _ORDER, rows, 'groups')]
     # Most of the time goes by here.
-    parts += [_examine_reach, _examine_states, _examine_joints, assemblies]
+    parts += [_examine_reach, _map_limits, _examine_states, _examine_joints, assemblies]
     parts += [_transmission_table, _conditioning_table]
     for index, part in enumerate(parts):
         advance(index, len(parts))
@@ -235,6 +236,13 @@ def _examine_reach(closure: Closure, sweep: InputSweep | None) -> dict[str, Any]
             for singular in closure.singular_inputs
         ],
     }
+
+
+def _map_limits(closure: Closure, _sweep: InputSweep | None) -> dict[str, Any]:
+    """Return what is reached within limits of other joints."""
+    joints = closure.linkage.named_joints
+    found = find_reached_values(closure)
+    return {'reached': [one._asdict() | {'unit': joints[one.joint].unit} for one in found]}
 
 
 def _is_reached(sweep: InputSweep, value: float) -> bool:

@@ -103,6 +103,11 @@ def _reach_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tu
     """Yield the limits, the range, its singular places and the worst residual."""
     for limits in account['limits']:
         yield 'limits', f'{limits["joint"]}: {_limits_text(limits, units)}'
+    for one in account['reached']:
+        low, high = (units.value_text(one[end], one['unit'] == 'rad') for end in ('low', 'high'))
+        closing = '' if one['closes'] else ', where the loops close'
+        within = f'within the limits of {", ".join(one["within"])}{closing}'
+        yield 'reached', f'{one["joint"]}: {low} to {high}, {within}'
     yield from _range_facts(account, units)
     worst = account['worst_residual']
     if worst is None:

@@ -43,6 +43,9 @@ from linkage_ros.kinematics.analysis.ranges import (
     link_lengths as link_lengths,
     sample_inputs as sample_inputs,
 )
+from linkage_ros.kinematics.analysis.reached_values import (
+    find_reached_values as find_reached_values,
+)
 from linkage_ros.kinematics.analysis.searched_inputs import search_inputs as search_inputs
 from linkage_ros.kinematics.analysis.shapes import (
     bar_size as bar_size,

@@ -103,7 +103,7 @@ class CarriedEfforts:
         count = len(self._given)
         efforts = [of * unit for of, (_, unit) in zip(numbers, self._given, strict=False)]
         width = (len(numbers) - count) // len(self._inputs)
-        rows = [numbers[first : first + width] for first in range(count, len(numbers), width)]
+        rows = [*zip(*[iter(numbers[count:])] * width, strict=True)]
         slopes = [row[:count] for row in rows]
         if max(map(abs, chain.from_iterable(slopes))) > _MOST:
             return None
@@ -115,7 +115,8 @@ class CarriedEfforts:
                 return None
             if inverse is None or not all(abs(entry) <= _MOST for entry in inverse[0]):
                 return None
-            found = [sum(map(mul, found, inverse[0][k :: len(rows)])) for k in range(len(rows))]
+            n = len(rows)
+            found = [sum(map(mul, found, inverse[0][k::n])) for k in range(n)]
         return tuple(of / unit for of, (_, unit) in zip(found, self._wanted, strict=True))
 
 
