@@ -12,8 +12,6 @@
 from linkage_ros.dynamics.applied import AppliedForces as AppliedForces
 from linkage_ros.dynamics.dry_friction import settle_forces as settle_forces
 from linkage_ros.dynamics.equation import (
-    InputLawTerm as InputLawTerm,
-    InputTerms as InputTerms,
     Mechanics as Mechanics,
     Terms as Terms,
 )
@@ -52,7 +50,7 @@ from linkage_ros.dynamics.motion import (
     Motion as Motion,
     SingleDofMechanism as SingleDofMechanism,
 )
-from linkage_ros.dynamics.motor import Motor as Motor, MotorLaw as MotorLaw
+from linkage_ros.dynamics.motor import Motor as Motor
 from linkage_ros.dynamics.reactions import (
     JointReaction as JointReaction,
     Reactions as Reactions,
@@ -60,6 +58,11 @@ from linkage_ros.dynamics.reactions import (
 from linkage_ros.dynamics.several_freedoms import (
     InputVector as InputVector,
     SeveralDofMechanism as SeveralDofMechanism,
+)
+from linkage_ros.dynamics.several_motors import (
+    InputMotors as InputMotors,
+    InputWindings as InputWindings,
+    motors_of as motors_of,
 )
 from linkage_ros.dynamics.two_masses import TwoMasses as TwoMasses
 from linkage_ros.dynamics.winding import Winding as Winding

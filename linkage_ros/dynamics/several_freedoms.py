@@ -406,7 +406,7 @@ class SeveralDofMechanism:
         parts = _solve_coupled(rows, moved, [slips[j].rate for j in piece.sticking])
         for way, part in zip(moved, parts, strict=True):
             rate -= part * way
-        return rate
+        return self._without_braked(rate, piece)
 
     def _law_segments(
         self, motion: SeveralMotion, force: InputVector, now: float
@@ -474,7 +474,17 @@ class SeveralDofMechanism:
         if piece.sticking and len(piece.sticking) + len(piece.held) >= len(rate):
             return InputVector([0.0] * len(rate))
         force = self._total_force(terms, rate, time, piece)
-        return self._free_acceleration(terms, force, piece)
+        found = self._free_acceleration(terms, force, piece)
+        return found if found is None else self._without_braked(found, piece)
+
+    def _without_braked(self, change: InputVector, piece: _Piece) -> InputVector:
+        """Return rates or accelerations of which those are 0, not nearly, that a brake holds."""
+        first = len(self.frictions)
+        if not piece.brakes or not piece.sticking:
+            return change
+        return InputVector(
+            [0.0 if piece.senses.get(first + n) == 0.0 else part for n, part in enumerate(change)]
+        )
 
     def _move(self, terms: InputTerms, force: InputVector, piece: _Piece) -> InputVector:
         """Return q̈ under a force alone; 0 where there is none."""

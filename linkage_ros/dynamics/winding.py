@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import expm1, inf, sqrt
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from linkage_ros.dynamics.longest_step import check_step
 from linkage_ros.dynamics.motor import Motor
@@ -43,6 +43,8 @@ class Winding:
     supply: float  # U, in [V]
     # What is commanded: 'effort' in [N·m] or [N], 'current' in [A], or 'voltage' in [V].
     command: str
+    idle: ClassVar[float] = 0.0
+    """The current at the first tick, in [A]."""
 
     @property
     def ratio(self) -> float:
@@ -63,14 +65,17 @@ class Winding:
 
     def torque(self, _mechanism: WoundMechanism, motion: WoundMotion) -> float:
         """Return the torque before the gear, in [N·m]."""
-        return self.motor.constant * motion.current
+        current: float = motion.current
+        return self.motor.constant * current
 
     def at_rest(self, _mechanism: WoundMechanism, motion: WoundMotion) -> tuple[float, float]:
         """Return the effort at rest, and what the gear holds."""
         law = self.motor.effort_law(motion.current)
         return law.resting, law.holding
 
-    def check_step(self, inertia: float, method: str, step: float) -> None:
+    def check_step(
+        self, inertia: float, method: str, step: float, key: str = 'drive.torque.motor'
+    ) -> None:
         """
         Refuse a motor whose current, alone or with the rate, is too fast for the integration.
 
@@ -79,7 +84,7 @@ class Winding:
         motor = self.motor
         if motor.resistance and self.inductance / motor.resistance < step:
             raise DefinitionError(
-                'drive.torque.motor.inductance',
+                f'{key}.inductance',
                 f'the current changes within {self.inductance / motor.resistance:.3g} s, and a '
                 f'step is {step:g} s',
                 'leave it out, so that the current follows at once, or write a shorter step',
@@ -88,7 +93,7 @@ class Winding:
         swings = coupling / sqrt(self.inductance)
         slows = coupling**2 / motor.resistance if motor.resistance else inf
         check_step(
-            'drive.torque.motor',
+            key,
             min(swings, slows),
             method,
             step,
@@ -124,20 +129,20 @@ class Winding:
 
 
 class WoundMotion(NamedTuple):
-    """A state of a mechanism and of the current that drives it."""
+    """A state of a mechanism and of the current that drives it; of several inputs one of each."""
 
     moved: Any  # The state of the mechanism
-    current: float  # The current in the winding, in [A]
+    current: Any  # The current in the winding, in [A]
 
     @property
-    def value(self) -> float:
+    def value(self) -> Any:
         """Return the input's value, in [rad] or [m]."""
-        return float(self.moved.value)
+        return self.moved.value
 
     @property
-    def rate(self) -> float:
+    def rate(self) -> Any:
         """Return the input's rate, in [rad/s] or [m/s]."""
-        return float(self.moved.rate)
+        return self.moved.rate
 
     @property
     def motor(self) -> Any:
@@ -147,44 +152,36 @@ class WoundMotion(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class WoundMechanism:
-    """A mechanism that is driven by the current in a winding."""
+    """A mechanism that is driven by the current in a winding; of several inputs in one of each."""
 
     mechanism: Any  # What moves, with its motor
-    winding: Winding  # The winding
-    command: float | None = None  # The command, in [A] or [V]; None if there is none
+    winding: Any  # The winding
+    command: Any = None  # The command, in [A] or [V]; None if there is none
 
     @property
-    def stops(self) -> tuple[float, float]:
+    def stops(self) -> Any:
         """Lower and upper stop of the input, in [rad] or [m]."""
-        low, high = self.mechanism.stops
-        return low, high
+        return self.mechanism.stops
 
-    def state_at(self, value: float, rate: float) -> WoundMotion | None:
+    def state_at(self, value: Any, rate: Any) -> WoundMotion | None:
         """Return a state without a current, or None if there is none."""
         moved = self.mechanism.state_at(value, rate)
-        return None if moved is None else WoundMotion(moved, 0.0)
+        return None if moved is None else WoundMotion(moved, self.winding.idle)
 
-    def acceleration(
-        self, motion: WoundMotion, force: float, brake: float = 0.0, time: float = 0.0
-    ) -> float:
+    def acceleration(self, motion: WoundMotion, force: Any, brake: Any, time: float = 0.0) -> Any:
         """Return q̈; the parameters are as in `SingleDofMechanism.advance`."""
-        under, _, holding = self.winding.motor.drive_by(self.mechanism, motion.current)
-        return float(under.acceleration(motion.moved, force, brake + holding, time))
+        under, push, holding = self.winding.motor.drive_by(self.mechanism, motion.current)
+        return under.acceleration(motion.moved, force + push, brake + holding, time)
 
     def advance(
-        self,
-        motion: WoundMotion,
-        seconds: float,
-        force: float,
-        brake: float = 0.0,
-        time: float = 0.0,
+        self, motion: WoundMotion, seconds: float, force: Any, brake: Any, time: float = 0.0
     ) -> WoundMotion:
         """Advance a state by one step; the parameters are as in `SingleDofMechanism.advance`."""
         current_after, half = self.winding.current_after, 0.5 * seconds
         current = current_after(motion.current, motion.motor.rate, self.command, half)
-        under, _, holding = self.winding.motor.drive_by(self.mechanism, current)
+        under, push, holding = self.winding.motor.drive_by(self.mechanism, current)
         moved = WoundMotion(
-            under.advance(motion.moved, seconds, force, brake + holding, time), current
+            under.advance(motion.moved, seconds, force + push, brake + holding, time), current
         )
         current = current_after(current, moved.motor.rate, self.command, half)
         return moved._replace(current=current)

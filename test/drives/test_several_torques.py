@@ -198,14 +198,6 @@ def test_an_input_at_its_stop_shows_its_command():
 
 REFUSED = {
     'play': ({'play': PlayParameters(0.1, 0.1)}, 'drive.torque.play: is for one input'),
-    'gear': (
-        {'motor': MotorParameters(0.05, efficiency=0.8)},
-        'drive.torque.motor: the friction of its gear is for one input',
-    ),
-    'delay': (
-        {'motor': MotorParameters(0.05, delay=0.01)},
-        'drive.torque.motor.delay: is for one input',
-    ),
     'stiff motor': (
         {'motor': MotorParameters(50.0, resistance=1e-3, command='voltage')},
         'drive.torque.motor: it follows its voltage too fast',

@@ -15,68 +15,65 @@ valid for the same time from its own arrival.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from bisect import insort
+from collections.abc import Sequence
 from math import isfinite
+from operator import itemgetter
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.dynamics import InputLawTerm, InputTerms, InputVector, LARGEST, MotorLaw
-from linkage_ros.messages import EffortsCommand, Rejection
+from linkage_ros.dynamics import InputVector, LARGEST
+from linkage_ros.messages import EffortsCommand, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import CrankAtRest, CrankState
 from linkage_ros.stages.drives.torque_crank import NEVER, TorqueCrank
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import HeldWrench, Motor, SeveralDofMechanism
-
-Equation = Callable[[Sequence[float], Sequence[float]], InputTerms | None]
+    from linkage_ros.dynamics import HeldWrench, InputMotors, InputWindings
+    from linkage_ros.stages.drives.torque import TorqueDrive
 
 
 class SeveralTorqueCrank(TorqueCrank):
     """
     A mechanism whose inputs are moved by commanded efforts.
 
-    Commands of an input are clipped to ± its part of ``most_each``, in [N·m] or [N], or for a
-    motor in [A] or [V]. ``use`` has the parameters of the drive. ``motors`` has the motor of each
-    input, with the step to which its command is rounded; None for an input without one.
+    ``motors`` are mounted on the mechanism. ``uses`` has the parameters of the drive for each
+    input. Commands of an input are clipped to ± its part of ``most_each``, in [N·m] or [N], or for
+    a motor in [A] or [V].
     """
 
     __slots__ = (
         '_brake',
         '_commands',
+        '_delays',
         '_most_each',
         '_motors',
         '_newest_inputs',
         '_stamps',
         '_untils',
+        '_uses',
     )
 
     def __init__(
         self,
-        mechanism: SeveralDofMechanism,
+        mechanism: Any,
         start: Any,
-        use: Any,
+        uses: tuple[TorqueDrive, ...],
         period: int,
         most_each: tuple[float, ...],
-        motors: tuple[tuple[Motor, float] | None, ...],
+        motors: InputMotors | InputWindings,
         wrenches: tuple[HeldWrench, ...] = (),
         exerts_effort: bool = False,
     ) -> None:
-        self._motors, self._most_each, self._brake = motors, most_each, use.brake
-        driven = [number for number, motor in enumerate(motors) if motor]
-        if driven:
-            mechanism = replace(
-                mechanism,
-                terms=_with_motors(mechanism.terms, driven),
-                laws=(*mechanism.laws, *(MotorLaw() for _ in driven)),
-            )
-            start = mechanism.state_at(start.value, start.rate)
         super().__init__(
-            mechanism, start, replace(use, motor=None), period,
-            wrenches=wrenches, exerts_effort=exerts_effort,
-        )  # fmt: skip
-        self._commands: list[float | None] = [None] * len(motors)
-        self._untils = [NEVER] * len(motors)
-        self._stamps = [0] * len(motors)
+            mechanism, start, uses[0], period, wrenches=wrenches, exerts_effort=exerts_effort
+        )
+        self._uses, self._motors, self._most_each = uses, motors, most_each
+        self._brake = uses[0].brake
+        self._delays = [round(use.motor.delay * NANOSECONDS) if use.motor else 0 for use in uses]
+        # The commands that wait: when they act, their input, and themselves.
+        self._waiting: Any = []
+        self._commands: list[float | None] = [None] * len(uses)
+        self._untils = [NEVER] * len(uses)
+        self._stamps = [0] * len(uses)
         self._newest_inputs: tuple[int, ...] = ()
         self._acting = self._idle = self._actuation()
 
@@ -106,9 +103,16 @@ class SeveralTorqueCrank(TorqueCrank):
         for number, effort in named:
             most = self._most_each[number]
             self.saturated += not -most <= effort <= most
-            self._commands[number] = min(max(effort, -most), most)
-            self._untils[number] = now + self.max_age
+            clipped = min(max(effort, -most), most)
             self._stamps[number] = now
+            if self._delays[number]:
+                insort(
+                    self._waiting, (now + self._delays[number], number, clipped), key=itemgetter(0)
+                )
+                self._due = self._waiting[0][0]
+            else:
+                self._commands[number] = clipped
+                self._untils[number] = now + self.max_age
         self._newest_inputs = tuple([number for number, _ in named])
         acting = self._actuation()
         if self._time >= 0 and acting != self._acting and now > self._time:
@@ -116,31 +120,42 @@ class SeveralTorqueCrank(TorqueCrank):
         self._acting, self._until = acting, min(self._untils)
         return None
 
+    @property
+    def motors(self) -> Sequence[tuple[float, float, float | None]]:
+        """Angle, rate and torque before the gear of each motor at the last state."""
+        motion, motors = self._shown, self._motors
+        torques = motors.torques(self._acting[0], motion)
+        found = []
+        for use, at in zip(self._uses, motors.drives, strict=True):
+            ratio = use.motor.ratio if use.motor else 1.0
+            found.append((ratio * motion.value[at], ratio * motion.rate[at], torques.get(at)))
+        return found
+
     def _expire(self, end: int) -> None:
         for number, until in enumerate(self._untils):
             if until == end:
                 self._commands[number], self._untils[number] = None, NEVER
         self._acting, self._until = self._actuation(), min(self._untils)
 
-    def _actuation(self) -> tuple[Any, InputVector, tuple[float, ...]]:
+    def _take_due(self, end: int) -> None:
+        _, number, self._commands[number] = self._waiting.pop(0)
+        self._untils[number] = end + self.max_age
+        self._acting, self._until = self._actuation(), min(self._untils)
+
+    def _actuation(self) -> tuple[Any, InputVector, InputVector]:
         """Return mechanism, forces on its inputs and brakes under the commands."""
-        mechanism, forces = self._mechanism, [0.0] * len(self._motors)
-        laws: list[MotorLaw] = []
-        for number, (given, command) in enumerate(zip(self._motors, self._commands, strict=True)):
-            if given is None:
-                forces[number] = command or 0.0
-                continue
-            motor, quantum = given
-            if command is None:
-                laws.append(MotorLaw())
-                continue
-            rounded = round(command / quantum) * quantum if quantum else command
-            laws.append(motor.effort_law(rounded))
-        if laws:
-            others = len(mechanism.laws) - len(laws)
-            mechanism = replace(mechanism, laws=(*mechanism.laws[:others], *laws))
-        brakes = tuple([self._brake if each is None else 0.0 for each in self._commands])
-        return mechanism, InputVector(forces), brakes
+        commands: list[float | None] = []
+        for use, command in zip(self._uses, self._commands, strict=True):
+            quantum = use.motor.quantum if use.motor else 0.0
+            if command is None or not quantum:
+                commands.append(command)
+            else:
+                commands.append(round(command / quantum) * quantum)
+        mechanism, forces, holding = self._motors.drive_by(self._mechanism, commands)
+        brakes = [*holding]
+        for at, command in zip(self._motors.drives, commands, strict=True):
+            brakes[at] += self._brake if command is None else 0.0
+        return mechanism, forces, InputVector(brakes)
 
     def _crank_state(self, motion: Any, acceleration: InputVector) -> CrankState:
         values = tuple(motion.value), tuple(motion.rate), tuple(acceleration)
@@ -148,31 +163,11 @@ class SeveralTorqueCrank(TorqueCrank):
             return CrankState(*values, 0)
         # A stop may bear a part of an effort, which then does not follow from the motion.
         mechanism, forces, brakes = self._acting
-        efforts: list[float] = list(forces)
-        driven = [number for number, motor in enumerate(self._motors) if motor]
-        # The laws of the motors are the last ones.
-        for number, law in zip(reversed(driven), reversed(mechanism.laws), strict=False):
-            rate = motion.rate[number]
-            efforts[number] = law.force(law.segment(0.0, rate, 0.0), 0.0, rate, 0.0)
+        efforts, holding = self._motors.efforts(mechanism, motion, forces, brakes)
         state = CrankAtRest(*values, 0)
-        held = zip(efforts, brakes, strict=True)
         state.bearing = tuple(
-            end for effort, brake in held for end in (effort - brake, effort + brake)
+            end
+            for at in self._motors.drives
+            for end in (efforts[at] - holding[at], efforts[at] + holding[at])
         )
         return state
-
-
-def _with_motors(terms: Equation, driven: Sequence[int]) -> Equation:
-    """Return an equation of motion with the laws of the motors of some inputs after all others."""
-
-    def equation_with_motors(values: Sequence[float], rates: Sequence[float]) -> InputTerms | None:
-        there = terms(values, rates)
-        if there is None:
-            return None
-        laws = tuple(
-            InputLawTerm(tuple(float(n == number) for n in range(len(rates))), 0.0, rates[number])
-            for number in driven
-        )
-        return there._replace(laws=(*there.laws, *laws))
-
-    return equation_with_motors

@@ -217,8 +217,8 @@ class TorqueDrive(Drive):
             MotorEncoder,  # local import: only if published
         )
 
-        name = f'{context.inputs_in_messages[0]}_motor'
-        return MotorEncoder(name, self.motor_encoder.counts, lambda: drive.motor)
+        names = [f'{name}_motor' for name in context.inputs_in_messages]
+        return MotorEncoder(names, self.motor_encoder.counts, lambda: drive.motors)
 
 
 def _refuse_useless(parameters: TorqueDrive) -> None:
@@ -381,23 +381,29 @@ def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, f
 
 def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCrank:
     """Build the crank of a linkage with several inputs."""
-    from linkage_ros.dynamics import SeveralDofMechanism  # local import: only with several
+    from linkage_ros.dynamics import (
+        motors_of,  # local import: only with several
+        SeveralDofMechanism,  # local import: only with several
+    )
     from linkage_ros.stages.drives.several_torques import (
         SeveralTorqueCrank,  # local import: only with several
     )
 
     mechanics, inputs = context.mechanics, context.closure.linkage.inputs
     _refuse_for_several(parameters, context)
-    own = [parameters.for_input(given.joint) for given in inputs]
+    uses = tuple(parameters.for_input(given.joint) for given in inputs)
     keys = [parameters.key_for(given.joint, 'motor') for given in inputs]
-    motors: list[tuple[Motor, float] | None] = []
-    most: list[float] = []
-    for given, use, key in zip(inputs, own, keys, strict=True):
-        limit = given.limits.effort
-        motor: Any = _build_motor(use.motor, limit, key) if use.motor else None
-        motors.append((motor, use.motor.quantum) if use.motor else None)
-        commanded = use.motor is None or use.motor.command == 'effort'
-        most.append(min(limit, LARGEST) if commanded else LARGEST)
+    built = [
+        _build_motor(use.motor, given.limits.effort, key) if use.motor else None
+        for use, given, key in zip(uses, inputs, keys, strict=True)
+    ]
+    most = tuple(
+        LARGEST
+        if use.motor and use.motor.command != 'effort'
+        else min(given.limits.effort, LARGEST)
+        for use, given in zip(uses, inputs, strict=True)
+    )
+    motors = motors_of(built, range(len(inputs)))
     limits = context.hard_limited.linkage.inputs
     mechanism = SeveralDofMechanism(
         mechanics.input_equation,
@@ -408,9 +414,9 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         frictions=mechanics.dry_frictions,
         joint_stops=mechanics.joint_stops,
     )
-    start = mechanism.state_at([use.start for use in own], [use.rate for use in own])
+    start = mechanism.state_at([use.start for use in uses], [use.rate for use in uses])
     if start is None:
-        values = ', '.join(f'{use.start:g} {i.unit}' for use, i in zip(own, inputs, strict=True))
+        values = ', '.join(f'{use.start:g} {i.unit}' for use, i in zip(uses, inputs, strict=True))
         raise DefinitionError(
             parameters.key_for(inputs[0].joint, 'start'),
             f'at {values} nothing can be moved: beyond a stop, a toggle, or no inertia',
@@ -418,11 +424,11 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         )
     inertia = start.terms.total_inertia
     mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin)
-    for index, (given_motor, key) in enumerate(zip(motors, keys, strict=True)):
-        if given_motor is not None:
+    for index, (motor, key) in enumerate(zip(built, keys, strict=True)):
+        if motor:
             # What it moves if the other inputs are free.
             alone = 1.0 / start.terms.mobility[index][index]
-            given_motor[0].check_step(alone, parameters.method, parameters.step, key)
+            motor.check_step(alone, parameters.method, parameters.step, key)
     mechanics.check_curves_at(start.terms, parameters.method, parameters.step)
     if mechanics.applied:
         mobility = start.terms.mobility
@@ -430,9 +436,9 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    return SeveralTorqueCrank(
-        mechanism, start, parameters, period, tuple(most), tuple(motors), wrenches, exerts
-    )
+    moved = motors.mount_on(mechanism)
+    begin = moved.state_at(start.value, start.rate)
+    return SeveralTorqueCrank(moved, begin, uses, period, most, motors, wrenches, exerts)
 
 
 def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
@@ -441,19 +447,6 @@ def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
     reason = f'is for one input, and the linkage has {len(names)}'
     if parameters.play is not None:
         raise DefinitionError('drive.torque.play', reason, 'leave it out')
-    if parameters.motor_encoder is not None:
-        raise DefinitionError('drive.torque.motor_encoder', reason, 'leave it out')
-    for name in names:
-        motor, key = parameters.for_input(name).motor, parameters.key_for(name, 'motor')
-        if motor is None:
-            continue
-        if motor.efficiency < 1.0 or motor.back_efficiency < 1.0:
-            raise DefinitionError(
-                key, f'the friction of its gear {reason}', 'leave efficiency out'
-            )
-        for part in ('inductance', 'delay'):
-            if getattr(motor, part):
-                raise DefinitionError(f'{key}.{part}', reason, 'leave it out')
     for name, rubbing in context.mechanics.friction.joints.items():
         if rubbing.coefficient:
             raise DefinitionError(

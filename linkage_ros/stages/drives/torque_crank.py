@@ -18,6 +18,7 @@ shorter step of the same method, which is then discarded.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from math import copysign, inf, isfinite
 from typing import Any, TYPE_CHECKING
 
@@ -258,6 +259,11 @@ class TorqueCrank(Crank):
             return moved.value, moved.rate, None
         ratio, torque = self._motor.ratio, self._motor.torque(mechanism, self._shown)
         return ratio * moved.value, ratio * moved.rate, torque
+
+    @property
+    def motors(self) -> Sequence[tuple[float, float, float | None]]:
+        """Return the same of the motor of each input."""
+        return [self.motor]
 
     def _advance(self, now: int) -> None:
         """Integrate all steps that end by a time, in [ns]."""

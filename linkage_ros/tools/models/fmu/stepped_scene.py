@@ -168,24 +168,25 @@ def _published_fields(scene_linkage: SceneLinkage) -> list[str]:
 
 
 class MotorOutputs:
-    """Readings of a motor's encoder: the newest ``~/motor`` message, by its auxiliary writer."""
+    """Readings of the motors' encoders: the newest ``~/motor`` message, by its writer."""
 
     def __init__(self, line: LinkagePipeline, writer: int) -> None:
         scene_linkage = line.scene_linkage
-        (joint,), (given,) = scene_linkage.input_names, scene_linkage.linkage.inputs
+        inputs = scene_linkage.linkage.inputs
         _, parameters = scene_linkage.drive
-        # Without a motor at the input, the reading is of what is commanded: the input itself.
-        slides = bool(given.slider) and parameters.motor is None
-        fields = ('position', 'velocity', 'effort')[: 2 if parameters.motor is None else 3]
+        motors = [parameters.for_input(given.joint).motor for given in inputs]
+        fields = ('position', 'velocity', 'effort')[: 3 if any(motors) else 2]
         self.variables = [
+            # Without a motor at an input, the reading is of what is commanded: the input itself.
             Variable(
-                f'motor.{joint}_motor.{field}',
-                _UNITS[field][slides],
-                f'{field} of the motor of {joint}, as its encoder reads it',
+                f'motor.{given.joint}_motor.{field}',
+                _UNITS[field][bool(given.slider) and motor is None],
+                f'{field} of the motor of {given.joint}, as its encoder reads it',
             )
             for field in fields
+            for given, motor in zip(inputs, motors, strict=True)
         ]
-        self.values = [0.0] * len(fields)
+        self.values = [0.0] * len(self.variables)
         """The newest values, in the order of the variables; 0 before the first."""
         self._writer, self._read = writer, MessageValues(JOINT_STATE_TYPE).read
 
