@@ -72,6 +72,16 @@ class Slip(NamedTuple):
         return abs(self.rate) <= _STILL * parts
 
 
+class JointStop(NamedTuple):
+    """The hard stops of a joint, in [rad] or [m]."""
+
+    low: float
+    high: float
+    middle: float | None = None  # The angle nearest to which a value is meant, if any
+    # Ratio of its rates after and before an impact, 0 to 1; None for that of the mechanism.
+    restitution: float | None = None
+
+
 def settle_forces(
     matrix: Sequence[Sequence[float]],
     begin: Sequence[float],

@@ -40,7 +40,7 @@ from operator import mul
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
-from linkage_ros.dynamics.dry_friction import DryFriction, Slip
+from linkage_ros.dynamics.dry_friction import DryFriction, JointStop, Slip
 from linkage_ros.dynamics.loads import (
     check_loads,
     check_masses,
@@ -549,11 +549,15 @@ class Mechanics:
         return tuple(DryFriction(f.coulomb, f.breakaway_excess, f.stribeck) for f in rubbing)
 
     @property
-    def joint_stops(self) -> tuple[tuple[float, float, float | None], ...]:
+    def joint_stops(self) -> tuple[JointStop, ...]:
         """Return the hard stops of `stopped_joints`, as a linkage of several inputs takes them."""
         joints, stops = self.closure.linkage.joints, self.stopped_joints
         return tuple(
-            (one.low, one.high, 0.5 * (one.low + one.high) if joints[name].unit == 'rad' else None)
+            JointStop(
+                one.low,
+                one.high,
+                0.5 * (one.low + one.high) if joints[name].unit == 'rad' else None,
+            )
             for name, one in stops.items()
         )
 

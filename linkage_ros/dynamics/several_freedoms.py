@@ -18,7 +18,8 @@ integrator finds the instant and cuts the step there, as with one freedom
 (`linkage_ros.dynamics.motion`).
 
 A stop of an input is hard: at the instant of the impact the impulse L on this input changes all
-rates, by M·Δq̇ = L·e, so that its own rate becomes −ε·q̇. An input that is pushed against its stop
+rates, by M·Δq̇ = L·e, so that its own rate becomes −ε·q̇. What touches its stop already bears a part
+of the blow, by impulses that only push. An input that is pushed against its stop
 stays there: it leaves the equations, and the force that the stop needs comes from its own. Where
 that force would pull, the step is cut and the input is free. Of several inputs at their stops
 those stay that are pushed (F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts,
@@ -52,6 +53,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from linkage_ros.dynamics.dry_friction import (
     DryFriction,
     independent_slips,
+    JointStop,
     settle_forces,
     Slip,
 )
@@ -109,6 +111,7 @@ class SeveralMotion(NamedTuple):
     terms: InputTerms  # The equation of motion there
     ahead: float = 0.0  # The time since the start of the step in which it was found, in [s]
     resting: frozenset[int] = frozenset()  # Joints and brakes that do not slip, by number
+    coarse: int = 0  # Steps so far with too many impacts, of which the last ones did not bounce
 
 
 class _StepEnd(NamedTuple):
@@ -151,8 +154,7 @@ class SeveralDofMechanism:
     laws: tuple[Law, ...] = ()  # The laws of the applied forces, as in ``InputTerms.laws``
     most_inertia: float = inf  # Sum of the inertias at which a toggle holds the motion
     frictions: tuple[DryFriction, ...] = ()  # As in ``InputTerms.slips``
-    # Stops as in ``InputTerms.limited``, and the angle nearest to which values are meant, if any.
-    joint_stops: tuple[tuple[float, float, float | None], ...] = ()
+    joint_stops: tuple[JointStop, ...] = ()  # As in ``InputTerms.limited``
 
     def state_at(self, value: Sequence[float], rate: Sequence[float]) -> SeveralMotion | None:
         """Return a state, or None if it cannot exist."""
@@ -191,7 +193,7 @@ class SeveralDofMechanism:
         the brake of each holds, in [N·m] or [N]. ``time`` is the time of the state since the first
         tick, in [s].
         """
-        left, pieces, cuts = seconds, 0, 0
+        left, pieces, cuts, coarse = seconds, 0, 0, motion.coarse
         while pieces < 2 * _PIECES:
             now = time + (seconds - left)
             piece = self._begin_piece(
@@ -199,12 +201,12 @@ class SeveralDofMechanism:
             )
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
-                return _at_rest(motion)
+                return _at_rest(motion)._replace(coarse=coarse)
             length, reached = left, reach(left)
             while reached is None:
                 length *= 0.5
                 if length < seconds * _SHORTEST:
-                    return self._bounce(motion)
+                    return self._bounce(motion)._replace(coarse=coarse)
                 reached = reach(length)
             event = None
             # At the last state before one event, another event may have happened already.
@@ -224,12 +226,22 @@ class SeveralDofMechanism:
             if event and event.kind == 'toggle':
                 motion = self._bounce(motion)
             elif event and event.kind == 'stop':
-                back = self.restitution if pieces < _PIECES else 0.0
-                motion = self._meet_stop(motion, event.number, back)
+                motion = self._meet_stop(motion, event.number, bounces=pieces < _PIECES)
             left -= length
             if left <= seconds * NARROW:
-                return motion
-        return _at_rest(motion)
+                break
+        else:
+            motion = _at_rest(motion)
+        coarse += pieces >= _PIECES
+        return motion._replace(coarse=coarse) if coarse else motion
+
+    def leaning_sides(self, motion: SeveralMotion) -> dict[int, int]:
+        """Return the joints that lean on their stops: 1 on the upper one, −1 on the lower."""
+        return {
+            k: self._nearer_stop(k, motion.terms)
+            for k in range(len(self.joint_stops))
+            if self._first_stop + k in motion.resting
+        }
 
     def _begin_piece(
         self,
@@ -246,11 +258,7 @@ class SeveralDofMechanism:
         held = [n for n in self._inputs_at_stops(motion) if motion.rate[n] == 0.0]
         brakes = brakes if any(brakes) else ()
         # Those that would be pulled are free; the worst of them first.
-        leaning = {
-            k: self._nearer_stop(k, motion.terms)
-            for k in range(len(self.joint_stops))
-            if self._first_stop + k in motion.resting
-        }
+        leaning = self.leaning_sides(motion) if motion.resting else {}
         while True:
             piece = _Piece(now, force, tuple(held), cuts, segments, brakes, leaning=leaning)
             if self.frictions or brakes or leaning:
@@ -290,11 +298,11 @@ class SeveralDofMechanism:
 
     def _joint_value(self, number: int, terms: InputTerms) -> float:
         """Return the value of a joint with a stop."""
-        value, middle = terms.limited[number].value, self.joint_stops[number][2]
+        value, middle = terms.limited[number].value, self.joint_stops[number].middle
         return value if middle is None else nearest_turn(value, middle)
 
     def _nearer_stop(self, number: int, terms: InputTerms) -> int:
-        low, high, _ = self.joint_stops[number]
+        low, high = self.joint_stops[number][:2]
         return 1 if 2.0 * self._joint_value(number, terms) >= low + high else -1
 
     def _passed_stop(self, terms: InputTerms, leaning: Collection[int] = ()) -> int | None:
@@ -305,7 +313,7 @@ class SeveralDofMechanism:
         return None
 
     def _stop_margin(self, number: int, terms: InputTerms) -> float:
-        (low, high, _), value = self.joint_stops[number], self._joint_value(number, terms)
+        (low, high), value = self.joint_stops[number][:2], self._joint_value(number, terms)
         return min(value - low, high - value)
 
     def _with_frictions(self, motion: SeveralMotion, piece: _Piece) -> _Piece:
@@ -496,7 +504,7 @@ class SeveralDofMechanism:
     ) -> InputVector | None:
         """Return M⁻¹ times a force; 0 of inputs that are held at their stops."""
         if not piece.held:
-            return InputVector([sum(map(mul, row, force)) for row in terms.mobility])
+            return _change_by(terms, force)
         free = [n for n in range(len(force)) if n not in piece.held]
         rows = [[terms.inertia(i, j) for j in free[: k + 1]] for k, i in enumerate(free)]
         solved = solve_positive(rows, [force[n] for n in free])
@@ -616,37 +624,72 @@ class SeveralDofMechanism:
             default=inf,
         )
 
-    def _meet_stop(self, motion: SeveralMotion, number: int, restitution: float) -> SeveralMotion:
-        """Return the state after an impact of an input or another joint on its nearer stop."""
-        if number >= len(self.stops):
-            return self._meet_joint_stop(motion, number - len(self.stops), restitution)
-        low, high = self.stops[number]
-        at, rate = motion.value[number], motion.rate[number]
-        upper = abs(at - high) <= abs(at - low)
-        value = list(motion.value)
-        value[number] = high if upper else low
-        met = self._reach(InputVector(value), motion.rate) or motion
-        if (rate > 0.0) is not upper or not rate:
-            return met
-        way = met.terms.mobility[number]
-        impulse = (1.0 + restitution) * rate / way[number]
-        rates = [w - impulse * by for w, by in zip(motion.rate, way, strict=True)]
-        rates[number] = 0.0 - restitution * rate
-        return self._reach(met.value, InputVector(rates)) or _at_rest(met)
+    def _meet_stop(self, motion: SeveralMotion, number: int, *, bounces: bool) -> SeveralMotion:
+        """
+        Return the state after an impact of an input, or of another joint, on its nearer stop.
 
-    def _meet_joint_stop(
-        self, motion: SeveralMotion, number: int, restitution: float
-    ) -> SeveralMotion:
-        terms, rates = motion.terms, motion.rate
-        joint, side = terms.limited[number], self._nearer_stop(number, terms)
-        if joint.rate * side > 0.0:
-            way = InputVector([sum(map(mul, row, joint.levers)) for row in terms.mobility])
-            impulse = (1.0 + restitution) * joint.rate / sum(map(mul, joint.levers, way))
-            rates = motion.rate - impulse * way
-        met = self._reach(motion.value, rates) or _at_rest(motion)
-        if restitution and joint.rate:
-            return met
-        return met._replace(resting=frozenset({self._first_stop + number}))
+        What touches its stop already bears a part of the blow, as far as it is pressed against it.
+        Friction takes no part: in no time a force with a limit takes no momentum.
+        """
+        count, met = len(self.stops), motion
+        if number < count:
+            value, (low, high) = [*motion.value], self.stops[number]
+            value[number] = high if abs(value[number] - high) <= abs(value[number] - low) else low
+            met = self._reach(InputVector(value), motion.rate) or motion
+        terms, before = met.terms, met.rate
+        sides = {
+            n: 1 if met.value[n] >= self.stops[n][1] else -1 for n in self._inputs_at_stops(met)
+        }
+        sides |= {count + k: side for k, side in self.leaning_sides(motion).items()}
+        if number >= count:
+            sides[number] = self._nearer_stop(number - count, terms)
+        rows = {
+            c: InputVector(
+                terms.limited[c - count].levers
+                if c >= count
+                else [float(n == c) for n in range(count)]
+            )
+            for c in sides
+        }
+        moved = [
+            InputVector([sum(map(mul, row, way)) for row in terms.mobility])
+            for way in rows.values()
+        ]
+        closing = {c: sum(map(mul, row, before)) for c, row in rows.items()}
+        returned = {
+            c: self._restitution_of(c) * rate
+            for c, rate in closing.items()
+            if bounces and (c == number or c < count) and rate * sides[c] > 0.0
+        }
+        impulses, _ = settle_forces(
+            [[sum(map(mul, row, way)) for way in moved] for row in rows.values()],
+            [rate + returned.get(c, 0.0) for c, rate in closing.items()],
+            [(-inf, 0.0) if side > 0 else (0.0, inf) for side in sides.values()],
+        )
+        rates, borne = before, set()
+        for c, way, impulse in zip(sides, moved, impulses, strict=True):
+            rates += impulse * way
+            if impulse:
+                borne.add(c)
+        exact = [
+            0.0 - returned.get(n, 0.0) if n in borne else rate for n, rate in enumerate(rates)
+        ]
+        after = self._reach(met.value, InputVector(exact), met.ahead) or _at_rest(met)
+        resting = frozenset(
+            self._first_stop + c - count
+            for c in sides
+            if c >= count
+            and not returned.get(c)
+            and (c in borne or after.terms.limited[c - count].is_still(after.rate))
+        )
+        return after._replace(resting=resting)
+
+    def _restitution_of(self, number: int) -> float:
+        """Return the ratio of the rates after and before an impact of an input, or of a joint."""
+        own = None
+        if number >= len(self.stops):
+            own = self.joint_stops[number - len(self.stops)].restitution
+        return self.restitution if own is None else own
 
     def _bounce(self, motion: SeveralMotion) -> SeveralMotion:
         """Return a state whose rates are reversed, as far as an impact returns them."""
@@ -660,6 +703,11 @@ def _solve_coupled(
     """Return the forces of joints that give their slips the right accelerations, or rates."""
     matrix = [[sum(map(mul, row, way)) for way in moved[: k + 1]] for k, row in enumerate(rows)]
     return solve_positive(matrix, right) or [0.0] * len(rows)
+
+
+def _change_by(terms: InputTerms, force: InputVector) -> InputVector:
+    """Return M⁻¹ times a force."""
+    return InputVector([sum(map(mul, row, force)) for row in terms.mobility])
 
 
 def _at_rest(motion: SeveralMotion) -> SeveralMotion:

@@ -13,14 +13,19 @@ A motor gives its effort as a law over the rate of what it drives (`linkage_ros.
 which is one more law of the equation of motion. The friction in its gear that acts at rest too is
 that of a brake. Where windings have an inductance, their currents are states: a step of the
 mechanism lies between two halves of a step of all currents (`linkage_ros.dynamics.winding`).
+
+Play between a motor and its input is the stop of a joint between two freedoms: they meet, press on
+each other and part as any joint and its stops do (`linkage_ros.dynamics.several_freedoms`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TYPE_CHECKING
+from math import inf
+from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.dynamics.dry_friction import JointStop, Slip
 from linkage_ros.dynamics.equation import InputLawTerm, InputTerms
 from linkage_ros.dynamics.motor import Motor, MotorLaw
 from linkage_ros.dynamics.several_freedoms import InputVector, SeveralDofMechanism
@@ -30,6 +35,58 @@ if TYPE_CHECKING:
 
 Commands = Sequence[float | None]
 """The command of each input in its unit; None without one."""
+
+
+class Play(NamedTuple):
+    """The play between a motor and the input that it drives."""
+
+    width: float  # In [rad] or [m]
+    inertia: float  # The motor's, seen at the input, in [kg·m²] or [kg]
+    restitution: float  # Ratio of the relative rates after and before they meet, 0 to 1
+
+
+def behind_play(mechanism: SeveralDofMechanism, plays: Mapping[int, Play]) -> SeveralDofMechanism:
+    """
+    Return a mechanism of which some inputs, by number, have play to their motors.
+
+    Each such motor is one more freedom, in the order of the inputs; within the play nothing
+    couples it to the others, and at its ends a motor and its input meet as at a hard stop.
+    """
+    terms, count, more = mechanism.terms, len(mechanism.stops), (0.0,) * len(plays)
+
+    def equation_with_motors(values: Sequence[float], rates: Sequence[float]) -> InputTerms | None:
+        there = terms(values[:count], rates[:count])
+        if there is None:
+            return None
+        matrix = there.matrix
+        mobility = [row + more for row in there.mobility]
+        limited = [slip._replace(levers=slip.levers + more) for slip in there.limited]
+        for at, (driven, play) in enumerate(plays.items(), count):
+            own = tuple(float(n == at) for n in range(count + len(more)))
+            matrix += (*own[:at], play.inertia)
+            mobility.append(tuple(one / play.inertia for one in own))
+            levers = tuple(one - (n == driven) for n, one in enumerate(own))
+            gap, opening = values[at] - values[driven], rates[at] - rates[driven]
+            limited.append(Slip(levers, opening, 0.0, gap))
+        return InputTerms(
+            matrix,
+            tuple(mobility),
+            there.bias + more,
+            tuple([law._replace(levers=law.levers + more) for law in there.laws]),
+            tuple([slip._replace(levers=slip.levers + more) for slip in there.slips]),
+            tuple(limited),
+        )
+
+    ends = [
+        JointStop(-0.5 * play.width, 0.5 * play.width, None, play.restitution)
+        for play in plays.values()
+    ]
+    return replace(
+        mechanism,
+        terms=equation_with_motors,
+        stops=(*mechanism.stops, *((-inf, inf) for _ in plays)),
+        joint_stops=(*mechanism.joint_stops, *ends),
+    )
 
 
 @dataclass(frozen=True, slots=True)

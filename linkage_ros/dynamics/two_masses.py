@@ -131,7 +131,8 @@ class TwoMasses:
         self, motion: PlayMotion, force: float, brake: float = 0.0, time: float = 0.0
     ) -> float:
         """Return q̈ of the crank; the parameters are as in `SingleDofMechanism.advance`."""
-        if not motion.side:
+        # Under another force than before they may have to part.
+        if not motion.side or self._pressing_rate(motion, force, brake, time) < 0.0:
             return self.crank.acceleration(motion.crank, 0.0, 0.0, time)
         return self.joined.acceleration(self._as_one(motion.crank), force, brake, time)
 

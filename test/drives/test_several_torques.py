@@ -19,7 +19,7 @@ from linkage_ros.dynamics import (
     METHODS,
     SeveralDofMechanism,
 )
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics import Limits
 from linkage_ros.messages import EffortsCommand, JointEffortsReader, Rejection
 from linkage_ros.stages.drives import Context, TorqueDrive
@@ -197,7 +197,6 @@ def test_an_input_at_its_stop_shows_its_command():
 
 
 REFUSED = {
-    'play': ({'play': PlayParameters(0.1, 0.1)}, 'drive.torque.play: is for one input'),
     'stiff motor': (
         {'motor': MotorParameters(50.0, resistance=1e-3, command='voltage')},
         'drive.torque.motor: it follows its voltage too fast',
@@ -251,6 +250,21 @@ def test_brakes_hold_the_inputs_that_have_no_command():
     assert abs(state.velocity[0]) > 0.1
     assert state.position[1] == pytest.approx(0.0, abs=1e-15)
     assert state.effort[0] == 0.8
+
+
+def test_the_run_ends_where_motors_meet_their_inputs_too_often_and_the_scene_says_so():
+    def pushed(on_chatter):
+        play = PlayParameters(1e-6, 1e-3, 1.0, on_chatter)
+        crank = five_bar(play=play)
+        crank.state(BEGIN)
+        crank.offer(EffortsCommand(0, (3.0, 3.0)), BEGIN)
+        crank.state(BEGIN + 3 * MS)
+        return crank.chatter_count
+
+    assert pushed('close') > 0
+    line = 'drive.torque.play: motor and crank meet and part too often'
+    with pytest.raises(LinkageError, match=line):
+        pushed('end')
 
 
 def test_a_hard_stop_of_a_dependent_joint_holds_and_a_stiff_load_is_refused():

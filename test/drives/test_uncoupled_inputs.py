@@ -40,12 +40,15 @@ def four_bars(*numbers):
     ).encode()
 
 
+PLAY = 'play: {width: 0.03, inertia: 1.0e-3}'
 MOTOR = 'torque_constant: 0.05, ratio: 10, resistance: 1.5, voltage: 6'
 # Name: (what the drive has, what the scene has besides).
 SCENES = {
     'motor': (f'motor: {{{MOTOR}, command: voltage, quantum: 0.3}}', ''),
     'gear': (f'motor: {{{MOTOR}, command: current, efficiency: 0.7, back_efficiency: 0.4}}', ''),
     'winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}', ''),
+    'play': ('play: {width: 0.03, inertia: 1.0e-3, restitution: 0.3}', ''),
+    'play, winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}, {PLAY}', ''),
     'delay': (f'motor: {{{MOTOR}, command: voltage, delay: 0.0123}}', ''),
 }
 
@@ -67,7 +70,7 @@ def command_at(number, time_ms):
     """Return the command of a four-bar at a time, of which some run out and turn; or None."""
     if time_ms % (30 + 10 * number):
         return None
-    return 1.5 * (-1.0) ** (time_ms // 120) / number
+    return 0.5 * (-1.0) ** (time_ms // 120) / number
 
 
 def run(name, numbers, milliseconds=250):

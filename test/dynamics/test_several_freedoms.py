@@ -12,11 +12,13 @@ from math import inf
 
 from linkage_ros.dynamics import (
     AppliedLoads,
+    behind_play,
     JointLoad,
     JointSpring,
     Loads,
     Mechanics,
     METHODS,
+    Play,
     SeveralDofMechanism,
     SoftStop,
 )
@@ -257,3 +259,51 @@ def test_at_a_toggle_it_is_held_as_by_a_stop(restitution):
     assert 0.9 * most < max(inertias) < 1.001 * most
     if not restitution:
         assert state.rate == (0.0, 0.0)
+
+
+def test_motors_that_bounce_in_their_play_keep_the_energy():
+    closure, start = several('five_bar')
+    mechanics = Mechanics(closure, Loads())
+    plays = {0: Play(0.02, 0.001, 1.0), 1: Play(0.03, 0.002, 1.0)}
+    moved = behind_play(mechanism(mechanics, method='gauss_legendre'), plays)
+    state = moved.state_at([*start, *start], [0.5, -0.5, 2.0, -1.5])
+
+    def energy(state):
+        motors = sum(
+            0.5 * play.inertia * rate**2
+            for play, rate in zip(plays.values(), state.rate[2:], strict=True)
+        )
+        position = closure.close_unlimited(*state.value[:2])
+        return motors + mechanics.total_energy(position, *state.rate[:2])
+
+    begin, met = energy(state), 0
+    for _ in range(150):
+        before, state = state, moved.advance(state, 1e-3, [0.0] * 4)
+        met += abs(np.subtract(state.rate, before.rate)[2:]).max() > 0.1
+        for number, play in plays.items():
+            gap = state.value[2 + number] - state.value[number]
+            assert abs(gap) <= 0.5 * play.width + 1e-12
+    assert met > 3
+    assert energy(state) == pytest.approx(begin, rel=1e-9)
+
+
+@pytest.mark.parametrize('restitution', [0.0, 0.4])
+def test_a_blow_on_what_leans_on_its_stop_is_one_on_a_wall(restitution):
+    closure, start = several('five_bar')
+    mechanics = Mechanics(closure, Loads())
+    stops = (-2.0, start[0]), FREE
+    bare = mechanism(mechanics, stops, restitution=0.5)
+    moved = behind_play(bare, {0: Play(0.02, 0.001, restitution)})
+    state = moved.state_at([*start, start[0]], [0.0, 0.0, 1.0])
+    for _ in range(12):
+        state = moved.advance(state, 1e-3, [1.0, 0.0, 0.0])
+    assert state.value[0] == start[0]
+    assert state.rate[0] == 0.0
+    assert state.rate[2] == pytest.approx(-restitution, abs=1e-12)
+    # The other input, which no blow meets, moves only by what it is pushed.
+    alone = bare.state_at(start, [0.0, 0.0])
+    for _ in range(12):
+        alone = bare.advance(alone, 1e-3, [1.0, 0.0])
+    assert (state.value[1], state.rate[1]) == pytest.approx(
+        (alone.value[1], alone.rate[1]), rel=1e-9
+    )

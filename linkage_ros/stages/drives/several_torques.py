@@ -24,7 +24,7 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.dynamics import InputVector, LARGEST
 from linkage_ros.messages import EffortsCommand, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import CrankAtRest, CrankState
-from linkage_ros.stages.drives.torque_crank import NEVER, TorqueCrank
+from linkage_ros.stages.drives.torque_crank import NEVER, PUSHES, TorqueCrank, without_winding
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import HeldWrench, InputMotors, InputWindings
@@ -42,6 +42,7 @@ class SeveralTorqueCrank(TorqueCrank):
 
     __slots__ = (
         '_brake',
+        '_chatter_seen',
         '_commands',
         '_delays',
         '_most_each',
@@ -68,6 +69,9 @@ class SeveralTorqueCrank(TorqueCrank):
         )
         self._uses, self._motors, self._most_each = uses, motors, most_each
         self._brake = uses[0].brake
+        self._chatter_seen = 0
+        plays = [use.play for use in uses if use.play]
+        self._play = max(plays, key=lambda play: play.on_chatter == 'end', default=None)
         self._delays = [round(use.motor.delay * NANOSECONDS) if use.motor else 0 for use in uses]
         # The commands that wait: when they act, their input, and themselves.
         self._waiting: Any = []
@@ -131,6 +135,10 @@ class SeveralTorqueCrank(TorqueCrank):
             found.append((ratio * motion.value[at], ratio * motion.rate[at], torques.get(at)))
         return found
 
+    def _hurries(self) -> bool:
+        before, self._chatter_seen = self._chatter_seen, self.chatter_count
+        return self.chatter_count > before
+
     def _expire(self, end: int) -> None:
         for number, until in enumerate(self._untils):
             if until == end:
@@ -158,16 +166,26 @@ class SeveralTorqueCrank(TorqueCrank):
         return mechanism, forces, InputVector(brakes)
 
     def _crank_state(self, motion: Any, acceleration: InputVector) -> CrankState:
-        values = tuple(motion.value), tuple(motion.rate), tuple(acceleration)
+        count, drives = len(self._uses), self._motors.drives
+        of_inputs = motion.value[:count], motion.rate[:count], acceleration[:count]
         if not self.exerts_effort:
-            return CrankState(*values, 0)
+            return CrankState(*of_inputs, 0)
         # A stop may bear a part of an effort, which then does not follow from the motion.
         mechanism, forces, brakes = self._acting
         efforts, holding = self._motors.efforts(mechanism, motion, forces, brakes)
-        state = CrankAtRest(*values, 0)
-        state.bearing = tuple(
-            end
-            for at in self._motors.drives
-            for end in (efforts[at] - holding[at], efforts[at] + holding[at])
-        )
+        bearing: tuple[float, ...] = ()
+        moved = without_winding(motion)
+        touching: dict[int, int] = without_winding(self._mechanism).leaning_sides(moved)
+        behind = sum(at >= count for at in drives)
+        for at in drives:
+            least, most = efforts[at] - holding[at], efforts[at] + holding[at]
+            if at >= count:
+                # The plays are the last stops of joints.
+                number = len(moved.terms.limited) - behind + at - count
+                own = moved.terms.inertia(at, at) * acceleration[at]
+                low, high = PUSHES[touching.get(number, 0)]
+                least, most = (min(max(end - own, low), high) for end in (least, most))
+            bearing += least, most
+        state = CrankAtRest(*of_inputs, 0)
+        state.bearing = bearing
         return state

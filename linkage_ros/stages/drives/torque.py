@@ -121,12 +121,15 @@ class MotorEncoderParameters:
 
 @dataclass(frozen=True, slots=True)
 class TorqueInput:
-    """Start and motor of one input."""
+    """Start, motor and play of one input."""
 
     start: float = number('value at the first tick', 0.0, unit='rad or m', least=-1e6, most=1e6)
     rate: float = number('its rate then', 0.0, unit='rad/s or m/s', least=-1e6, most=1e6)
     motor: MotorParameters | None = optional_section(  # noqa: RUF009 (a field, as the others are)
         'its own motor; without, the common one', MotorParameters
+    )
+    play: PlayParameters | None = optional_section(  # noqa: RUF009 (as above)
+        'its own play; without, the common one', PlayParameters
     )
 
 
@@ -172,7 +175,7 @@ class TorqueDrive(Drive):
         'publishes the motor, as its own encoder reads it, on ~/motor', MotorEncoderParameters
     )
     inputs: Mapping[str, TorqueInput] = each_part(
-        'inputs with a start, a rate and a motor of their own', 'input', TorqueInput
+        'inputs with a start, a rate, a motor and play of their own', 'input', TorqueInput
     )
 
     listens_to = 'crank_commands'
@@ -194,14 +197,15 @@ class TorqueDrive(Drive):
         return _build_single(self.for_input(names[0]), context)
 
     def for_input(self, name: str) -> TorqueDrive:
-        """Return the drive with the start and the motor of an input."""
+        """Return the drive with the start, the motor and the play of an input."""
         own = self.inputs.get(name)
         if own is None:
             return self
-        return replace(self, start=own.start, rate=own.rate, motor=own.motor or self.motor)
+        motor, play = own.motor or self.motor, own.play or self.play
+        return replace(self, start=own.start, rate=own.rate, motor=motor, play=play)
 
     def key_for(self, name: str, part: str) -> str:
-        """Return the key under which a part of an input is: its ``start`` or its ``motor``."""
+        """Return the key under which a part of an input is, as ``motor``."""
         own = name in self.inputs and getattr(self.inputs[name], part) is not None
         return f'drive.torque.inputs.{name}.{part}' if own else f'drive.torque.{part}'
 
@@ -382,7 +386,9 @@ def _find_stops(closure: Closure, start: float, margin: float) -> tuple[float, f
 def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCrank:
     """Build the crank of a linkage with several inputs."""
     from linkage_ros.dynamics import (
+        behind_play,  # local import: only with several
         motors_of,  # local import: only with several
+        Play,  # local import: only with several
         SeveralDofMechanism,  # local import: only with several
     )
     from linkage_ros.stages.drives.several_torques import (
@@ -403,7 +409,6 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         else min(given.limits.effort, LARGEST)
         for use, given in zip(uses, inputs, strict=True)
     )
-    motors = motors_of(built, range(len(inputs)))
     limits = context.hard_limited.linkage.inputs
     mechanism = SeveralDofMechanism(
         mechanics.input_equation,
@@ -423,12 +428,19 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
             f'start elsewhere, as inputs: {{{inputs[0].joint}: {{start: 0.1}}}}',
         )
     inertia = start.terms.total_inertia
-    mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin)
+    of_motors = sum(use.play.inertia for use in uses if use.play)
+    mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin + of_motors)
+    plays = {
+        index: Play(use.play.width, use.play.inertia, use.play.restitution)
+        for index, use in enumerate(uses)
+        if use.play
+    }
     for index, (motor, key) in enumerate(zip(built, keys, strict=True)):
         if motor:
             # What it moves if the other inputs are free.
             alone = 1.0 / start.terms.mobility[index][index]
-            motor.check_step(alone, parameters.method, parameters.step, key)
+            least = plays[index].inertia if index in plays else alone
+            motor.check_step(least, parameters.method, parameters.step, key)
     mechanics.check_curves_at(start.terms, parameters.method, parameters.step)
     if mechanics.applied:
         mobility = start.terms.mobility
@@ -436,8 +448,12 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    moved = motors.mount_on(mechanism)
-    begin = moved.state_at(start.value, start.rate)
+    drives = [*range(len(inputs))]
+    for at, index in enumerate(plays, len(inputs)):
+        drives[index] = at
+    motors = motors_of(built, drives)
+    moved = motors.mount_on(behind_play(mechanism, plays) if plays else mechanism)
+    begin = moved.state_at(*([*of, *[of[n] for n in plays]] for of in (start.value, start.rate)))
     return SeveralTorqueCrank(moved, begin, uses, period, most, motors, wrenches, exerts)
 
 
@@ -445,8 +461,6 @@ def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
     """Refuse what is for one input only: friction by the force in a joint, and play."""
     names = context.closure.input_names
     reason = f'is for one input, and the linkage has {len(names)}'
-    if parameters.play is not None:
-        raise DefinitionError('drive.torque.play', reason, 'leave it out')
     for name, rubbing in context.mechanics.friction.joints.items():
         if rubbing.coefficient:
             raise DefinitionError(

@@ -42,14 +42,14 @@ _FEW_TRIALS = 50
 NEVER = 1 << 63
 """A time after all others, in [ns]."""
 
-_PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
+PUSHES = {1: (0.0, inf), 0: (0.0, 0.0), -1: (-inf, 0.0)}
 """What passes through the play, by the side on which the motor touches the crank."""
 
 _Acting = tuple[Any, Any, Any]
 """What acts by a command: the mechanism, and of its input or inputs the force and the brake."""
 
 
-def _without_winding(motion: Any) -> Any:
+def without_winding(motion: Any) -> Any:
     """Return the motion of motor and mechanism, without the current of a winding."""
     return getattr(motion, 'moved', motion)
 
@@ -224,11 +224,15 @@ class TorqueCrank(Crank):
             raise LinkageError(
                 'drive.torque.play',
                 f'motor and crank meet and part too often for a step of {self._step * 1e-9:g} s, '
-                f'at a rate of {self._motion.rate:.4g}',
+                f'at a rate of {abs(self._motion.rate):.4g}',
                 'shorten the step, look at the controller, or write on_chatter: close',
             )
-        hurries = _without_winding(self._motion).trials < _FEW_TRIALS
-        self._made_up = self._least_made_up if hurries else self._most_made_up
+        self._made_up = self._least_made_up if self._hurries() else self._most_made_up
+
+    def _hurries(self) -> bool:
+        """Return whether motor and crank meet and part too often."""
+        trials: int = without_winding(self._motion).trials
+        return trials < _FEW_TRIALS
 
     def _resting_efforts(self, motion: Any, acceleration: float) -> tuple[float, float]:
         """Return the least and the greatest effort that acts on the input at rest."""
@@ -237,18 +241,18 @@ class TorqueCrank(Crank):
             resting, within = self._motor.at_rest(mechanism, motion)
             force, holding = force + resting, holding + within
         least, most = force - holding, force + holding
-        behind_play = _without_winding(motion)
+        behind_play = without_winding(motion)
         if not isinstance(behind_play, Motion):
             # Through the play passes what is left after the motor's own inertia, as a push.
             own = behind_play.motor.terms.inertia * acceleration
-            low, high = _PUSHES[behind_play.side]
+            low, high = PUSHES[behind_play.side]
             least, most = (min(max(end - own, low), high) for end in (least, most))
         return least, most
 
     @property
     def chatter_count(self) -> int:
         """Return the number of steps in which motor and crank met and parted too often."""
-        coarse: int = getattr(_without_winding(self._motion), 'coarse', 0)
+        coarse: int = getattr(without_winding(self._motion), 'coarse', 0)
         return coarse
 
     @property
