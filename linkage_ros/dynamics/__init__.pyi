@@ -63,8 +63,8 @@ from linkage_ros.dynamics.several_motors import (
     behind_play as behind_play,
     InputMotors as InputMotors,
     InputWindings as InputWindings,
+    MotorPlay as MotorPlay,
     motors_of as motors_of,
-    Play as Play,
 )
 from linkage_ros.dynamics.two_masses import TwoMasses as TwoMasses
 from linkage_ros.dynamics.winding import Winding as Winding

@@ -105,6 +105,8 @@ class InputTerms(NamedTuple):
     laws: tuple[InputLawTerm, ...] = ()  # One for each law of an applied force
     slips: tuple[Slip, ...] = ()  # One for each joint with dry friction
     limited: tuple[Slip, ...] = ()  # One for each joint with a hard stop that is no input
+    # By the time, the forces of `linkage_ros.dynamics.reactions.Reactions.joint_presses`.
+    presses: Callable[[float], Sequence[float]] | None = None
 
     def inertia(self, row: int, column: int) -> float:
         """Return an element of M."""
@@ -138,6 +140,10 @@ class FrictionJoint(NamedTuple):
     def slip_rate(self, v: Sequence[float]) -> float:
         """Return the rate for the rates of the closure's coordinates."""
         return self.factor * (v[self.one] - v[self.other])
+
+    def viscous_drag(self, v: Sequence[float]) -> float:
+        """Return its viscous friction for the rates of the closure's coordinates."""
+        return self.friction.viscous * self.slip_rate(v)
 
 
 class Mechanics:
@@ -182,10 +188,8 @@ class Mechanics:
         """Laws of the forces, in the order of ``Terms.laws``."""
         self.stribeck_joints = tuple(rubbing for rubbing in self.friction_joints if rubbing.law)
         """The joints whose friction falls with the rate; their laws are the last ones."""
-        self.dry_joints = tuple(
-            one for one in self.friction_joints if one.friction.coulomb or one.friction.breakaway
-        )
-        """The joints with dry friction by no force in them."""
+        self.dry_joints = tuple(one for one in self.friction_joints if one.friction.is_dry)
+        """The joints with dry friction."""
         self.stopped_joints = _find_stopped(closure, self.loads)
         """Of several inputs, the other joints with hard stops, by name, with their limits."""
         sticks = any(rubbing.friction.breakaway_excess for rubbing in self.friction_joints)

@@ -20,6 +20,9 @@ method finds the T_k from 0 on. Where there are none, the linkage jams (R. L. No
 Machinery, ch. 11, on the friction circle; on self-locking F. Reuleaux, Theoretische Kinematik,
 1875).
 
+With several inputs F is linear in the acceleration of each, and in the friction of every joint,
+which is then known by sticking or sliding (`linkage_ros.dynamics.several_freedoms`).
+
 Both the balance and a Newton step are straight lines by an elimination of our own, so they have
 the same bits on every machine.
 """
@@ -27,8 +30,10 @@ the same bits on every machine.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from math import hypot
+from operator import mul
+from typing import Any, NamedTuple
 
 from linkage_ros.dynamics.joint_matrix import compile_function, JointMatrix, split_numbers
 from linkage_ros.kinematics import Elimination, make_vector, where
@@ -47,12 +52,14 @@ class FrictionSolver:
     """
     Finds the friction in joints by their forces.
 
-    ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ.
+    ``unknowns`` are the joints; their factor is µ·ρ, in [m], or µ. ``sides`` is the number of
+    right sides of `forces_in`.
     """
 
-    def __init__(self, unknowns: Sequence[Unknown], matrix: JointMatrix) -> None:
+    def __init__(self, unknowns: Sequence[Unknown], matrix: JointMatrix, sides: int) -> None:
         self._unknowns = unknowns
         self._matrix = matrix
+        self._sides = sides
         self._count = len(unknowns)
         # Of each joint x and y of F₀, F₁ and each P_k; |ψ'| of each; the pull and the mobility.
         count = self._count
@@ -64,10 +71,10 @@ class FrictionSolver:
         """
         Return a function that returns the force in each joint, x and y, for each right side.
 
-        These follow the numbers of the matrix that vary: without this friction, by the input's
-        acceleration, and by a unit of each friction.
+        These follow the numbers of the matrix that vary: without this friction, by the
+        acceleration of each input, and by a unit of each friction.
         """
-        return self._matrix.compile_solver(2 + self._count, select=self._joint_forces)
+        return self._matrix.compile_solver(self._sides, select=self._joint_forces)
 
     @cached_property
     def _solve_sides(self) -> Callable[..., Sequence[float] | None]:
@@ -126,9 +133,30 @@ class FrictionSolver:
         joint. ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how
         much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
         """
-        count = self._count
         (numbers,) = self._begin(*forces, *levers, pull, mobility)
-        sizes, moved = numbers[:count], numbers[count:]
+        return self._iterate(numbers[: self._count], numbers[self._count :])
+
+    @property
+    def factors(self) -> list[float]:
+        """Return the friction of each joint for a force of 1."""
+        return [factor for _, _, factor in self._unknowns]
+
+    def solve_by_forces(self, forces: Sequence[float]) -> Sequence[float] | None:
+        """
+        Return the friction in each joint, in [N·m] or [N]; None if the linkage jams.
+
+        ``forces`` are of each joint x and y of the force without, then by a unit of each friction.
+        """
+        pieces = split_numbers(forces, 2 * (self._count + 1))
+        sizes = [
+            _STAYS * factor * hypot(x, y)
+            for factor, (x, y, *_) in zip(self.factors, pieces, strict=True)
+        ]
+        return self._iterate(sizes, forces)
+
+    def _iterate(self, sizes: Sequence[float], moved: Sequence[float]) -> Sequence[float] | None:
+        """Return frictions, of which what is small is given, by forces without and by them."""
+        count = self._count
         found: Sequence[float] = (0.0,) * count
         for _ in range(_ROUNDS):
             improved = self._improve(*found, *moved)
@@ -193,3 +221,39 @@ class FrictionSolver:
             falls = [along * (x * units[2 * k] + y * units[2 * k + 1]) for k in range(count)]
             slopes.append([float(i == k) - fall for k, fall in enumerate(falls)])
         return missing, slopes
+
+
+class Pressing(NamedTuple):
+    """What of several inputs makes friction grow with the forces in joints."""
+
+    joints: tuple[int, ...]  # The joints, by number among those with dry friction
+    inputs: int  # The number of inputs
+    solver: FrictionSolver
+    # As `linkage_ros.dynamics.reactions.Reactions.joint_presses`.
+    forces_at: Callable[[Sequence[float], Sequence[float], float], Sequence[float]]
+
+    def mount_on(self, terms: Callable[..., Any]) -> Callable[..., Any]:
+        """Return an equation of motion of several inputs with the forces in these joints."""
+
+        def equation_with_presses(values: Sequence[float], rates: Sequence[float]) -> Any:
+            there = terms(values, rates)
+            if there is None:
+                return None
+            return there._replace(presses=partial(self.forces_at, values, rates))
+
+        return equation_with_presses
+
+    def forces_by(
+        self, presses: Sequence[float], weights: Sequence[Sequence[float]]
+    ) -> list[list[tuple[float, float]]]:
+        """
+        Return the force in each joint, x and y, in [N], for each of some sums.
+
+        ``presses`` are of `forces_at`, and the weights are 1 or 0, the acceleration of each input,
+        and the friction along the positive slip of each dry joint and of each with a stop.
+        """
+        forces = []
+        for piece in split_numbers(presses, len(presses) // len(self.joints)):
+            x, y = piece[::2], piece[1::2]
+            forces.append([(sum(map(mul, x, of)), sum(map(mul, y, of))) for of in weights])
+        return forces

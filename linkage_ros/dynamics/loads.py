@@ -241,6 +241,11 @@ class JointFriction:
         """Return how much more it is at rest, in [N·m] or [N]."""
         return max(0.0, self.breakaway - self.coulomb)
 
+    @property
+    def is_dry(self) -> bool:
+        """Return whether there is more than viscous friction."""
+        return bool(self.coulomb or self.breakaway or self.coefficient)
+
 
 @dataclass(frozen=True, slots=True)
 class Friction:

@@ -81,7 +81,7 @@ from linkage_ros.kinematics.compiling import Compiled, TracedMotion as CompiledM
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.applied import Loaded
-    from linkage_ros.dynamics.load_dependent_friction import FrictionSolver
+    from linkage_ros.dynamics.load_dependent_friction import FrictionSolver, Pressing
 
 _SOLVED = (Status.CLOSED, Status.LIMITED)
 
@@ -327,6 +327,83 @@ class Reactions:
         forces, levers = found
         return self._frictions.friction_effort(forces, levers, pull, mobility)
 
+    @property
+    def pressing(self) -> Pressing:
+        """Return how friction grows with the forces in the joints, with several inputs."""
+        from linkage_ros.dynamics.load_dependent_friction import (
+            Pressing,  # local import: only with it
+        )
+
+        dry, inputs = self._mechanics.dry_joints, self._mechanics.closure.input_names
+        joints = tuple(k for k, rubbing in enumerate(dry) if rubbing.friction.coefficient)
+        return Pressing(joints, len(inputs), self._frictions, self.joint_presses)
+
+    def joint_presses(
+        self, values: Sequence[float], rates: Sequence[float], seconds: float
+    ) -> Sequence[float]:
+        """
+        Return the force in each joint whose friction grows with it, x and y, in [N].
+
+        There are those without dry friction at accelerations of 0, then for an acceleration of 1
+        of each input, then for a unit of friction along the positive slip of each joint with dry
+        friction, and of each with a hard stop; none where there are no forces.
+        """
+        applied = self._mechanics.applied
+        given = () if applied is None else applied.given_after(seconds)
+        found: Sequence[Sequence[float]] | None = self._compiled_presses.fast(
+            *values, *rates, *given
+        )
+        if found is None:
+            position = self._mechanics.closure.close_unlimited(*values)
+            if position.status not in _SOLVED:
+                return ()
+            found = self._press_coefficients(position, rates, given)
+        return found[0] if found else ()
+
+    @cached_property
+    def _compiled_presses(self) -> Compiled:
+        inputs = len(self._mechanics.closure.input_names)
+
+        def list_outputs(motion: CompiledMotion, *given: float) -> Sequence[Sequence[float]]:
+            return self._press_coefficients(motion.position, given[:inputs], given[inputs:])
+
+        applied = self._mechanics.applied
+        count = inputs + (0 if applied is None else len(applied.given_after(0.0)))
+        return Compiled(
+            self._mechanics.closure, 0, list_outputs, within_limits=False, given_count=count
+        )
+
+    def _press_coefficients(
+        self, position: Position, rates: Sequence[float], given: Sequence[float]
+    ) -> Sequence[Sequence[float]]:
+        closure, mechanics = self._mechanics.closure, self._mechanics
+        places, count = self._follower.places(position), len(rates)
+        velocity = closure.velocity(position, *rates)
+        of_accelerations: list[list[float]] = []
+        for number in range(-1, count):
+            changes = [float(n == number) for n in range(count)]
+            acceleration = closure.acceleration(position, velocity, *changes)
+            sides, _ = self._right_sides(
+                position, velocity, acceleration, places, given, dry=False
+            )
+            of_accelerations.append(sides)
+        still, *others = of_accelerations
+        columns = [*still]
+        for sides in others:
+            columns += [one - other for one, other in zip(sides, still, strict=True)]
+        actions = [self._motion(rubbing) for rubbing in mechanics.dry_joints]
+        actions += [self._forms.efforts[name] for name in mechanics.stopped_joints]
+        for action in actions:
+            of_a_unit = [0.0] * self._matrix.size
+            self._apply_effort(of_a_unit, action, 1.0, position, places)
+            columns += of_a_unit
+        numbers = self._matrix.varying_at(position, places)
+        forces = call(self._frictions.forces_in, *numbers, *columns)
+        if not has_result(forces):
+            return []
+        total = 2 * len(self._load_dependent) * (1 + count + len(actions))
+        return [[forces[i] for i in range(total)]]
+
     def joint_deflections(
         self, position: Position, offsets: Sequence[Any]
     ) -> tuple[float, ...] | None:
@@ -395,7 +472,11 @@ class Reactions:
         )
 
         unknowns = [self._friction_unknown(rubbing) for rubbing in self._load_dependent]
-        return FrictionSolver(unknowns, self._matrix)
+        mechanics = self._mechanics
+        sides, count = 2 + len(unknowns), len(mechanics.closure.input_names)
+        if count > 1:
+            sides = 1 + count + len(mechanics.dry_joints) + len(mechanics.stopped_joints)
+        return FrictionSolver(unknowns, self._matrix, sides)
 
     @cached_property
     def _solve_forces(self) -> Callable[..., Sequence[float] | None]:
@@ -466,11 +547,13 @@ class Reactions:
         acceleration: Acceleration,
         places: list[Any],
         given: Sequence[float],
+        dry: bool = True,
     ) -> tuple[list[float], list[float]]:
         """
         Return the right sides of the system, and the friction in each joint.
 
-        After them follow the right sides of a unit of each friction that grows with its force.
+        After them follow the right sides of a unit of each friction that grows with its force;
+        they are left out with all dry friction.
         """
         mechanics, model, vectors = self._mechanics, self._model, self._vectors
         v = velocity.state.coordinates
@@ -511,9 +594,10 @@ class Reactions:
                 self._apply_load(sides, on, load, position, places, loaded)
         resistances = [0.0] * len(self.joints)
         for rubbing in mechanics.friction_joints:
-            resistances[rubbing.joint] = drag = joint_friction(rubbing, v)
+            drag = joint_friction(rubbing, v) if dry else rubbing.viscous_drag(v)
+            resistances[rubbing.joint] = drag
             self._apply_effort(sides, self._motion(rubbing), -drag, position, places)
-        for rubbing in self._load_dependent:
+        for rubbing in self._load_dependent if dry else ():
             of_a_unit = [0.0] * self._matrix.size
             direction = -slip_direction(rubbing, v)
             self._apply_effort(of_a_unit, self._motion(rubbing), direction, position, places)

@@ -36,6 +36,10 @@ The hard stop of another joint is met by an impulse on this joint, w: M·Δq̇ =
 pushed against its stop it is a joint at rest whose friction only pushes, one of that
 complementarity.
 
+Friction by the forces in the joints (`linkage_ros.dynamics.load_dependent_friction`) bounds what
+holds and is what resists: that of joints that slide is found with the accelerations; where joints
+are at rest, forces and complementarity follow each other to a fixed point.
+
 At a toggle the inertia M grows without bound. With several inputs toggles are no ends of ranges
 but surfaces: the motion is held as by a stop where the sum of the inertias is a given multiple of
 that at the start.
@@ -45,7 +49,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import copysign, inf, ulp
+from math import copysign, hypot, inf, ulp
 from operator import add, mul, sub
 from types import MappingProxyType
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -63,6 +67,7 @@ from linkage_ros.dynamics.motion import LARGEST, last_before, NARROW
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.laws import Law
+    from linkage_ros.dynamics.load_dependent_friction import Pressing
 
 _PIECES = 20
 """
@@ -82,6 +87,13 @@ _BEGINNING = 1e-200
 
 _PROBE = 1e-3
 """Fraction of a step after which a motion that is held at a toggle is seen to leave it."""
+
+
+_FIXED = 1e-13
+"""Change of a friction by forces at which it stays, as a fraction of it."""
+
+_FIXED_ROUNDS = 200
+"""Most rounds in which frictions at rest and the forces in joints follow each other."""
 
 
 class InputVector(tuple[float, ...]):
@@ -142,6 +154,14 @@ class _Piece(NamedTuple):
     leaning: Mapping[int, int] = MappingProxyType({})
 
 
+class _Resolved(NamedTuple):
+    """The forces at one state."""
+
+    force: InputVector  # On each input, with that of joints that stick and slide
+    parts: Mapping[int, float] = MappingProxyType({})  # Of each joint that sticks
+    pressed: Mapping[int, float] = MappingProxyType({})  # What friction by forces resists or holds
+
+
 @dataclass(frozen=True, slots=True)
 class SeveralDofMechanism:
     """A mechanism with several inputs that are moved by forces."""
@@ -155,6 +175,7 @@ class SeveralDofMechanism:
     most_inertia: float = inf  # Sum of the inertias at which a toggle holds the motion
     frictions: tuple[DryFriction, ...] = ()  # As in ``InputTerms.slips``
     joint_stops: tuple[JointStop, ...] = ()  # As in ``InputTerms.limited``
+    pressing: Pressing | None = None  # What makes friction grow with forces, as in its terms
 
     def state_at(self, value: Sequence[float], rate: Sequence[float]) -> SeveralMotion | None:
         """Return a state, or None if it cannot exist."""
@@ -289,11 +310,13 @@ class SeveralDofMechanism:
             return self.frictions[number]
         return DryFriction(piece.brakes[number - joints])
 
-    def _bounds_of(self, number: int, piece: _Piece) -> tuple[float, float]:
+    def _bounds_of(
+        self, number: int, piece: _Piece, pressed: Mapping[int, float]
+    ) -> tuple[float, float]:
         """Return the least and the greatest force that holds a joint at rest."""
         if number >= self._first_stop:
             return (-inf, 0.0) if piece.leaning[number - self._first_stop] > 0 else (0.0, inf)
-        holding = self._friction_of(number, piece).holding
+        holding = self._friction_of(number, piece).holding + pressed.get(number, 0.0)
         return -holding, holding
 
     def _joint_value(self, number: int, terms: InputTerms) -> float:
@@ -355,40 +378,148 @@ class SeveralDofMechanism:
         matrix, resting = self._couple_slips(terms, slips, piece)
         if not resting:
             return {}
-        force = self._force(terms, motion.rate, piece.now + motion.ahead, piece)
-        change = self._move(terms, force, piece)
-        _, accelerations = settle_forces(
-            matrix,
-            [sum(map(mul, slips[j].levers, change)) + slips[j].bias for j in resting],
-            [self._bounds_of(j, piece) for j in resting],
-        )
+        now = piece.now + motion.ahead
+        force, rows = self._force(terms, motion.rate, now, piece), self._rows(slips)
+        bound: dict[int, float] = {}
+        for _ in range(_FIXED_ROUNDS):
+            pushed = force
+            for j, friction in bound.items():
+                pushed -= (piece.senses[j] * friction) * rows[j]
+            change = self._move(terms, pushed, piece)
+            borne, accelerations = settle_forces(
+                matrix,
+                [sum(map(mul, rows[j], change)) + slips[j].bias for j in resting],
+                [self._bounds_of(j, piece, bound) for j in resting],
+            )
+            if self.pressing is None:
+                break
+            for j, part in zip(resting, borne, strict=True):
+                pushed += part * rows[j]
+            resisted = self._sliding_frictions(slips, piece, bound) | dict(
+                zip(resting, borne, strict=True)
+            )
+            change = self._move(terms, pushed, piece)
+            before, bound = bound, self._press_frictions(terms, now, change, resisted)
+            if all(
+                abs(new - before.get(j, 0.0)) <= _FIXED * min(new, LARGEST)
+                for j, new in bound.items()
+            ):
+                break
         found = zip(resting, accelerations, strict=True)
         return {j: copysign(1.0, slipping) for j, slipping in found if slipping}
 
-    def _sticking_forces(
-        self, terms: InputTerms, rate: InputVector, piece: _Piece, force: InputVector
-    ) -> list[tuple[InputVector, float]]:
-        """Return of each joint that sticks its levers, and its friction beside a force."""
+    @staticmethod
+    def _rows(slips: Mapping[int, Slip]) -> dict[int, InputVector]:
+        return {j: InputVector(slip.levers) for j, slip in slips.items()}
+
+    def _sliding_frictions(
+        self, slips: Mapping[int, Slip], piece: _Piece, pressed: Mapping[int, float]
+    ) -> dict[int, float]:
+        """Return the friction of joints that slide along their positive slips."""
+        return {
+            j: -sense * (self._friction_of(j, piece).sliding(slips[j].rate) + pressed.get(j, 0.0))
+            for j, sense in piece.senses.items()
+            if sense
+        }
+
+    def _weights(
+        self, one: float, change: InputVector, resisted: Mapping[int, float]
+    ) -> list[float]:
+        """Return the weights of `Pressing.forces_by`."""
+        assert self.pressing is not None
+        stops = [self._first_stop + k for k in range(len(self.joint_stops))]
+        numbers = [*range(len(self.frictions)), *stops]
+        return [one, *change[: self.pressing.inputs], *[resisted.get(j, 0.0) for j in numbers]]
+
+    def _press_frictions(
+        self, terms: InputTerms, time: float, change: InputVector, resisted: Mapping[int, float]
+    ) -> dict[int, float]:
+        """Return the friction by the forces in joints, from accelerations and all friction."""
+        assert self.pressing
+        assert terms.presses
+        presses = terms.presses(time)
+        if not presses:
+            return {}
+        forces = self.pressing.forces_by(presses, [self._weights(1.0, change, resisted)])
+        frictions = zip(self.pressing.solver.factors, forces, strict=True)
+        return {
+            j: min(factor * hypot(*force), LARGEST)
+            for j, (factor, (force,)) in zip(self.pressing.joints, frictions, strict=True)
+        }
+
+    def _resolve(
+        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
+    ) -> _Resolved | None:
+        """Return the forces with those of joints that stick and slide; None where it jams."""
+        force = self._force(terms, rate, time, piece)
+        if not piece.sticking and self.pressing is None:
+            return _Resolved(force)
         slips = self._slips(terms, rate, piece)
-        rows = [InputVector(slips[j].levers) for j in piece.sticking]
-        moved = [self._move(terms, row, piece) for row in rows]
-        change = self._move(terms, force, piece)
-        needed = [
-            -sum(map(mul, row, change)) - slips[j].bias
-            for row, j in zip(rows, piece.sticking, strict=True)
+        rows = self._rows(slips)
+        stuck = [rows[j] for j in piece.sticking]
+        moved = [self._move(terms, row, piece) for row in stuck]
+
+        def with_sticking(force: InputVector, biases: Sequence[float]) -> _Resolved:
+            change = self._move(terms, force, piece)
+            needed = [
+                -sum(map(mul, row, change)) - bias for row, bias in zip(stuck, biases, strict=True)
+            ]
+            parts = _solve_coupled(stuck, moved, needed) if stuck else []
+            for row, part in zip(stuck, parts, strict=True):
+                force += part * row
+            return _Resolved(force, dict(zip(piece.sticking, parts, strict=True)))
+
+        whole = with_sticking(force, [slips[j].bias for j in piece.sticking])
+        if self.pressing is None or terms.presses is None:
+            return whole
+        presses = terms.presses(time)
+        if not presses:
+            return None
+        joints, senses = self.pressing.joints, piece.senses
+        units = {
+            j: with_sticking(-senses[j] * rows[j], [0.0] * len(stuck))
+            for j in joints
+            if senses.get(j)
+        }
+        sliding = self._sliding_frictions(slips, piece, {})
+        weights = [
+            self._weights(1.0, self._move(terms, whole.force, piece), {**sliding, **whole.parts})
         ]
-        return [*zip(rows, _solve_coupled(rows, moved, needed), strict=True)]
+        for j, unit in units.items():
+            change = self._move(terms, unit.force, piece)
+            weights.append(self._weights(0.0, change, {j: -senses[j], **unit.parts}))
+        numbers: list[float] = []
+        forces = self.pressing.forces_by(presses, weights)
+        for j, (without, *by_unit) in zip(joints, forces, strict=True):
+            # The friction of what sticks is among the forces already.
+            of = dict(zip(units, by_unit, strict=True))
+            for pair in (without, *(of.get(k, (0.0, 0.0)) for k in joints)):
+                numbers += pair if j in units else (0.0, 0.0)
+        found = self.pressing.solver.solve_by_forces(numbers)
+        if found is None:
+            return None
+        frictions = dict(zip(joints, found, strict=True))
+        force, parts = whole.force, dict(whole.parts)
+        for j, unit in units.items():
+            force += frictions[j] * unit.force
+            parts = {k: part + frictions[j] * unit.parts[k] for k, part in parts.items()}
+        resisted = self._sliding_frictions(slips, piece, frictions) | parts
+        pressed = self._press_frictions(terms, time, self._move(terms, force, piece), resisted)
+        return _Resolved(force, parts, pressed)
 
     def _break_margin(self, motion: SeveralMotion, piece: _Piece) -> float:
         """Return how much more the joints hold that stick; negative where one breaks away."""
         if sum(not sense for sense in piece.senses.values()) > len(piece.sticking):
             # What each of them bears is not certain, but whether they hold is.
             return -1.0 if self._find_slipping(motion, piece) else 1.0
-        force = self._force(motion.terms, motion.rate, piece.now + motion.ahead, piece)
-        borne = self._sticking_forces(motion.terms, motion.rate, piece, force)
-        bounds = [self._bounds_of(j, piece) for j in piece.sticking]
-        parts = zip(bounds, borne, strict=True)
-        return min((min(part - low, high - part) for (low, high), (_, part) in parts), default=inf)
+        resolved = self._resolve(motion.terms, motion.rate, piece.now + motion.ahead, piece)
+        if resolved is None:
+            return inf
+        margins = []
+        for j, part in resolved.parts.items():
+            low, high = self._bounds_of(j, piece, resolved.pressed)
+            margins.append(min(part - low, high - part))
+        return min(margins, default=inf)
 
     def _rest_slips(
         self, motion: SeveralMotion, piece: _Piece, halted: int | None
@@ -441,12 +572,12 @@ class SeveralDofMechanism:
     def _stop_pull(self, motion: SeveralMotion, number: int, piece: _Piece) -> float:
         """Return the force with which a stop would have to pull an input to hold it."""
         terms = motion.terms
-        force = self._total_force(terms, motion.rate, piece.now + motion.ahead, piece)
-        change = self._free_acceleration(terms, force, piece)
-        if change is None:
+        resolved = self._resolve(terms, motion.rate, piece.now + motion.ahead, piece)
+        change = resolved and self._free_acceleration(terms, resolved.force, piece)
+        if resolved is None or change is None:
             return 0.0
         needed = sum(terms.inertia(number, j) * change[j] for j in range(len(change)))
-        needed -= force[number]
+        needed -= resolved.force[number]
         return needed if motion.value[number] >= self.stops[number][1] else -needed
 
     def _force(
@@ -465,25 +596,15 @@ class SeveralDofMechanism:
                     total -= sense * resisted * InputVector(slip.levers)
         return total
 
-    def _total_force(
-        self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
-    ) -> InputVector:
-        """Return the force on each input with that of joints that stick."""
-        total = self._force(terms, rate, time, piece)
-        if piece.sticking:
-            for row, part in self._sticking_forces(terms, rate, piece, total):
-                total += part * row
-        return total
-
     def _accelerate(
         self, terms: InputTerms, rate: InputVector, time: float, piece: _Piece
     ) -> InputVector | None:
         """Return q̈ of the equation of motion; 0 of inputs that are held at their stops."""
         if piece.sticking and len(piece.sticking) + len(piece.held) >= len(rate):
             return InputVector([0.0] * len(rate))
-        force = self._total_force(terms, rate, time, piece)
-        found = self._free_acceleration(terms, force, piece)
-        return found if found is None else self._without_braked(found, piece)
+        resolved = self._resolve(terms, rate, time, piece)
+        found = resolved and self._free_acceleration(terms, resolved.force, piece)
+        return None if found is None else self._without_braked(found, piece)
 
     def _without_braked(self, change: InputVector, piece: _Piece) -> InputVector:
         """Return rates or accelerations of which those are 0, not nearly, that a brake holds."""

@@ -37,7 +37,7 @@ Commands = Sequence[float | None]
 """The command of each input in its unit; None without one."""
 
 
-class Play(NamedTuple):
+class MotorPlay(NamedTuple):
     """The play between a motor and the input that it drives."""
 
     width: float  # In [rad] or [m]
@@ -45,7 +45,9 @@ class Play(NamedTuple):
     restitution: float  # Ratio of the relative rates after and before they meet, 0 to 1
 
 
-def behind_play(mechanism: SeveralDofMechanism, plays: Mapping[int, Play]) -> SeveralDofMechanism:
+def behind_play(
+    mechanism: SeveralDofMechanism, plays: Mapping[int, MotorPlay]
+) -> SeveralDofMechanism:
     """
     Return a mechanism of which some inputs, by number, have play to their motors.
 
@@ -75,6 +77,7 @@ def behind_play(mechanism: SeveralDofMechanism, plays: Mapping[int, Play]) -> Se
             tuple([law._replace(levers=law.levers + more) for law in there.laws]),
             tuple([slip._replace(levers=slip.levers + more) for slip in there.slips]),
             tuple(limited),
+            there.presses,
         )
 
     ends = [

@@ -159,11 +159,6 @@ class WoundMechanism:
     command: Any = None  # The command, in [A] or [V]; None if there is none
 
     @property
-    def moved(self) -> Any:
-        """Return the mechanism without its winding."""
-        return self.mechanism
-
-    @property
     def stops(self) -> Any:
         """Lower and upper stop of the input, in [rad] or [m]."""
         return self.mechanism.stops

@@ -209,24 +209,19 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_what_is_for_one_input_is_refused(name):
+def test_what_cannot_be_moved_is_refused(name):
     parameters, line = REFUSED[name]
     with pytest.raises(DefinitionError) as caught:
         five_bar(**parameters)
     assert str(caught.value).startswith(line)
 
 
-def test_friction_by_the_force_in_a_joint_is_refused_and_a_curve_too_steep():
+def test_a_curve_of_friction_too_steep_for_the_step_is_refused():
     drive, closure = TorqueDrive(inputs=START), closed('five_bar')
-    rubbing = {
-        'coefficient: friction by the force in a joint is for one input': JointFriction(
-            coefficient=0.1, radius=0.01
-        ),
-        'stribeck: the curve is too steep': JointFriction(breakaway=50.0, stribeck=1e-4),
-    }
-    for line, friction in rubbing.items():
-        with pytest.raises(DefinitionError, match=rf'effects\.friction\.joints\.P\.{line}'):
-            drive.build(context_of(closure, friction=Friction({'P': friction})))
+    steep = JointFriction(breakaway=50.0, stribeck=1e-4)
+    line = r'effects\.friction\.joints\.P\.stribeck: the curve is too steep'
+    with pytest.raises(DefinitionError, match=line):
+        drive.build(context_of(closure, friction=Friction({'P': steep})))
     drive.build(context_of(closure, friction=Friction({'P': JointFriction(0.1, 0.2)})))
 
 

@@ -44,17 +44,37 @@ PLAY = 'play: {width: 0.03, inertia: 1.0e-3}'
 MOTOR = 'torque_constant: 0.05, ratio: 10, resistance: 1.5, voltage: 6'
 # Name: (what the drive has, what the scene has besides).
 SCENES = {
-    'motor': (f'motor: {{{MOTOR}, command: voltage, quantum: 0.3}}', ''),
-    'gear': (f'motor: {{{MOTOR}, command: current, efficiency: 0.7, back_efficiency: 0.4}}', ''),
-    'winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}', ''),
-    'play': ('play: {width: 0.03, inertia: 1.0e-3, restitution: 0.3}', ''),
-    'play, winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}, {PLAY}', ''),
-    'delay': (f'motor: {{{MOTOR}, command: voltage, delay: 0.0123}}', ''),
+    'motor': (f'motor: {{{MOTOR}, command: voltage, quantum: 0.3}}', {}),
+    'gear': (f'motor: {{{MOTOR}, command: current, efficiency: 0.7, back_efficiency: 0.4}}', {}),
+    'winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}', {}),
+    'play': ('play: {width: 0.03, inertia: 1.0e-3, restitution: 0.3}', {}),
+    'play, winding': (f'motor: {{{MOTOR}, command: effort, inductance: 0.02}}, {PLAY}', {}),
+    'dry friction': (
+        '',
+        {
+            'A1': {'coulomb': 2e-3, 'breakaway': 4e-3},
+            'Q1': {'coulomb': 1e-2},
+            'A2': {'coulomb': 3e-3},
+            'Q2': {'coulomb': 2e-2, 'breakaway': 0.03, 'stribeck': 0.3},
+        },
+    ),
+    'friction by force': (
+        '',
+        {
+            'A1': {'coefficient': 0.3, 'radius': 0.01},
+            'B1': {'coulomb': 1e-3},
+            'A2': {'coefficient': 0.5, 'radius': 0.008, 'coulomb': 2e-3, 'breakaway': 3e-3},
+            'Q2': {'coefficient': 0.3, 'radius': 0.02},
+        },
+    ),
+    'delay': (f'motor: {{{MOTOR}, command: voltage, delay: 0.0123}}', {}),
 }
 
 
 def scene_of(name, numbers):
-    drive, besides = SCENES[name]
+    drive, friction = SCENES[name]
+    mine = {joint: of for joint, of in friction.items() if int(joint[-1]) in numbers}
+    effects = {'velocity': {}, 'effort': {}, **({'friction': {'joints': mine}} if mine else {})}
     starts = ', '.join(f'crank{n}_joint: {{start: 0.{n}}}' for n in numbers)
     return f"""
 drive:
@@ -62,15 +82,16 @@ drive:
     {{inputs: {{{starts}}}, method: gauss_legendre, step: 5.0e-4, timeout: 0.05,
      motor_encoder: {{}}, {drive}}}
 loads: {{gravity: [0, -9.81], drive_inertia: 2.0e-4}}
-effects: {{velocity: {{}}, effort: {{}}{besides}}}
+effects: {effects}
 """
 
 
-def command_at(number, time_ms):
+def command_at(name, number, time_ms):
     """Return the command of a four-bar at a time, of which some run out and turn; or None."""
     if time_ms % (30 + 10 * number):
         return None
-    return 0.5 * (-1.0) ** (time_ms // 120) / number
+    most = 0.05 if SCENES[name][1] else 0.5
+    return most * (-1.0) ** (time_ms // 120) / number
 
 
 def run(name, numbers, milliseconds=250):
@@ -80,7 +101,7 @@ def run(name, numbers, milliseconds=250):
     found = {n: [] for n in numbers}
     for time in range(milliseconds):
         now = BEGIN + time * MS
-        commands = tuple(command_at(n, time) for n in numbers)
+        commands = tuple(command_at(name, n, time) for n in numbers)
         if any(command is not None for command in commands):
             alone = len(numbers) == 1
             given = EffortCommand(0, commands[0]) if alone else EffortsCommand(0, commands)

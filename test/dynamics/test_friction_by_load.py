@@ -10,7 +10,7 @@
 
 from cmath import rect
 from dataclasses import replace
-from math import copysign, cos, hypot, pi, sin, sqrt
+from math import copysign, cos, hypot, inf, pi, sin, sqrt
 
 from hypothesis import given, strategies as st
 from linkage_ros.dynamics import (
@@ -23,6 +23,7 @@ from linkage_ros.dynamics import (
     METHODS,
     PointLoad,
     Reactions,
+    SeveralDofMechanism,
     SingleDofMechanism,
     WrenchLoad,
 )
@@ -30,11 +31,13 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics import Closure, cross_product, GROUND, Mass
 from linkage_ros.messages import EffortCommand
 from linkage_ros.stages.drives import Context, TorqueDrive
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from .loaded import BEGIN, closed, loads_of, STATES, swing
+from .test_in_space import weighed
 from ..support.messages import read_joint_state
 from ..support.scenes import closure_of, PENDULUM, pipeline_of
 
@@ -234,6 +237,71 @@ def test_the_acceleration_is_that_whose_effort_is_the_command(name):
             efforts = reactions.drive_efforts(*moved(closure, value, rate, pull))
             size = abs(mechanics.motion_terms(closure.position(value)).inertia * pull) + abs(force)
             assert efforts == pytest.approx((force,), abs=1e-10 * size)
+
+
+def pressed(closure, joints, loads):
+    """Return the mechanism of a linkage of several inputs, and the forces in its joints."""
+    mechanics = Mechanics(closure, loads, Friction(joints))
+    reactions = Reactions(mechanics)
+    pressing = reactions.pressing
+    mechanism = SeveralDofMechanism(
+        pressing.mount_on(mechanics.input_equation),
+        METHODS['rk4'].step,
+        ((-inf, inf),) * len(closure.input_names),
+        frictions=mechanics.dry_frictions,
+        pressing=pressing,
+    )
+    return mechanism, reactions
+
+
+def several_rubbing(name):
+    """Return a linkage of several inputs, friction of its joints, its loads and a place."""
+    if name == 'five_bar':
+        return *rubbing_everywhere(name), Loads((0.0, -9.81)), [1.2, 1.9]
+    closure = weighed(name)
+    named = (*closure.input_names, *closure.joint_names)
+    hinges = [joint for joint in named if joint in closure.linkage.hinges]
+    joints = {joint: JointFriction(0.01, 0.02, coefficient=0.2, radius=0.005) for joint in hinges}
+    return closure, joints, Loads((0.0, 0.0, -9.81)), [*closure.linkage.pose.inputs]
+
+
+@pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
+def test_accelerations_of_several_inputs_are_those_whose_efforts_are_the_commands(name):
+    closure, joints, loads, start = several_rubbing(name)
+    mechanism, reactions = pressed(closure, joints, loads)
+    count = len(start)
+    for rates, forces in (([1.5, -0.8, 0.4], [0.3, -0.2, 0.1]), ([-0.5, -0.9, 0.7], [0.0] * 3)):
+        motion = mechanism.state_at(start, rates[:count])
+        changes = mechanism.acceleration(motion, forces[:count])
+        position = closure.close_unlimited(*start)
+        velocity = closure.velocity(position, *rates[:count])
+        acceleration = closure.acceleration(position, velocity, *changes)
+        efforts = reactions.drive_efforts(position, velocity, acceleration)
+        size = motion.terms.total_inertia * max(map(abs, changes)) + 1.0
+        assert efforts == pytest.approx(forces[:count], abs=1e-10 * size)
+
+
+@pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
+def test_several_inputs_at_rest_are_held_up_to_the_effort_that_moves_them(name):
+    """At the start of a motion q̈ is 0, and each joint resists all that it can."""
+    closure, joints, loads, start = several_rubbing(name)
+    joints = {joint: replace(of, coulomb=0.0, breakaway=0.0) for joint, of in joints.items()}
+    mechanism, reactions = pressed(closure, joints, loads)
+    count, position = len(start), closure.close_unlimited(*start)
+    motion = mechanism.state_at(start, [0.0] * count)
+    for ways in ([1.0, -0.8, 0.4], [-0.5, -0.9, 0.7], [0.9, 0.1, -0.3]):
+        velocity = closure.velocity(position, *(1e-9 * way for way in ways[:count]))
+        still = closure.acceleration(position, velocity, *[0.0] * count)
+        needed = np.array(reactions.drive_efforts(position, velocity, still))
+        weight = np.array(motion.terms.bias)
+        for share, moves in ((0.98, False), (1.02, True)):
+            force = (weight + share * (needed - weight)).tolist()
+            change = mechanism.acceleration(motion, force)
+            assert any(change) == moves
+            after = mechanism.advance(motion, 1e-3, force)
+            assert (after.value != motion.value) == moves
+        # A little beyond, it begins to move where every joint slips as it was said to.
+        assert np.dot(change, ways[:count]) > 0.0
 
 
 def test_a_linkage_that_jams_stands_under_any_command():

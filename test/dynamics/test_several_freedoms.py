@@ -18,7 +18,7 @@ from linkage_ros.dynamics import (
     Loads,
     Mechanics,
     METHODS,
-    Play,
+    MotorPlay,
     SeveralDofMechanism,
     SoftStop,
 )
@@ -264,7 +264,7 @@ def test_at_a_toggle_it_is_held_as_by_a_stop(restitution):
 def test_motors_that_bounce_in_their_play_keep_the_energy():
     closure, start = several('five_bar')
     mechanics = Mechanics(closure, Loads())
-    plays = {0: Play(0.02, 0.001, 1.0), 1: Play(0.03, 0.002, 1.0)}
+    plays = {0: MotorPlay(0.02, 0.001, 1.0), 1: MotorPlay(0.03, 0.002, 1.0)}
     moved = behind_play(mechanism(mechanics, method='gauss_legendre'), plays)
     state = moved.state_at([*start, *start], [0.5, -0.5, 2.0, -1.5])
 
@@ -293,7 +293,7 @@ def test_a_blow_on_what_leans_on_its_stop_is_one_on_a_wall(restitution):
     mechanics = Mechanics(closure, Loads())
     stops = (-2.0, start[0]), FREE
     bare = mechanism(mechanics, stops, restitution=0.5)
-    moved = behind_play(bare, {0: Play(0.02, 0.001, restitution)})
+    moved = behind_play(bare, {0: MotorPlay(0.02, 0.001, restitution)})
     state = moved.state_at([*start, start[0]], [0.0, 0.0, 1.0])
     for _ in range(12):
         state = moved.advance(state, 1e-3, [1.0, 0.0, 0.0])

@@ -175,7 +175,8 @@ class SeveralTorqueCrank(TorqueCrank):
         efforts, holding = self._motors.efforts(mechanism, motion, forces, brakes)
         bearing: tuple[float, ...] = ()
         moved = without_winding(motion)
-        touching: dict[int, int] = without_winding(self._mechanism).leaning_sides(moved)
+        wound: Any = self._mechanism
+        touching = getattr(wound, 'mechanism', wound).leaning_sides(moved)
         behind = sum(at >= count for at in drives)
         for at in drives:
             least, most = efforts[at] - holding[at], efforts[at] + holding[at]

@@ -387,8 +387,8 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     """Build the crank of a linkage with several inputs."""
     from linkage_ros.dynamics import (
         behind_play,  # local import: only with several
+        MotorPlay,  # local import: only with several
         motors_of,  # local import: only with several
-        Play,  # local import: only with several
         SeveralDofMechanism,  # local import: only with several
     )
     from linkage_ros.stages.drives.several_torques import (
@@ -396,7 +396,6 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     )
 
     mechanics, inputs = context.mechanics, context.closure.linkage.inputs
-    _refuse_for_several(parameters, context)
     uses = tuple(parameters.for_input(given.joint) for given in inputs)
     keys = [parameters.key_for(given.joint, 'motor') for given in inputs]
     built = [
@@ -410,14 +409,19 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         for use, given in zip(uses, inputs, strict=True)
     )
     limits = context.hard_limited.linkage.inputs
+    terms, pressing = mechanics.input_equation, None
+    if mechanics.friction.load_dependent_joint:
+        pressing = context.reactions.pressing
+        terms = pressing.mount_on(terms)
     mechanism = SeveralDofMechanism(
-        mechanics.input_equation,
+        terms,
         METHODS[parameters.method].step,
         tuple((given.limits.low, given.limits.high) for given in limits),
         parameters.restitution,
         mechanics.applied.laws if mechanics.applied else (),
         frictions=mechanics.dry_frictions,
         joint_stops=mechanics.joint_stops,
+        pressing=pressing,
     )
     start = mechanism.state_at([use.start for use in uses], [use.rate for use in uses])
     if start is None:
@@ -431,7 +435,7 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     of_motors = sum(use.play.inertia for use in uses if use.play)
     mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin + of_motors)
     plays = {
-        index: Play(use.play.width, use.play.inertia, use.play.restitution)
+        index: MotorPlay(use.play.width, use.play.inertia, use.play.restitution)
         for index, use in enumerate(uses)
         if use.play
     }
@@ -455,16 +459,3 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     moved = motors.mount_on(behind_play(mechanism, plays) if plays else mechanism)
     begin = moved.state_at(*([*of, *[of[n] for n in plays]] for of in (start.value, start.rate)))
     return SeveralTorqueCrank(moved, begin, uses, period, most, motors, wrenches, exerts)
-
-
-def _refuse_for_several(parameters: TorqueDrive, context: Context) -> None:
-    """Refuse what is for one input only: friction by the force in a joint, and play."""
-    names = context.closure.input_names
-    reason = f'is for one input, and the linkage has {len(names)}'
-    for name, rubbing in context.mechanics.friction.joints.items():
-        if rubbing.coefficient:
-            raise DefinitionError(
-                f'effects.friction.joints.{name}.coefficient',
-                f'friction by the force in a joint {reason}',
-                'write coulomb instead',
-            )
