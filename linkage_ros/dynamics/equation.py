@@ -40,7 +40,7 @@ from operator import mul
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.dynamics.bodies import BodyModel, planar_bodies, spring_length
-from linkage_ros.dynamics.dry_friction import DryFriction, JointStop, Slip
+from linkage_ros.dynamics.dry_friction import DryFriction, JointStop, settle_forces, Slip
 from linkage_ros.dynamics.loads import (
     check_loads,
     check_masses,
@@ -49,7 +49,6 @@ from linkage_ros.dynamics.loads import (
     Loads,
 )
 from linkage_ros.dynamics.longest_step import check_step, EXACT
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     Acceleration,
     all_finite,
@@ -163,12 +162,6 @@ class Mechanics:
         linkage = closure.linkage
         check_masses(linkage, self.loads)
         check_loads(linkage, self.loads, self.friction)
-        if self.friction.holds and len(linkage.inputs) > 1:
-            raise DefinitionError(
-                'effects.friction.holds',
-                f'the linkage has {len(linkage.inputs)} inputs, and friction could hold either',
-                'leave it out',
-            )
         self.model = model = _bodies_of(closure, self.loads)
         """The bodies, and the ends of the springs."""
         self._points, self._bodies = model.points, model.bodies
@@ -321,15 +314,7 @@ class Mechanics:
         matrix: tuple[float, ...] = ()
         bias: tuple[float, ...] = ()
         for i, way in enumerate(alone):
-            for j in range(i + 1):
-                inertia = self.loads.drive_inertia if i == j else 0.0
-                for (mass, gyration, point), one, other in zip(
-                    self._bodies, turned[i], turned[j], strict=True
-                ):
-                    carried = vectors.scale(mass, moved[i][point])
-                    inertia += vectors.dot(carried, moved[j][point])
-                    inertia += vectors.turn_dot(vectors.momentum(gyration, one), other)
-                matrix += (inertia,)
+            matrix += self._inertia_row(moved[: i + 1], turned[: i + 1])
             needed = 0.0
             for body, (force, moment), turn in zip(self._bodies, forces, turned[i], strict=True):
                 needed += vectors.dot(force, moved[i][body.point])
@@ -357,6 +342,23 @@ class Mechanics:
         return InputTerms(
             matrix, mobility, bias, laws, *self._find_slips(position, velocity, still, alone)
         )
+
+    def _inertia_row(
+        self, moved: Sequence[Sequence[Any]], turned: Sequence[Sequence[Any]]
+    ) -> tuple[float, ...]:
+        """Return M between the last of some inputs and each of them, by rates of 1 of each."""
+        vectors = self.model.vectors
+        row: tuple[float, ...] = ()
+        for speeds, turns in zip(moved, turned, strict=True):
+            inertia = self.loads.drive_inertia if len(row) == len(moved) - 1 else 0.0
+            for (mass, gyration, point), one, other in zip(
+                self._bodies, turned[-1], turns, strict=True
+            ):
+                carried = vectors.scale(mass, moved[-1][point])
+                inertia += vectors.dot(carried, speeds[point])
+                inertia += vectors.turn_dot(vectors.momentum(gyration, one), other)
+            row += (inertia,)
+        return row
 
     def _find_slips(
         self,
@@ -520,6 +522,10 @@ class Mechanics:
         drags = [joint_friction(rubbing, v) for rubbing in self.friction_joints]
         forces = self._inertia_forces(accelerations, turns, changes)
         efforts: tuple[float, ...] = ()
+        moved_by: list[Any] = []
+        turned_by: list[Any] = []
+        matrix: tuple[float, ...] = ()
+        levers: tuple[float, ...] = ()
         for i, unit in enumerate(self._units):
             virtual = self.closure.velocity(position, *_unit_rates(count, i))
             w = virtual.state.coordinates
@@ -535,15 +541,52 @@ class Mechanics:
                 effort += drag * rubbing.slip_rate(w)
             if self.applied is not None:
                 effort -= self.applied.virtual_work(position, velocity, virtual, given)
-            if self.friction.holds:
+            if self.friction.holds and count > 1:
+                moved_by.append(moved)
+                turned_by.append(turned)
+                matrix += self._inertia_row(moved_by, turned_by)
+                levers += tuple(rubbing.slip_rate(w) for rubbing in self.dry_joints)
+            elif self.friction.holds:
                 held = sum(
-                    (rubbing.friction.coulomb + rubbing.friction.breakaway_excess)
-                    * abs(rubbing.slip_rate(w))
+                    rubbing.friction.holding * abs(rubbing.slip_rate(w))
                     for rubbing in self.friction_joints
                 )
                 rest = copysign(where(abs(effort) > held, abs(effort) - held, 0.0), effort)
                 effort = where(abs(v[1]) <= 0.0, rest, effort)
             efforts += (effort,)
+        if not (self.friction.holds and count > 1):
+            return efforts
+        limits = [
+            where(_is_at_rest(v, one.one, one.other), one.friction.holding, 0.0)
+            for one in self.dry_joints
+        ]
+        rest = call(self._efforts_beside_friction, *efforts, *matrix, *levers, *limits)
+        return tuple(rest[i] for i in range(count))
+
+    def _efforts_beside_friction(self, *numbers: float) -> list[float]:
+        """
+        Return what is left of efforts where friction carries what it can, of several inputs.
+
+        Friction carries what it would hold if the drives let go: what is left is what would then
+        accelerate the linkage. The numbers are efforts, the inertia, the slips of dry joints at a
+        rate of 1 of each input, and what these joints hold.
+        """
+        count, parts = len(self._units), iter(numbers)
+        efforts = [*islice(parts, count)]
+        rows = [[*islice(parts, i + 1)] for i in range(count)]
+        by_input = [[*islice(parts, len(self.dry_joints))] for _ in range(count)]
+        levers, limits = [*zip(*by_input, strict=True)], [*parts]
+        moved = [solve_positive(rows, lever) for lever in levers]
+        free = solve_positive(rows, efforts)
+        if free is None:
+            return efforts
+        borne, _ = settle_forces(
+            [[sum(map(mul, lever, way or ())) for way in moved] for lever in levers],
+            [-sum(map(mul, lever, free)) for lever in levers],
+            [(-limit, limit) for limit in limits],
+        )
+        for lever, part in zip(levers, borne, strict=True):
+            efforts = [effort - of * part for effort, of in zip(efforts, lever, strict=True)]
         return efforts
 
     @property

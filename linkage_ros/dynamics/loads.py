@@ -242,6 +242,11 @@ class JointFriction:
         return max(0.0, self.breakaway - self.coulomb)
 
     @property
+    def holding(self) -> float:
+        """Return what holds the joint at rest, in [N·m] or [N]."""
+        return self.coulomb + self.breakaway_excess
+
+    @property
     def is_dry(self) -> bool:
         """Return whether there is more than viscous friction."""
         return bool(self.coulomb or self.breakaway or self.coefficient)

@@ -126,3 +126,39 @@ def test_each_of_two_uncoupled_inputs_moves_as_it_does_alone(name):
         for one, other in zip(both[n], alone, strict=True):
             assert one == pytest.approx(other, rel=1e-6, abs=1e-6)
         assert max(abs(rate) for _, rate, *_ in alone) > 0.5, 'it moves'
+
+
+HELD = """
+drive: {{constant_rate: {{rate: {rate}, start: {start}, inputs: {{{inputs}}}}}}}
+loads: {{gravity: [0, -9.81]}}
+effects: {{effort: {{}}, friction: {{holds: true, joints: {{{joints}}}}}}}
+"""
+LIMITS = {
+    1: 'A1: {coulomb: 2e-3}, Q1: {coulomb: 4e-3}',
+    2: 'A2: {coulomb: 3e-3}, Q2: {coulomb: 5e-3}',
+}
+
+
+@pytest.mark.parametrize('rates', [(0.0, 0.0), (0.0, 1.5)])
+def test_friction_holds_each_of_two_uncoupled_inputs_as_it_holds_it_alone(rates):
+    def pipeline_for(first, *others):
+        inputs = [f'crank{n}_joint: {{rate: {rates[n - 1]}, start: 0.{n}}}' for n in others]
+        joints = [LIMITS[n] for n in (first, *others)]
+        scene = HELD.format(
+            rate=rates[first - 1],
+            start=f'0.{first}',
+            inputs=', '.join(inputs),
+            joints=', '.join(joints),
+        )
+        return pipeline_of(scene, four_bars(first, *others))
+
+    both = pipeline_for(1, 2)
+    states = [read_joint_state(both.tick(BEGIN + time * MS).message) for time in range(30)]
+    assert tuple(states[-1].effort) == both.linkages[0].interpret(BEGIN + 29 * MS).reading.efforts
+    for n in (1, 2):
+        alone = pipeline_for(n)
+        for time, state in enumerate(states):
+            mine = read_joint_state(alone.tick(BEGIN + time * MS).message)
+            effort = state.effort[[*state.name].index(f'crank{n}_joint')]
+            assert effort == pytest.approx(mine.effort[0], rel=1e-9, abs=1e-12)
+            assert abs(effort) > 1e-3

@@ -193,6 +193,41 @@ def test_at_a_toggle_friction_ends_no_step_for_ever():
     assert state.rate == (0.0, 0.0)
 
 
+@pytest.mark.parametrize('name', ['five_bar', 'ankle', 'delta'])
+def test_friction_that_holds_leaves_the_least_acceleration_to_the_drives(name):
+    """By scipy's bounded least squares, in the metric of the kinetic energy."""
+    closure, start = several(name)
+    if name == 'five_bar':
+        named = [joint.name for joint in closure.structure.joints]
+    else:
+        named = [*closure.input_names, *closure.joint_names]
+        named = [joint for joint in named if joint in closure.linkage.hinges]
+    gravity = GRAVITY if name != 'five_bar' else (0.0, -9.81)
+    start = [value + 0.1 * (1 + k) for k, value in enumerate(start)]
+    bare = Mechanics(closure, Loads(gravity))
+    position = closure.close_unlimited(*start)
+    velocity = closure.velocity(position, *[0.0] * len(start))
+    at_rest = position, velocity, closure.acceleration(position, velocity, *[0.0] * len(start))
+    needed = np.array(bare.drive_efforts(*at_rest))
+    left = set()
+    for size in (0.01, 0.1, 0.3, 3.0):
+        limits = [size * max(abs(needed)) * (1 + k) / 3 for k in range(len(named))]
+        joints = {
+            joint: JointFriction(coulomb=0.5 * limit, breakaway=limit)
+            for joint, limit in zip(named, limits, strict=True)
+        }
+        mechanics = Mechanics(closure, Loads(gravity), Friction(joints, holds=True))
+        efforts = np.array(mechanics.drive_efforts(*at_rest))
+        terms = mechanics.input_terms(position, [0.0] * len(start))
+        root = np.linalg.cholesky(np.array(terms.mobility)).T
+        levers = np.array([slip.levers for slip in terms.slips]).T
+        found = [joints[joint.name].breakaway for joint in mechanics.dry_joints]
+        solved = lsq_linear(root @ levers, root @ needed, (-np.array(found), found), tol=1e-15)
+        assert efforts == pytest.approx(needed - levers @ solved.x, abs=1e-6 * max(abs(needed)))
+        left.add(bool(np.abs(efforts).max() > 1e-6 * max(abs(needed))))
+    assert left == {False, True}
+
+
 def stopped_foot(restitution):
     """Return an ankle whose roll, no input, has a stop beside the pose, and its mechanism."""
     closure, start = several('ankle_motors')

@@ -43,10 +43,7 @@ class FrictionEffect(ForceEffect):
     joints: Mapping[str, JointFriction] = each_part(
         'of each pin or slider, in space of each joint', 'pin', JointFriction, required=True
     )
-    holds: bool = flag(
-        'at rest friction carries what it can, and effort the rest; for a linkage of one input',
-        False,
-    )
+    holds: bool = flag('at rest friction carries what it can, and effort the rest', False)
 
     sample = '{joints: {O2: {coulomb: 0.01}}}'
 
