@@ -45,6 +45,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from math import copysign, inf, ulp
 from typing import NamedTuple, TYPE_CHECKING, TypeVar
 
@@ -59,6 +60,7 @@ NARROW = 1e-14
 """Precision of an instant, as a fraction of the step."""
 
 State = TypeVar('State')
+Event = TypeVar('Event')
 
 LARGEST = 1e10
 """
@@ -70,7 +72,7 @@ As doubles, angles are 2e-6 rad apart there.
 _LEAST = 1e-100
 """Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
 
-_PIECES = 20
+PIECES = 20
 """
 Most pieces of a step: at stops, where it sticks, and where it is too long.
 
@@ -80,10 +82,10 @@ After these the mechanism rests: with so many bounces in one step it comes to re
 _KINKS = 20
 """Most cuts of a step at slips and segments; the rest of the step is integrated without cuts."""
 
-_BEGINNING = 1e-200
+BEGINNING = 1e-200
 """A rate that has a direction and no size."""
 
-_SHORTEST = 0.5**30
+SHORTEST = 0.5**30
 """Smallest fraction of a step that is integrated."""
 
 
@@ -133,6 +135,36 @@ def last_before(
     return after, last, known
 
 
+def piece_of_step(
+    reach: Callable[[float], State | None],
+    begin: State,
+    left: float,
+    shortest: float,
+    find_event: Callable[[State], Event | None],
+    margin_to: Callable[[Event], Callable[[State], float]],
+) -> tuple[float, State, Event | None] | None:
+    """
+    Return the length of the next piece of a step, its end, and the event that ends it, if any.
+
+    A piece that leads to where no motion exists is halved until it succeeds; None if it would then
+    be shorter than ``shortest``, in [s]. ``reach`` is as in `last_before`. ``find_event`` returns
+    an event that has happened before a state, None if there is none, and ``margin_to`` the margin
+    of states to it.
+    """
+    length, reached = left, reach(left)
+    while reached is None:
+        length *= 0.5
+        if length < shortest:
+            return None
+        reached = reach(length)
+    event = None
+    # At the last state before one event, another event may have happened already.
+    while happened := find_event(reached):
+        length, last, known = last_before(reach, margin_to(happened), begin, length, reached)
+        reached, event = last, happened if known else None
+    return length, reached, event
+
+
 class Motion(NamedTuple):
     """A state of one freedom."""
 
@@ -150,6 +182,17 @@ class _Event(Enum):
     TURN = 'rate zero'
     KINK = 'slip zero'
     SEGMENT = 'segment left'
+
+
+class _Piece(NamedTuple):
+    """What stays the same within a piece of a step."""
+
+    now: float  # The time at its start, in [s]
+    sense: float  # The direction of motion
+    sticks: bool  # Whether it may come to rest
+    # Of the joints and the laws at its start; empty without cuts.
+    slips: tuple[float, ...]
+    segments: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +228,7 @@ class SingleDofMechanism:
             force += self._applied_force(motion.terms, motion.rate, time)
         sense = self._motion_direction(motion, force, brake, time)
         if self.laws and not motion.rate:
-            force += self._applied_force(motion.terms, sense * _BEGINNING, time)
+            force += self._applied_force(motion.terms, sense * BEGINNING, time)
             force -= self._applied_force(motion.terms, 0.0, time)
         value, rate, terms, _ = motion
         free = _solve_acceleration(terms, rate, force, sense * brake, sense)
@@ -213,7 +256,7 @@ class SingleDofMechanism:
         left = seconds
         pieces = kinks = 0
         now, push, laws = time, force, self.laws
-        while pieces < _PIECES:
+        while pieces < PIECES:
             if laws:
                 now = time + (seconds - left)
                 push = force + self._applied_force(motion.terms, motion.rate, now)
@@ -233,24 +276,23 @@ class SingleDofMechanism:
             slips = terms.slips if cuts else ()
             segments = self._law_segments(motion, now, sense) if laws and cuts else ()
             reach = self._step_function(motion, now, force, sense * brake, sense, slips, segments)
-            length = left
-            reached = reach(length)
-            while reached is None:
-                length *= 0.5
-                if length < seconds * _SHORTEST:
-                    return self._bounce(motion)
-                reached = reach(length)
-            event = None
-            # At the last state before one event, another event may have happened already.
-            while happened := self._find_event(reached, now, sense, sticks, slips, segments):
-                margin = self._event_margin(happened, now, sense, slips, segments)
-                length, last, known = last_before(reach, margin, motion, length, reached)
-                reached, event = last, happened if known else None
+            piece = _Piece(now, sense, sticks, slips, segments)
+            found = piece_of_step(
+                reach,
+                motion,
+                left,
+                seconds * SHORTEST,
+                partial(self._find_event, piece),
+                partial(self._event_margin, piece),
+            )
+            if found is None:
+                return self._bounce(motion)
+            length, reached, event = found
             if event is _Event.SEGMENT:
                 # The next segment begins just beyond, at a time that differs when it is rounded.
                 length = min(length + 2.0 * ulp(time + seconds), left)
                 beyond = reach(length)
-                if beyond and not self._find_event(beyond, now, sense, sticks, slips, ()):
+                if beyond and not self._find_event(piece._replace(segments=()), beyond):
                     reached = beyond
             motion = reached
             if event in (_Event.KINK, _Event.SEGMENT):
@@ -321,7 +363,7 @@ class SingleDofMechanism:
         if self.friction_effort is None or sense == 0.0:
             return free
         # A rate that falls through zero within a step has the direction of the step.
-        moving = rate if rate * sense > 0.0 else sense * _BEGINNING
+        moving = rate if rate * sense > 0.0 else sense * BEGINNING
         mobility = sense / terms.inertia
         resisted = self.friction_effort(value, moving, time, free, mobility)
         return None if resisted is None else free - mobility * resisted
@@ -332,7 +374,7 @@ class SingleDofMechanism:
         most = terms.coulomb + terms.breakaway + brake
         if self.friction_effort is None or not push:
             return most
-        resisted = self.friction_effort(value, copysign(_BEGINNING, push), time, 0.0, 0.0)
+        resisted = self.friction_effort(value, copysign(BEGINNING, push), time, 0.0, 0.0)
         return inf if resisted is None else most + resisted
 
     def _reach_value(self, value: float, rate: float, ahead: float = 0.0) -> Motion | None:
@@ -343,16 +385,9 @@ class SingleDofMechanism:
             return None
         return Motion(value, rate, terms, ahead)
 
-    def _find_event(
-        self,
-        motion: Motion,
-        now: float,
-        sense: float,
-        sticks: bool,
-        slips: tuple[float, ...],
-        segments: tuple[int, ...],
-    ) -> _Event | None:
+    def _find_event(self, piece: _Piece, motion: Motion) -> _Event | None:
         """Return the event that has happened before a state, or None."""
+        now, sense, sticks, slips, segments = piece
         value, rate, terms, _ = motion
         low, high = self.stops
         if sticks and sense * rate < 0.0:
@@ -369,15 +404,9 @@ class SingleDofMechanism:
             else None
         )
 
-    def _event_margin(
-        self,
-        event: _Event,
-        now: float,
-        sense: float,
-        slips: tuple[float, ...],
-        segments: tuple[int, ...],
-    ) -> Callable[[Motion], float]:
+    def _event_margin(self, piece: _Piece, event: _Event) -> Callable[[Motion], float]:
         """Return a function that gives the margin of a state to an event."""
+        now, sense, _, slips, segments = piece
         low, high = self.stops
         if event is _Event.TURN:
             return lambda motion: sense * motion.rate
@@ -445,7 +474,7 @@ class SingleDofMechanism:
 
     def _law_segments(self, motion: Motion, now: float, sense: float) -> tuple[int, ...]:
         """Return the segment of each law for a motion, or for the direction in which it begins."""
-        rate = motion.rate or sense * _BEGINNING
+        rate = motion.rate or sense * BEGINNING
         return tuple(
             law.segment(at.value, at.factor * rate, now)
             for law, at in zip(self.laws, motion.terms.laws, strict=True)

@@ -49,6 +49,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import copysign, hypot, inf, ulp
 from operator import add, mul, sub
 from types import MappingProxyType
@@ -63,27 +64,21 @@ from linkage_ros.dynamics.dry_friction import (
 )
 from linkage_ros.dynamics.equation import InputTerms, solve_positive
 from linkage_ros.dynamics.laws import nearest_turn
-from linkage_ros.dynamics.motion import LARGEST, last_before, NARROW
+from linkage_ros.dynamics.motion import (
+    BEGINNING,
+    LARGEST,
+    NARROW,
+    piece_of_step,
+    PIECES,
+    SHORTEST,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.laws import Law
     from linkage_ros.dynamics.load_dependent_friction import Pressing
 
-_PIECES = 20
-"""
-Most pieces of a step with an impact that bounces, or that are too long.
-
-After these no impact bounces; after twice as many the rest of the step is left out.
-"""
-
 _CUTS = 20
 """Most cuts of a step at segments and where a stop lets go; then it is integrated without cuts."""
-
-_SHORTEST = 0.5**30
-"""Smallest fraction of a step that is integrated."""
-
-_BEGINNING = 1e-200
-"""A rate that has a direction and no size."""
 
 _PROBE = 1e-3
 """Fraction of a step after which a motion that is held at a toggle is seen to leave it."""
@@ -214,8 +209,9 @@ class SeveralDofMechanism:
         the brake of each holds, in [N·m] or [N]. ``time`` is the time of the state since the first
         tick, in [s].
         """
+        # With more than so many pieces no impact bounces; with twice as many the rest is left out.
         left, pieces, cuts, coarse = seconds, 0, 0, motion.coarse
-        while pieces < 2 * _PIECES:
+        while pieces < 2 * PIECES:
             now = time + (seconds - left)
             piece = self._begin_piece(
                 motion, InputVector(force), tuple(brakes), now, cuts=cuts < _CUTS
@@ -223,18 +219,17 @@ class SeveralDofMechanism:
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
                 return _at_rest(motion)._replace(coarse=coarse)
-            length, reached = left, reach(left)
-            while reached is None:
-                length *= 0.5
-                if length < seconds * _SHORTEST:
-                    return self._bounce(motion)._replace(coarse=coarse)
-                reached = reach(length)
-            event = None
-            # At the last state before one event, another event may have happened already.
-            while happened := self._find_event(motion, reached, piece):
-                margin = self._event_margin(happened, piece)
-                length, last, known = last_before(reach, margin, motion, length, reached)
-                reached, event = last, happened if known else None
+            found = piece_of_step(
+                reach,
+                motion,
+                left,
+                seconds * SHORTEST,
+                partial(self._find_event, motion, piece),
+                partial(self._event_margin, piece),
+            )
+            if found is None:
+                return self._bounce(motion)._replace(coarse=coarse)
+            length, reached, event = found
             if event and event.kind in ('leave', 'segment', 'break', 'halt'):
                 cuts += 1
                 # The next piece begins just beyond, at a time that differs when it is rounded.
@@ -247,13 +242,13 @@ class SeveralDofMechanism:
             if event and event.kind == 'toggle':
                 motion = self._bounce(motion)
             elif event and event.kind == 'stop':
-                motion = self._meet_stop(motion, event.number, bounces=pieces < _PIECES)
+                motion = self._meet_stop(motion, event.number, bounces=pieces < PIECES)
             left -= length
             if left <= seconds * NARROW:
                 break
         else:
             motion = _at_rest(motion)
-        coarse += pieces >= _PIECES
+        coarse += pieces >= PIECES
         return motion._replace(coarse=coarse) if coarse else motion
 
     def leaning_sides(self, motion: SeveralMotion) -> dict[int, int]:
@@ -561,7 +556,7 @@ class SeveralDofMechanism:
             rate = at.rate
             if rate == 0.0 and change is not None:
                 began = sum(map(mul, at.levers, change))
-                rate = copysign(_BEGINNING, began) if began else 0.0
+                rate = copysign(BEGINNING, began) if began else 0.0
             segments += (law.segment(at.value, rate, now),)
         return segments
 
@@ -679,7 +674,7 @@ class SeveralDofMechanism:
         return probe is None or probe.terms.total_inertia >= motion.terms.total_inertia
 
     def _find_event(
-        self, begin: SeveralMotion, motion: SeveralMotion, piece: _Piece
+        self, begin: SeveralMotion, piece: _Piece, motion: SeveralMotion
     ) -> _StepEnd | None:
         """Return an event that has happened before a state, or None."""
         for n, (at, (low, high)) in enumerate(zip(motion.value, self.stops, strict=True)):
@@ -707,7 +702,7 @@ class SeveralDofMechanism:
                     return _StepEnd('leave', n)
         return None
 
-    def _event_margin(self, event: _StepEnd, piece: _Piece) -> Callable[[SeveralMotion], float]:
+    def _event_margin(self, piece: _Piece, event: _StepEnd) -> Callable[[SeveralMotion], float]:
         """Return a function that gives the margin of a state to an event."""
         kind, n = event
         if kind == 'stop' and n >= len(self.stops):
