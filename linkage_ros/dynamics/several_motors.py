@@ -128,22 +128,24 @@ class InputMotors:
         return replace(mechanism, terms=equation_with_motors, laws=laws)
 
     def drive_by(
-        self, mechanism: SeveralDofMechanism, commands: Commands
+        self, mechanism: SeveralDofMechanism, commands: Commands, brake: float = 0.0
     ) -> tuple[SeveralDofMechanism, InputVector, InputVector]:
         """
         Return a mechanism with these motors under commands.
 
-        The second result has the forces of inputs without a motor, the third the friction of the
-        gears that acts at rest too, as brakes, in [N·m] or [N].
+        The second result has the forces of inputs without a motor, the third what holds them: a
+        brake where there is no command, and the friction of the gears that acts at rest too, in
+        [N·m] or [N].
         """
         forces, brakes = [0.0] * len(mechanism.stops), [0.0] * len(mechanism.stops)
         laws: list[MotorLaw] = []
         for at, motor, command in zip(self.drives, self.motors, commands, strict=True):
+            brakes[at] = brake if command is None else 0.0
             if motor is None:
                 forces[at] = command or 0.0
                 continue
             law = MotorLaw() if command is None else motor.effort_law(command)
-            brakes[at] = law.holding
+            brakes[at] += law.holding
             laws.append(law)
         if laws:
             mechanism = replace(mechanism, laws=(*self._loads_of(mechanism), *laws))
@@ -198,17 +200,20 @@ class InputWindings:
         return WoundMechanism(self.motor.mount_on(mechanism), self, (None,) * len(self.windings))
 
     def drive_by(
-        self, mechanism: WoundMechanism, commands: Commands
+        self, mechanism: WoundMechanism, commands: Commands, brake: float = 0.0
     ) -> tuple[WoundMechanism, InputVector, InputVector]:
-        """Return a mechanism under commands, and no further force or friction on its inputs."""
+        """Return a mechanism under commands, no further force, and brakes without a command."""
         wanted = [
             winding.motor.current_for(command)
             if winding and winding.command == 'effort' and command is not None
             else command
             for winding, command in zip(self.windings, commands, strict=True)
         ]
-        nothing = InputVector([0.0] * len(mechanism.mechanism.stops))
-        return replace(mechanism, command=tuple(wanted)), nothing, nothing
+        brakes = [0.0] * len(mechanism.mechanism.stops)
+        for at, command in zip(self.drives, commands, strict=True):
+            brakes[at] = brake if command is None else 0.0
+        nothing = InputVector([0.0] * len(brakes))
+        return replace(mechanism, command=tuple(wanted)), nothing, InputVector(brakes)
 
     def current_after(
         self, begin: Commands, rates: Sequence[float], commands: Commands, seconds: float

@@ -279,6 +279,11 @@ class EffortCommand(NamedTuple):
     stamp: int  # Stamp of the message, in [ns]; 0 without one
     effort: float  # Effort in [N·m]; of a sliding joint in [N]
 
+    @property
+    def efforts(self) -> tuple[float]:
+        """Return it as one of several joints."""
+        return (self.effort,)
+
 
 class EffortsCommand(NamedTuple):
     """Commands for several joints."""

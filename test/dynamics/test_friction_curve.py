@@ -16,7 +16,6 @@ from math import cos, exp
 
 from hypothesis import given, strategies as st
 from linkage_ros.dynamics import Friction, JointFriction, JointLoad, Loads, Mechanics
-from linkage_ros.errors import DefinitionError
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -102,11 +101,6 @@ def test_at_rest_friction_carries_what_it_can(angle):
         still = mechanics.closure.acceleration(position, velocity, 0.0)
         efforts = mechanics.drive_efforts(position, velocity, still)
         assert efforts == pytest.approx((expected,), abs=1e-12)
-
-
-def test_friction_holds_one_input_only():
-    with pytest.raises(DefinitionError, match='the linkage has 2 inputs'):
-        Mechanics(closed('five_bar'), friction=Friction({}, holds=True))
 
 
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])

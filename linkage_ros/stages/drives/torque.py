@@ -266,9 +266,8 @@ def _build_single(parameters: TorqueDrive, context: Context) -> TorqueCrank:
     wrenches = tuple(mechanics.applied.wrenches.values()) if mechanics.applied else ()
     # An effect of the user's may ask for it.
     exerts = any(name == 'effort' or '.' in name for name in context.effects)
-    return TorqueCrank(
-        motion, start, parameters, period, min(most, LARGEST), motor, wrenches, exerts
-    )
+    most = min(most, LARGEST)
+    return TorqueCrank(motion, start, (parameters,), period, (most,), motor, wrenches, exerts)
 
 
 def _build_motion(parameters: TorqueDrive, context: Context) -> Any:

@@ -17,18 +17,20 @@ shorter step of the same method, which is then discarded.
 
 from __future__ import annotations
 
-from collections import deque
+from bisect import insort
 from collections.abc import Sequence
-from math import copysign, inf, isfinite
+from math import inf, isfinite
+from operator import itemgetter
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.dynamics import LARGEST, Motion
 from linkage_ros.errors import LinkageError
-from linkage_ros.messages import EffortCommand, NANOSECONDS, Rejection
+from linkage_ros.messages import EffortCommand, EffortsCommand, NANOSECONDS, Rejection
 from linkage_ros.stages.drives.drive import Crank, CrankAtRest, CrankState
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import HeldWrench, Motor, Winding
+    from linkage_ros.stages.drives.torque import TorqueDrive
 
 _MADE_UP = NANOSECONDS
 """Time that one tick integrates at most, in [ns]; two periods if these are longer."""
@@ -62,17 +64,20 @@ class TorqueCrank(Crank):
     limit whole steps are skipped, as if the mechanism had stood still.
 
     The mechanism is a `SingleDofMechanism` or `linkage_ros.dynamics.two_masses.TwoMasses`.
-    ``use`` has the parameters of the drive, ``period`` is the time from tick to tick, in [ns]; 0
-    if unknown. Commands are clipped to ±``most``, in [N·m] or [N], or for a motor in [A] or [V].
+    ``uses`` has the parameters of the drive for each input, ``period`` is the time from tick to
+    tick, in [ns]; 0 if unknown. Commands are clipped to ±``most`` of their input, in [N·m] or [N],
+    or for a motor in [A] or [V]. A message commands the inputs that it names; the commands of the
+    others go on, each for the same time from its own arrival.
     """
 
     __slots__ = (
         '_acting',
         '_begun',
         '_boundary',
-        '_delay',
+        '_brake',
+        '_commands',
+        '_delays',
         '_due',
-        '_idle',
         '_least_made_up',
         '_loaded_until',
         '_made_up',
@@ -81,12 +86,15 @@ class TorqueCrank(Crank):
         '_most_made_up',
         '_motion',
         '_motor',
+        '_newest_inputs',
         '_play',
-        '_quantum',
+        '_quanta',
         '_shown',
+        '_stamps',
         '_step',
         '_time',
         '_until',
+        '_untils',
         '_waiting',
         '_wrenches',
         'exerts_effort',
@@ -111,9 +119,9 @@ class TorqueCrank(Crank):
         self,
         mechanism: Any,
         start: Any,
-        use: Any,
+        uses: Sequence[TorqueDrive],
         period: int,
-        most: float = LARGEST,
+        most: Sequence[float],
         motor: Motor | Winding | None = None,
         wrenches: tuple[HeldWrench, ...] = (),
         exerts_effort: bool = False,
@@ -121,57 +129,89 @@ class TorqueCrank(Crank):
         self.exerts_effort = exerts_effort
         self._mechanism = mechanism
         self._motion = self._shown = start
+        use = uses[0]
         self._step = round(use.step * NANOSECONDS)
         # A scene with slow ticks must not skip time between them.
         self._made_up = self._most_made_up = max(_MADE_UP, 2 * period)
-        self._idle: _Acting = (mechanism, 0.0, use.brake)
-        self._acting: _Acting = self._idle
         self._time = self._boundary = self._begun = -1
         self._until = self._due = self._loaded_until = NEVER
         self._wrenches = wrenches
-        self._motor = motor
-        self._delay = round(use.motor.delay * NANOSECONDS) if use.motor else 0
-        self._quantum = use.motor.quantum if use.motor else 0.0
-        self._waiting: deque[tuple[int, _Acting]] = deque()
-        self._play = use.play
+        self._motor, self._brake = motor, use.brake
+        motors = [use.motor for use in uses]
+        self._delays = [round(one.delay * NANOSECONDS) if one else 0 for one in motors]
+        self._quanta = [one.quantum if one else 0.0 for one in motors]
+        # The commands that wait: when they act, their inputs, and themselves.
+        self._waiting: list[tuple[int, int, float]] = []
+        self._commands: list[float | None] = [None] * len(uses)
+        self._untils = [NEVER] * len(uses)
+        self._stamps = [0] * len(uses)
+        self._newest_inputs: tuple[int, ...] = (0,)
+        plays = [use.play for use in uses if use.play]
+        self._play = max(plays, key=lambda play: play.on_chatter == 'end', default=None)
         self._least_made_up = max(_HURRIED, 2 * period)
         self.max_age = round(use.timeout * NANOSECONDS)
         self._most = most
         self.stamp = self.lost = self.saturated = 0
+        self._acting = self.actuation_for(*self._commands)
 
-    def offer(self, command: EffortCommand, now: int) -> Rejection | None:
-        """Take a command at a time [ns], or return why it is rejected; then nothing changes."""
-        effort = command.effort
-        if not -LARGEST <= effort <= LARGEST:
-            if isfinite(effort):
-                return Rejection.EFFORT_TOO_LARGE
-            return Rejection.EFFORT_NOT_FINITE
-        self.saturated += not -self._most <= effort <= self._most
-        acting = self.actuation_for(effort)
+    @property
+    def stamps(self) -> tuple[int, ...]:
+        """Arrival of the newest good command of each input, in [ns]; 0 before the first."""
+        return tuple(self._stamps)
+
+    @property
+    def newest_inputs(self) -> tuple[int, ...]:
+        """Numbers of the inputs that the last good message commands."""
+        return self._newest_inputs
+
+    def offer(self, command: EffortCommand | EffortsCommand, now: int) -> Rejection | None:
+        """Take commands at a time [ns], or return why they are rejected; then nothing changes."""
+        named = [(n, effort) for n, effort in enumerate(command.efforts) if effort is not None]
+        for _, effort in named:
+            if not -LARGEST <= effort <= LARGEST:
+                if isfinite(effort):
+                    return Rejection.EFFORT_TOO_LARGE
+                return Rejection.EFFORT_NOT_FINITE
         self.stamp = now
-        if self._delay:
-            self._waiting.append((now + self._delay, acting))
-            self._due = self._waiting[0][0]
-            return None
-        if self._time >= 0:
+        self._newest_inputs = tuple([number for number, _ in named])
+        if self._time >= 0 and not all(self._delays[number] for number, _ in named):
             self._advance(now)
-            if acting != self._acting and now > self._time:
-                self._go_to(now)
-        self._acting = acting
-        self._until = now + self.max_age
+        for number, effort in named:
+            most = self._most[number]
+            self.saturated += not -most <= effort <= most
+            clipped = min(max(effort, -most), most)
+            self._stamps[number] = now
+            if self._delays[number]:
+                due = now + self._delays[number]
+                insort(self._waiting, (due, number, clipped), key=itemgetter(0))
+                self._due = self._waiting[0][0]
+            else:
+                self._commands[number] = clipped
+                self._untils[number] = now + self.max_age
+        acting = self.actuation_for(*self._commands)
+        if self._time >= 0 and acting != self._acting and now > self._time:
+            self._go_to(now)
+        self._acting, self._until = acting, min(self._untils)
         return None
 
-    def actuation_for(self, effort: float | None) -> _Acting:
+    def actuation_for(self, *commands: float | None) -> _Acting:
         """Return mechanism, force on its input and brake under a command; None: without one."""
-        if effort is None:
-            return self._idle
-        if not -self._most <= effort <= self._most:
-            effort = copysign(self._most, effort)
+        rounded = []
+        for command, quantum in zip(commands, self._quanta, strict=True):
+            if command is None or not quantum:
+                rounded.append(command)
+            else:
+                rounded.append(round(command / quantum) * quantum)
+        return self._drive_by(rounded)
+
+    def _drive_by(self, commands: Sequence[float | None]) -> _Acting:
+        """Return what acts by commands that are within their limits."""
+        (command,) = commands
+        if command is None:
+            return self._mechanism, 0.0, self._brake
         if self._motor is None:
-            return self._mechanism, effort, 0.0
-        if self._quantum:
-            effort = round(effort / self._quantum) * self._quantum
-        return self._motor.drive_by(self._mechanism, effort)
+            return self._mechanism, command, 0.0
+        return self._motor.drive_by(self._mechanism, command)
 
     @property
     def motion(self) -> Any:
@@ -291,14 +331,18 @@ class TorqueCrank(Crank):
                 self._take_due(end)
                 self._due = self._waiting[0][0] if self._waiting else NEVER
 
-    def _expire(self, _end: int) -> None:
-        """End the command that is too old."""
-        self._acting, self._until = self._idle, NEVER
+    def _expire(self, end: int) -> None:
+        """End the commands that are too old."""
+        for number, until in enumerate(self._untils):
+            if until == end:
+                self._commands[number], self._untils[number] = None, NEVER
+        self._acting, self._until = self.actuation_for(*self._commands), min(self._untils)
 
     def _take_due(self, end: int) -> None:
         """Let the first command that waits act from a time on, in [ns]."""
-        self._acting = self._waiting.popleft()[1]
-        self._until = end + self.max_age
+        _, number, self._commands[number] = self._waiting.pop(0)
+        self._untils[number] = end + self.max_age
+        self._acting, self._until = self.actuation_for(*self._commands), min(self._untils)
 
     def _go_to(self, end: int) -> None:
         """Integrate a step, or the rest of one."""
