@@ -45,9 +45,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
 from math import copysign, inf, ulp
-from typing import NamedTuple, TYPE_CHECKING, TypeVar
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeVar
 
 from linkage_ros.dynamics.equation import Terms
 from linkage_ros.dynamics.integrators import Step
@@ -60,7 +59,6 @@ NARROW = 1e-14
 """Precision of an instant, as a fraction of the step."""
 
 State = TypeVar('State')
-Event = TypeVar('Event')
 
 LARGEST = 1e10
 """
@@ -135,21 +133,21 @@ def last_before(
     return after, last, known
 
 
-def piece_of_step(
+def end_of_piece(
+    moving: Any,
+    piece: Any,
     reach: Callable[[float], State | None],
     begin: State,
     left: float,
     shortest: float,
-    find_event: Callable[[State], Event | None],
-    margin_to: Callable[[Event], Callable[[State], float]],
-) -> tuple[float, State, Event | None] | None:
+) -> tuple[float, State, Any] | None:
     """
     Return the length of the next piece of a step, its end, and the event that ends it, if any.
 
     A piece that leads to where no motion exists is halved until it succeeds; None if it would then
-    be shorter than ``shortest``, in [s]. ``reach`` is as in `last_before`. ``find_event`` returns
-    an event that has happened before a state, None if there is none, and ``margin_to`` the margin
-    of states to it.
+    be shorter than ``shortest``, in [s]. ``moving.find_event`` returns an event that has happened
+    before a state, or None, and ``moving.margin_to`` the margin of states to it. For ``reach`` see
+    `last_before`.
     """
     length, reached = left, reach(left)
     while reached is None:
@@ -159,8 +157,9 @@ def piece_of_step(
         reached = reach(length)
     event = None
     # At the last state before one event, another event may have happened already.
-    while happened := find_event(reached):
-        length, last, known = last_before(reach, margin_to(happened), begin, length, reached)
+    while happened := moving.find_event(piece, reached):
+        margin = moving.margin_to(piece, happened)
+        length, last, known = last_before(reach, margin, begin, length, reached)
         reached, event = last, happened if known else None
     return length, reached, event
 
@@ -184,15 +183,13 @@ class _Event(Enum):
     SEGMENT = 'segment left'
 
 
-class _Piece(NamedTuple):
-    """What stays the same within a piece of a step."""
+_Piece = tuple[float, float, bool, tuple[float, ...], tuple[int, ...]]
+"""
+What stays the same within a piece of a step.
 
-    now: float  # The time at its start, in [s]
-    sense: float  # The direction of motion
-    sticks: bool  # Whether it may come to rest
-    # Of the joints and the laws at its start; empty without cuts.
-    slips: tuple[float, ...]
-    segments: tuple[int, ...]
+The time at its start, in [s], the direction of motion, whether it may come to rest, and the slips
+of the joints and the segments of the laws at its start; these are empty without cuts.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,7 +257,11 @@ class SingleDofMechanism:
             if laws:
                 now = time + (seconds - left)
                 push = force + self._applied_force(motion.terms, motion.rate, now)
-            sense = self._motion_direction(motion, push, brake, now)
+            sense = (
+                copysign(1.0, motion.rate)
+                if motion.rate
+                else self._motion_direction(motion, push, brake, now)
+            )
             if sense == 0.0:
                 held = self._resting_time(motion, left, force, brake, now) if laws else left
                 left -= held
@@ -276,15 +277,8 @@ class SingleDofMechanism:
             slips = terms.slips if cuts else ()
             segments = self._law_segments(motion, now, sense) if laws and cuts else ()
             reach = self._step_function(motion, now, force, sense * brake, sense, slips, segments)
-            piece = _Piece(now, sense, sticks, slips, segments)
-            found = piece_of_step(
-                reach,
-                motion,
-                left,
-                seconds * SHORTEST,
-                partial(self._find_event, piece),
-                partial(self._event_margin, piece),
-            )
+            piece = now, sense, sticks, slips, segments
+            found = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
             if found is None:
                 return self._bounce(motion)
             length, reached, event = found
@@ -292,7 +286,7 @@ class SingleDofMechanism:
                 # The next segment begins just beyond, at a time that differs when it is rounded.
                 length = min(length + 2.0 * ulp(time + seconds), left)
                 beyond = reach(length)
-                if beyond and not self._find_event(piece._replace(segments=()), beyond):
+                if beyond and not self.find_event((*piece[:4], ()), beyond):
                     reached = beyond
             motion = reached
             if event in (_Event.KINK, _Event.SEGMENT):
@@ -385,7 +379,7 @@ class SingleDofMechanism:
             return None
         return Motion(value, rate, terms, ahead)
 
-    def _find_event(self, piece: _Piece, motion: Motion) -> _Event | None:
+    def find_event(self, piece: _Piece, motion: Motion) -> _Event | None:
         """Return the event that has happened before a state, or None."""
         now, sense, sticks, slips, segments = piece
         value, rate, terms, _ = motion
@@ -404,7 +398,7 @@ class SingleDofMechanism:
             else None
         )
 
-    def _event_margin(self, piece: _Piece, event: _Event) -> Callable[[Motion], float]:
+    def margin_to(self, piece: _Piece, event: _Event) -> Callable[[Motion], float]:
         """Return a function that gives the margin of a state to an event."""
         now, sense, _, slips, segments = piece
         low, high = self.stops

@@ -49,7 +49,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import copysign, hypot, inf, ulp
 from operator import add, mul, sub
 from types import MappingProxyType
@@ -66,9 +65,9 @@ from linkage_ros.dynamics.equation import InputTerms, solve_positive
 from linkage_ros.dynamics.laws import nearest_turn
 from linkage_ros.dynamics.motion import (
     BEGINNING,
+    end_of_piece,
     LARGEST,
     NARROW,
-    piece_of_step,
     PIECES,
     SHORTEST,
 )
@@ -136,6 +135,7 @@ class _StepEnd(NamedTuple):
 class _Piece(NamedTuple):
     """What stays the same within a piece of a step."""
 
+    begin: SeveralMotion  # The state at its start
     now: float  # The time at its start, in [s]
     force: InputVector  # On the inputs, without the laws
     held: tuple[int, ...]  # The inputs that rest at their stops
@@ -219,14 +219,7 @@ class SeveralDofMechanism:
             reach = self._step_function(motion, piece)
             if self._is_held_at_toggle(motion, reach, left):
                 return _at_rest(motion)._replace(coarse=coarse)
-            found = piece_of_step(
-                reach,
-                motion,
-                left,
-                seconds * SHORTEST,
-                partial(self._find_event, motion, piece),
-                partial(self._event_margin, piece),
-            )
+            found = end_of_piece(self, piece, reach, motion, left, seconds * SHORTEST)
             if found is None:
                 return self._bounce(motion)._replace(coarse=coarse)
             length, reached, event = found
@@ -276,7 +269,7 @@ class SeveralDofMechanism:
         # Those that would be pulled are free; the worst of them first.
         leaning = self.leaning_sides(motion) if motion.resting else {}
         while True:
-            piece = _Piece(now, force, tuple(held), cuts, segments, brakes, leaning=leaning)
+            piece = _Piece(begin, now, force, tuple(held), cuts, segments, brakes, leaning=leaning)
             if self.frictions or brakes or leaning:
                 piece = self._with_frictions(begin, piece)
             pulls = {n: self._stop_pull(begin, n, piece) for n in held}
@@ -549,7 +542,7 @@ class SeveralDofMechanism:
         laws = motion.terms.laws
         change: InputVector | None = None
         if any(at.rate == 0.0 for at in laws):
-            piece = _Piece(now, force, (), False, ())
+            piece = _Piece(motion, now, force, (), False, ())
             change = self._accelerate(motion.terms, motion.rate, now, piece)
         segments: tuple[int, ...] = ()
         for law, at in zip(self.laws, laws, strict=True):
@@ -597,6 +590,8 @@ class SeveralDofMechanism:
         """Return q̈ of the equation of motion; 0 of inputs that are held at their stops."""
         if piece.sticking and len(piece.sticking) + len(piece.held) >= len(rate):
             return InputVector([0.0] * len(rate))
+        if not piece.sticking and self.pressing is None:
+            return self._free_acceleration(terms, self._force(terms, rate, time, piece), piece)
         resolved = self._resolve(terms, rate, time, piece)
         found = resolved and self._free_acceleration(terms, resolved.force, piece)
         return None if found is None else self._without_braked(found, piece)
@@ -673,9 +668,7 @@ class SeveralDofMechanism:
         probe = reach(_PROBE * seconds)
         return probe is None or probe.terms.total_inertia >= motion.terms.total_inertia
 
-    def _find_event(
-        self, begin: SeveralMotion, piece: _Piece, motion: SeveralMotion
-    ) -> _StepEnd | None:
+    def find_event(self, piece: _Piece, motion: SeveralMotion) -> _StepEnd | None:
         """Return an event that has happened before a state, or None."""
         for n, (at, (low, high)) in enumerate(zip(motion.value, self.stops, strict=True)):
             if not low <= at <= high and n not in piece.held:
@@ -683,7 +676,7 @@ class SeveralDofMechanism:
         passed = self._passed_stop(motion.terms, piece.leaning)
         if passed is not None:
             return _StepEnd('stop', len(self.stops) + passed)
-        inertia = motion.terms.total_inertia
+        begin, inertia = piece.begin, motion.terms.total_inertia
         if inertia > self.most_inertia and inertia > begin.terms.total_inertia:
             return _StepEnd('toggle')
         if piece.cuts:
@@ -691,10 +684,9 @@ class SeveralDofMechanism:
             for n, margin in self._slip_margins(motion, piece).items():
                 if margin < 0.0 <= self._slip_margins(begin, piece)[n]:
                     return _StepEnd('halt', n)
-            if piece.sticking and self._break_margin(motion, piece) < 0.0:
-                start = begin._replace(ahead=0.0)
-                if self._break_margin(start, piece) >= 0.0:
-                    return _StepEnd('break')
+            breaks = piece.sticking and self._break_margin(motion, piece) < 0.0
+            if breaks and self._break_margin(begin, piece) >= 0.0:
+                return _StepEnd('break')
             if self._segment_margin(motion, piece) < 0.0:
                 return _StepEnd('segment')
             for n in piece.held:
@@ -702,7 +694,7 @@ class SeveralDofMechanism:
                     return _StepEnd('leave', n)
         return None
 
-    def _event_margin(self, piece: _Piece, event: _StepEnd) -> Callable[[SeveralMotion], float]:
+    def margin_to(self, piece: _Piece, event: _StepEnd) -> Callable[[SeveralMotion], float]:
         """Return a function that gives the margin of a state to an event."""
         kind, n = event
         if kind == 'stop' and n >= len(self.stops):
