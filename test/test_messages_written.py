@@ -34,6 +34,7 @@ from linkage_ros.tools.view.report import DIAGNOSTIC_ARRAY
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype
+from scipy.spatial.transform import Rotation
 
 from .support.messages import header, JOINT_STATE, STORE
 
@@ -51,12 +52,12 @@ markers_ = st.builds(
     Marker, ns=texts, number=st.integers(-(2**31), 2**31 - 1), kind=st.integers(0, 12),
     scale=places, colour=st.tuples(share, share, share, share),
     points=st.lists(places, max_size=4),
-    at=st.complex_numbers(allow_nan=False, allow_infinity=False), z=finite, text=texts,
+    at=places, text=texts,
     action=st.sampled_from([ADD, DELETE]), lifetime=times
 )  # fmt: skip
 FULL = Marker(
     'links', 7, 4, (1.0, 2.0, 3.0), (0.25, 0.5, 0.75, 1.0),
-    [(4.0, 5.0, 6.0), (7.0, 8.0, 9.0)], 10 + 11j, 12.0, 'offen', ADD, 13 * NS + 14,
+    [(4.0, 5.0, 6.0), (7.0, 8.0, 9.0)], (10.0, 11.0, 12.0), 'offen', ADD, 13 * NS + 14,
 )  # fmt: skip
 
 
@@ -110,7 +111,7 @@ def marker_message(frame, marker, stamp, angle=0.0):
         header=header(divmod(stamp, NS), frame), ns=marker.ns, id=marker.number, type=marker.kind,
         action=marker.action,
         pose=TYPES['geometry_msgs/msg/Pose'](
-            point(marker.at.real, marker.at.imag, marker.z),
+            point(*marker.at),
             TYPES['geometry_msgs/msg/Quaternion'](0.0, 0.0, sin(angle / 2), cos(angle / 2))
         ),
         scale=TYPES['geometry_msgs/msg/Vector3'](*marker.scale),
@@ -261,7 +262,7 @@ def test_one_writer_writes_each_message_for_itself():
 @given(
     st.complex_numbers(max_magnitude=1e9, allow_nan=False),
     st.floats(-10.0, 10.0),
-    st.lists(st.complex_numbers(max_magnitude=1e9, allow_nan=False), min_size=2, max_size=2),
+    st.lists(places, min_size=2, max_size=2),
     st.booleans(),
 )
 def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn, shown):
@@ -272,15 +273,33 @@ def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn
     writer.move_points(1, drawn)
     writer.show_marker(1, shown)
     moved = FULL._replace(
-        at=at,
+        at=(at.real, at.imag, FULL.at[2]),  # its height stays
         colour=(1.0, 0.0, 0.5, 0.25),
-        # Heights stay.
-        points=[(p.real, p.imag, z) for p, z in zip(drawn, (6.0, 9.0), strict=True)],
+        points=drawn,
         action=ADD if shown else DELETE,
     )
     expected = marker_array('ground', [other, FULL, other], 3 * NS)
     expected.markers[1] = marker_message('ground', moved, 3 * NS, angle)
     assert writer.message_at(3 * NS) == serialized(expected, 'visualization_msgs/msg/MarkerArray')
+
+
+@given(
+    places, st.tuples(*[st.floats(-9.0, 9.0)] * 3).filter(lambda way: max(map(abs, way)) > 1e-3)
+)
+def test_a_rod_lies_between_two_places(start, way):
+    start = tuple(each % 7.0 for each in start)
+    end = tuple(a + b for a, b in zip(start, way, strict=True))
+    writer = MarkerArrayWriter('ground', [FULL, FULL])
+    writer.lay_rod(1, start, end)
+    told = STORE.deserialize_cdr(writer.message_at(NS), 'visualization_msgs/msg/MarkerArray')
+    still, rod = told.markers
+    assert (still.pose.position.x, still.scale.z) == (10.0, 3.0)
+    turn, at = rod.pose.orientation, rod.pose.position
+    turned = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).apply([0.0, 0.0, rod.scale.z])
+    assert turned == pytest.approx(way, abs=1e-9)
+    middle = [0.5 * (a + b) for a, b in zip(start, end, strict=True)]
+    assert [at.x, at.y, at.z] == pytest.approx(middle, abs=1e-9)
+    assert (rod.scale.x, rod.scale.y) == (1.0, 2.0)
 
 
 # Declarations, against the definitions that rosbags has of Jazzy's.

@@ -45,7 +45,6 @@ from linkage_ros.description.linkage_writer import (
     number_text as number_text,
     pose_text as pose_text,
     scene_text_for as scene_text_for,
-    text_in_plane as text_in_plane,
     write_linkage as write_linkage,
 )
 from linkage_ros.description.notes import (
@@ -55,6 +54,7 @@ from linkage_ros.description.notes import (
 from linkage_ros.description.parameters import (
     choice as choice,
     ChoiceOf as ChoiceOf,
+    Components as Components,
     components as components,
     declared_fields as declared_fields,
     default_of as default_of,

@@ -28,14 +28,12 @@ import re
 from textwrap import wrap
 
 from linkage_ros.description.file_access import atomic_write
-from linkage_ros.description.linkage_file import is_planar_file, read_any_closure
-from linkage_ros.description.section import Section
+from linkage_ros.description.linkage_file import read_any_closure
 from linkage_ros.description.units import Units
 from linkage_ros.description.yaml_file import parse_yaml
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import (
     AssemblyPose,
-    check_planar,
     describe_ranges,
     Input,
     InputRange,
@@ -91,19 +89,6 @@ def linkage_text(linkage: Linkage | SpaceLinkage, comment: Sequence[str] = ()) -
     for key, value in content.items():
         lines += _entry_lines(key, value, '', in_rows=key in _IN_ROWS)
     return '\n'.join(lines) + '\n'
-
-
-def text_in_plane(content: Section, name: str) -> str | None:
-    """
-    Return the text of a planar file of a robot or of a spatial file whose links move in a plane.
-
-    None if it is written as a planar linkage; a LinkageError says that it is none.
-    """
-    if is_planar_file(content):
-        return None
-    linkage = read_any_closure(content, name).linkage
-    check_planar(content.file, linkage)
-    return linkage_text(linkage, [f'From {Path(content.file).name}.'])
 
 
 def write_linkage(

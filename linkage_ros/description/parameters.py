@@ -51,6 +51,7 @@ KINDS = {
     'link': 'moving link',
     'body': 'link or the ground',
     'point': 'point: LINK.POINT',
+    'hole': 'point, in space also hinge: LINK.POINT',
 }
 """Kinds of parts that a parameter can name, and their terms in messages."""
 
@@ -450,7 +451,11 @@ class Each(Name):
     def table_rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
         """Yield one row, and the rows of the values."""
         yield from Kind.table_rows(self, key, default)
-        one = 'LINK.POINT' if self.kind == 'point' else self.kind.removeprefix('any_').upper()
+        one = (
+            'LINK.POINT'
+            if self.kind in ('point', 'hole')
+            else self.kind.removeprefix('any_').upper()
+        )
         part = f'{key}.{one}'
         rows = self._value_kind.table_rows(part, '')
         if isinstance(self.of, type):

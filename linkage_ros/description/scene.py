@@ -254,6 +254,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
         return {
             **parts,
             **joints,
+            'hole': tuple(f'{link}.{name}' for link, name in linkage.holes),
             'bearing': (*linkage.pair_joints, *balls),
             'axis': ('x', 'y', 'z'),
         }
@@ -263,6 +264,7 @@ def parts_of(linkage: Linkage | SpaceLinkage) -> Parts:
     pins = {point: None for point in points if points.count(point) > 1}
     return {
         **parts,
+        'hole': parts['point'],
         'axis': ('x', 'y'),
         'pin': (*pins, *linkage.sliders),
         'bearing': (*pins, *linkage.sliders),

@@ -49,7 +49,7 @@ from linkage_ros.errors import (
     quote,
     read_each,
 )
-from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage
 from linkage_ros.resources import linkage_names, linkage_of_scene, named_file
 from linkage_ros.stages.drives import drive_class
 
@@ -426,8 +426,6 @@ def _read_scene_linkage(
         )
     linkage = closure.linkage
     _refuse_effects(effects, types, drive, published)
-    if isinstance(linkage, SpaceLinkage):
-        _refuse_in_space(section_with, effects, types, drive)
     kinds = {bool(given.slider) for given in linkage.inputs}
     for section in (own, scene):
         section.units = replace(section.units, slides=kinds == {True} if len(kinds) == 1 else None)
@@ -477,19 +475,6 @@ def _refuse_effects(
             raise effects.error(name, *effect.without_inputs)
         if drive in effect.refused_drives:
             raise effects.error(name, *effect.refused_drives[drive])
-
-
-def _refuse_in_space(
-    section_with: Callable[[str], Section],
-    effects: Section,
-    types: Mapping[str, type[Effect]],
-    drive: str,
-) -> None:
-    """Refuse what only planar linkages have."""
-    reason, remedy = 'is for planar linkages', 'leave it out'
-    for name, effect in types.items():
-        if effect.is_planar:
-            raise effects.error(name, reason, remedy)
 
 
 def _check_sampled(drives: Section, closure: Closure, joints: Sequence[str]) -> None:

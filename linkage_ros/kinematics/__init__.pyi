@@ -62,11 +62,14 @@ from linkage_ros.kinematics.analysis.shapes import (
     INK as INK,
     LinkFrame as LinkFrame,
     Polygon as Polygon,
-    Role as Role,
     round_corners as round_corners,
     Segment as Segment,
     Shape as Shape,
     shape_outline as shape_outline,
+)
+from linkage_ros.kinematics.analysis.space_shapes import (
+    Part as Part,
+    SpaceDrawing as SpaceDrawing,
 )
 from linkage_ros.kinematics.analysis.sweep_analysis import (
     check_closes as check_closes,
@@ -200,6 +203,7 @@ from linkage_ros.kinematics.space.carried_points import (
 from linkage_ros.kinematics.space.closure import (
     SpaceClosure as SpaceClosure,
 )
+from linkage_ros.kinematics.space.deviating_parts import put_together as put_together
 from linkage_ros.kinematics.space.freedom import (
     balls_of as balls_of,
     find_freedom as find_freedom,

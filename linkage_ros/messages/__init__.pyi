@@ -60,6 +60,7 @@ from linkage_ros.messages.marker_array import (
     ADD as ADD,
     ARROW as ARROW,
     Colour as Colour,
+    CYLINDER as CYLINDER,
     DELETE as DELETE,
     LINE_LIST as LINE_LIST,
     LINE_STRIP as LINE_STRIP,

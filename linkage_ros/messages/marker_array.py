@@ -16,7 +16,7 @@ textures, meshes and per-point colours stay empty.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import cos, sin
+from math import cos, hypot, sin
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ from linkage_ros.messages.layout import (
     parse_message,
 )
 
-ARROW, LINE_STRIP, LINE_LIST, SPHERE_LIST = 0, 4, 5, 7
+ARROW, CYLINDER, LINE_STRIP, LINE_LIST, SPHERE_LIST = 0, 3, 4, 5, 7
 TEXT_VIEW_FACING, TRIANGLE_LIST = 9, 11
 """Types of markers, as Marker.msg numbers them."""
 
@@ -45,6 +45,7 @@ _COUNT = Struct('<I')
 _STAMP = Struct('<iI')
 _COLOUR = Struct('<4f')
 _XY = _TURN = Struct('<2d')
+_XYZ, _POSE = Struct('<3d'), Struct('<7d')
 
 MARKER_ARRAY = parse_declaration(
     'Marker[] markers',
@@ -72,9 +73,7 @@ class Marker(NamedTuple):
     scale: Place  # Widths and lengths, depending on its type, in [m]
     colour: Colour  # Its colour
     points: Sequence[Place] = ()  # Points in its own frame, in [m]
-    # Origin of its frame, in [m].
-    at: complex = 0j
-    z: float = 0.0
+    at: Place = (0.0, 0.0, 0.0)  # Origin of its frame, in [m]
     text: str = ''  # The text, of a text marker
     action: int = ADD  # `ADD` or `DELETE`
     lifetime: int = 0  # Time after which it disappears without an update, in [ns]; 0 for never
@@ -88,7 +87,7 @@ def _field_values(frame: str, marker: Marker) -> dict[str, Any]:
         'id': marker.number,
         'type': marker.kind,
         'action': marker.action,
-        'pose': (marker.at.real, marker.at.imag, marker.z, 0.0, 0.0, 0.0, 1.0),
+        'pose': (*marker.at, 0.0, 0.0, 0.0, 1.0),
         'scale': marker.scale,
         'color': marker.colour,
         'lifetime': divmod(marker.lifetime, NANOSECONDS),
@@ -100,13 +99,14 @@ def _field_values(frame: str, marker: Marker) -> dict[str, Any]:
 class MarkerArrayWriter:
     """Writes the same markers repeatedly, in their order; a change holds until the next change."""
 
-    __slots__ = ('_buffer', '_where')
+    __slots__ = ('_buffer', '_where', '_widths')
 
     def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
         message = pack_message(
             MARKER_ARRAY, {'markers': [_field_values(frame, one) for one in markers]}
         )
         self._buffer = bytearray(message)
+        self._widths = [marker.scale[:2] for marker in markers]
         self._where = [
             {name: field.first for name, field in marker.items() if isinstance(field, NumberArray)}
             for marker in parse_message(message, MARKER_ARRAY)['markers']
@@ -129,13 +129,26 @@ class MarkerArrayWriter:
         _XY.pack_into(self._buffer, at, place.real, place.imag)
         _TURN.pack_into(self._buffer, at + 40, sin(0.5 * angle), cos(0.5 * angle))
 
+    def lay_rod(self, number: int, start: Place, end: Place) -> None:
+        """Lay a cylinder between two places, in [m]."""
+        where = self._where[number]
+        x, y, z = (last - first for first, last in zip(start, end, strict=True))
+        length = hypot(x, y, z)
+        middle = [0.5 * (first + last) for first, last in zip(start, end, strict=True)]
+        # Half of the turn about the bisector of the z axis and the rod.
+        double = hypot(x, y, length + z)
+        turn = (-y, x, 0.0, length + z) if double > 1e-6 * length else (1.0, 0.0, 0.0, 0.0)
+        turned = hypot(*turn)
+        _POSE.pack_into(self._buffer, where['pose'], *middle, *(one / turned for one in turn))
+        _XYZ.pack_into(self._buffer, where['scale'], *self._widths[number], length)
+
     def colour_marker(self, number: int, colour: Colour) -> None:
         """Give a marker another colour."""
         _COLOUR.pack_into(self._buffer, self._where[number]['color'], *colour)
 
-    def move_points(self, number: int, places: Iterable[complex]) -> None:
+    def move_points(self, number: int, places: Iterable[Place]) -> None:
         """Move the points of a marker, which stay as many, to places in its frame, in [m]."""
         at = self._where[number]['points']
         for place in places:
-            _XY.pack_into(self._buffer, at, place.real, place.imag)
-            at += 24
+            _XYZ.pack_into(self._buffer, at, *place)
+            at += _XYZ.size

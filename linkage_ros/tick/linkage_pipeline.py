@@ -403,7 +403,7 @@ def _suppress_beyond_limits(
 
 def _make_closure(scene_linkage: SceneLinkage, wanted: WantedEffects, seed: str) -> Closure:
     """Return the closure of a linkage as its effects alter it."""
-    linkage = scene_linkage.linkage
+    linkage: Any = scene_linkage.linkage
     for name, effect in wanted.of_kind(LinkageEffect).items():
         linkage = effect.alter(linkage, Context.generator(seed, name))
     return scene_linkage.closure if linkage is scene_linkage.closure.linkage else Closure(linkage)

@@ -9,7 +9,7 @@
 """A moving picture shows each link where the closure, or the recorded run, has it."""
 
 from itertools import pairwise
-from math import cos, hypot, radians
+from math import cos, hypot, radians, sin
 from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 from linkage_ros.cli.main import main
 from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import frames_of_links, prepare_view, usual_inputs
+from linkage_ros.kinematics import frames_of_links, prepare_view, SpaceDrawing, usual_inputs
 from linkage_ros.tools.drawing import animate, check_kind, range_motion, RATE
 import numpy as np
 import pytest
@@ -55,6 +55,39 @@ def test_a_range_with_ends_is_shown_there_and_back():
     assert motion.x[0] == low
     assert motion.x[RATE // 2] == pytest.approx(high)
     assert motion.x[1:] == pytest.approx(motion.x[:0:-1])
+
+
+def test_a_spatial_linkage_moves_before_a_camera(tmp_path, capsys):
+    closure = load('rssr')
+    shown = prepare_view(closure, usual_inputs(closure))
+    motion = range_motion(shown, 'rssr', 1.0, (0.0, radians(90.0)))
+    drawing = SpaceDrawing(closure)
+    for x, places in zip(motion.x, motion.frames, strict=True):
+        # The ball at the end of the crank goes round the z axis; the other is a rod away from it.
+        ball = places[drawing.points['A']]
+        assert ball == pytest.approx([0.04 * cos(x), 0.04 * sin(x), 0.0], abs=1e-12)
+        rod = np.linalg.norm(places[drawing.points['B']] - ball)
+        assert rod == pytest.approx(hypot(0.06, 0.02, 0.12), abs=1e-12)
+    file = tmp_path / 'rssr.gif'
+    animate(motion, file)
+    with image.open(file) as found:
+        assert found.n_frames == RATE
+        pictures = []
+        for number in range(RATE):
+            found.seek(number)
+            pictures.append(np.asarray(found.convert('RGB')).astype(int))
+    # Seen from above, with x downward, the driven crank turns: its colour is about the axis.
+    middles = []
+    for picture in pictures:
+        red, green, blue = np.moveaxis(picture[:, : picture.shape[1] // 2], 2, 0)
+        rows, columns = np.nonzero((red - blue > 60) & (green < red - 30))
+        middles.append(complex(columns.mean(), rows.mean()))
+    turned = np.diff(np.unwrap(np.angle(np.array(middles) - np.mean(middles))))
+    assert turned.sum() == pytest.approx(-2 * np.pi * (RATE - 1) / RATE, abs=0.4)
+    with pytest.raises(LinkageError, match=r'does not project them from a camera; write x\.gif'):
+        animate(motion, tmp_path / 'x.svg')
+    assert main(['animate', 'four_bar', '-o', str(file), '--force', '--azimuth', '3']) == 2
+    assert '--azimuth: is of a spatial linkage; leave it out' in capsys.readouterr().err
 
 
 def rules(file):

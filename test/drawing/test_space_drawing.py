@@ -12,9 +12,9 @@ from itertools import combinations
 from math import degrees
 
 from linkage_ros.description import load
-from linkage_ros.kinematics import Circle, prepare_view
+from linkage_ros.kinematics import Circle, prepare_view, SpaceDrawing
 from linkage_ros.resources import spatial_linkage_names
-from linkage_ros.tools.drawing import Camera, draw_linkage, SpaceDrawing
+from linkage_ros.tools.drawing import Camera, choose_camera, draw_linkage
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -103,12 +103,12 @@ def test_the_camera_is_chosen_unless_it_is_given():
     closure = load('delta')
     model = SpaceDrawing(closure)
     places = model.places(closure.position(*closure.linkage.pose.inputs))
-    chosen = model.choose_camera(places)
+    chosen = choose_camera(model, places)
     # From above or along an arm, some of its points would be one behind the other.
     seen, _ = chosen.project(np.array([*closure.points(closure.position(0.0, 0.0, 0.0)).values()]))
     assert min(abs(one - other) for one, other in combinations(seen, 2)) > 2.0 * model.size
-    assert model.choose_camera(places, 1.0, 0.5) == (1.0, 0.5)
-    assert model.choose_camera(places, 1.0).azimuth == 1.0
+    assert choose_camera(model, places, 1.0, 0.5) == (1.0, 0.5)
+    assert choose_camera(model, places, 1.0).azimuth == 1.0
     title = drawn('rssr', camera=(1.0, 0.5)).axes[0].get_title(loc='left')
     assert title.endswith(f'from azimuth {degrees(1.0):.4g}°, elevation {degrees(0.5):.4g}°')
 

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros.description import load
+from linkage_ros.kinematics import SpaceDrawing
 from linkage_ros.messages import JointStateWriter
-from linkage_ros.tools.drawing import Camera, SpaceDrawing
+from linkage_ros.tools.drawing import Camera
 from linkage_ros.tools.view.report import FRAME_BYTES
 import numpy as np
 import pytest

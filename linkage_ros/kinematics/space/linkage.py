@@ -15,9 +15,10 @@ two points is a rod. In the pose every joint has its ``value``, which is 0 unles
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
 from math import dist, frexp, isfinite, ldexp
 from typing import ClassVar
 
@@ -45,7 +46,14 @@ from linkage_ros.kinematics.plane.linkage import (
     SlideJoint,
 )
 from linkage_ros.kinematics.space.masses import MASSLESS, SpatialMass
-from linkage_ros.kinematics.space.vectors import length, Vector, ZERO
+from linkage_ros.kinematics.space.vectors import (
+    cross,
+    direction_of,
+    length,
+    minus,
+    Vector,
+    ZERO,
+)
 
 ONE_PLACE = 1e-6
 """Extent of axes that meet in one place but for rounding, in [m]."""
@@ -195,6 +203,37 @@ class SpaceLinkage(JointedLinkage):
             strut_limits={**self.strut_limits, **of_struts},
         )
 
+    def shared_points(self, *, on_axes: bool) -> Iterator[tuple[str, str, str]]:
+        """Yield each point with the links that share it: on the axis of their hinge, or not."""
+        for one, other in combinations(self.links, 2):
+            axes = [h for h in self.hinges.values() if {h.parent, h.child} == {one, other}]
+            for name in self.links[one]:
+                if name in self.links[other] and on_axes is any(
+                    _distance_from_axis(self.points[name], hinge) <= ONE_PLACE for hinge in axes
+                ):
+                    yield name, one, other
+
+    @cached_property
+    def holes(self) -> dict[tuple[str, str], Vector]:
+        """
+        Return where each link carries points and the places of hinges, in [m].
+
+        Points on the axis of a hinge between links that share them are the hinge's. Hinges in one
+        place are a ball or a universal joint: its axes meet.
+        """
+        shared = {(end, name) for name, *ends in self.shared_points(on_axes=True) for end in ends}
+        found = {
+            (link, name): self.points[name]
+            for link, names in self.links.items()
+            for name in names
+            if (link, name) not in shared
+        }
+        places = Counter(hinge.at for hinge in self.hinges.values())
+        for name, hinge in self.hinges.items():
+            if places[hinge.at] == 1:
+                found |= {(end, name): hinge.at for end in (hinge.parent, hinge.child)}
+        return found
+
     @cached_property
     def inputs(self) -> tuple[Input, ...]:
         """Return the driven joints, as those of a planar linkage."""
@@ -322,6 +361,11 @@ def _check_joints(linkage: SpaceLinkage) -> None:
                 f'gives {expected:.6g} in the pose, where {quote(name)} is {found:.6g}',
                 'write the offset that fits the pose',
             )
+
+
+def _distance_from_axis(place: Vector, hinge: SpatialJoint) -> float:
+    """Return how far a place is from the axis of a hinge, in [m]."""
+    return length(cross(minus(place, hinge.at), direction_of(hinge.axis)))
 
 
 def size_of(linkage: SpaceLinkage) -> float:

@@ -30,7 +30,7 @@ from linkage_ros.stages.effects.stage import DriveStage, Sensor, Stage, Writer
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics import Friction
-    from linkage_ros.kinematics import Linkage
+    from linkage_ros.kinematics import Linkage, SpaceLinkage
 
 _HERE = 'linkage_ros.stages.effects'
 
@@ -77,8 +77,6 @@ class Effect(ABC):
         Effects that are named together with it.
     needs_forces
         Whether masses, loads and friction matter to it.
-    is_planar
-        Whether it knows planar linkages only.
     suppresses_ticks
         Whether it may suppress the message of a tick.
     runs_in_gaps
@@ -101,7 +99,6 @@ class Effect(ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     publishes_with: ClassVar[tuple[str, ...]] = ()
     needs_forces: ClassVar[bool] = False
-    is_planar: ClassVar[bool] = False
     suppresses_ticks: ClassVar[bool] = False
     runs_in_gaps: ClassVar[bool] = False
     without_inputs: ClassVar[tuple[str, ...]] = ()
@@ -138,10 +135,9 @@ class LinkageEffect(Effect):
 
     __slots__ = ()
     place: ClassVar[str] = 'in the place of the linkage that is drawn'
-    is_planar: ClassVar[bool] = True
 
     @abstractmethod
-    def alter(self, linkage: Linkage, random: Random) -> Linkage:
+    def alter(self, linkage: Linkage | SpaceLinkage, random: Random) -> Linkage | SpaceLinkage:
         """Return the linkage as it is made."""
 
 

@@ -18,7 +18,7 @@ t′ is the time of the last message. Only the times of the ticks decide, so tha
 same messages. Still markers come with the first message of each second. A marker disappears after
 its lifetime, so that a silent linkage does not look like one that stands still.
 
-Forces are arrows; see `linkage_ros.stages.effects.marker_shapes`.
+Forces are arrows; see `linkage_ros.stages.effects.marker_pile`.
 
 Links are red while the conditioning of their group (see
 `linkage_ros.kinematics.analysis.singularity_margin`) is below √2·sin(μ/2), with the threshold μ:
@@ -31,13 +31,15 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from math import pi, radians, sin, sqrt
+from typing import Any
 
 from linkage_ros.description import number, text
-from linkage_ros.kinematics import GROUND, links_of, Position, Status, usual_inputs
-from linkage_ros.messages import DELETE, MarkerArrayWriter, NANOSECONDS
+from linkage_ros.kinematics import GROUND, PlanarClosure, Position, Status, usual_inputs
+from linkage_ros.messages import DELETE, MarkerArrayWriter, NANOSECONDS, Place
 from linkage_ros.stages.drives import Context
 from linkage_ros.stages.effects.effect import MessageEffect
-from linkage_ros.stages.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
+from linkage_ros.stages.effects.marker_pile import Arrows, MarkersWanted
+from linkage_ros.stages.effects.marker_shapes import PlanarMarkers
 from linkage_ros.stages.effects.stage import MechanismState, SensorReading, Writer
 
 _LONGEST_TRAIL = 2000
@@ -73,7 +75,6 @@ class MarkersEffect(MessageEffect):
         most=0.5 * pi,
     )
 
-    is_planar = True
     topic = '~/markers'
     message = 'visualization_msgs/msg/MarkerArray'
 
@@ -91,8 +92,8 @@ class Markers:
     """The markers of a linkage, at their own rate."""
 
     __slots__ = (
-        '_arrows', '_closure', '_frame', '_full', '_groups', '_inputs', '_moving', '_near', '_per',
-        '_second', '_shapes', '_slot', '_trails', '_unit',
+        '_arrows', '_closure', '_figure', '_frame', '_full', '_moving', '_near', '_per', '_pile',
+        '_second', '_slot', '_trails', '_unit',
     )  # fmt: skip
 
     def __init__(self, use: MarkersEffect, context: Context) -> None:
@@ -102,29 +103,22 @@ class Markers:
         self._slot = self._second = -1
         self._frame = use.frame or context.prefix + GROUND
         named = context.effects
-        self._inputs = closure.linkage.inputs if 'effort' in named else ()
-        reactions = context.reactions.joints if 'pin_forces' in named else ()
-        joints = [
-            Key(joint.link, closure.linkage.sliders[joint.name].point)
-            if joint.slides
-            else Key(joint.link, joint.name)
-            for joint in reactions
-        ]
         trail = min(round(use.trace * use.rate) + 1, _LONGEST_TRAIL) if use.trace else 0
-        self._shapes = shapes = marker_shapes(
-            closure,
+        wanted = MarkersWanted(
             use.thickness,
             trail,
-            len(joints),
-            len(self._inputs),
+            context.reactions.joints if 'pin_forces' in named else (),
+            closure.linkage.inputs if 'effort' in named else (),
             _marker_lifetimes(use, context),
         )
-        self._arrows = Arrows(use.force_scale, closure, shapes, joints)
-        self._moving = MarkerArrayWriter(self._frame, shapes.moving)
-        self._full = MarkerArrayWriter(self._frame, (*shapes.moving, *shapes.still))
-        self._trails: list[deque[complex]] = [deque(maxlen=trail) for _ in shapes.trails]
+        self._figure = figure = _markers_of(closure, wanted)
+        self._pile = pile = figure.pile
+        mass = sum(each.mass for each in closure.linkage.masses.values())
+        self._arrows = Arrows(use.force_scale, mass, pile)
+        self._moving = MarkerArrayWriter(self._frame, pile.markers)
+        self._full = MarkerArrayWriter(self._frame, (*pile.markers, *pile.still))
+        self._trails: list[deque[Place]] = [deque(maxlen=trail) for _ in pile.trails]
         self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
-        self._groups = tuple(frozenset(links_of(group)) for group in closure.structure.groups)
         # Search once here, not in a tick.
         closure.singularity_margin(closure.position(*usual_inputs(closure)))
 
@@ -135,34 +129,23 @@ class Markers:
         self._slot = now * self._unit // self._per
         position = motion.position
         full = self._still_due(now)
-        write, shapes = self._full if full else self._moving, self._shapes
-        closure = self._closure
-        points, angles = closure.points(position), closure.link_angles(position)
-        red = self._links_near_toggle(position)
-        for marker, at, colour, filled in shapes.bodies:
-            write.place_marker(marker, points[at], angles[at.link])
-            write.colour_marker(marker, ALARM if filled and at.link in red else colour)
-        pins = [points[at] for at in shapes.pin_places]
-        for marker in shapes.pins:
-            write.move_points(marker, pins)
-        for marker, at, trail in zip(
-            shapes.trails, shapes.trail_places, self._trails, strict=True
-        ):
-            place = points[at]
+        write, pile = self._full if full else self._moving, self._pile
+        placed = self._figure.place(write, position, self._links_near_toggle(position))
+        # Without trails there are none of the traced points.
+        for marker, place, trail in zip(pile.trails, placed.traced, self._trails, strict=False):
             trail.append(place)
             # A line has its full number of points from the start.
             write.move_points(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
-        for marker, drawn in zip(
-            shapes.forces, self._arrows.force_arrows(points, motion.reactions), strict=True
-        ):
-            _show_arrow(write, marker, drawn)
-        for marker, drawn in zip(
-            shapes.efforts,
-            self._arrows.effort_arrows(self._inputs, points, angles, motion.efforts),
-            strict=True,
-        ):
-            _show_arrow(write, marker, drawn)
-        write.show_marker(shapes.status, False)
+        forces = motion.reactions or [(0.0,)] * len(pile.forces)
+        axes = len(self._closure.linkage.axes)
+        for marker, start, wrench in zip(pile.forces, placed.joints, forces, strict=True):
+            # Behind the force of a wrench there is its moment.
+            fx, fy, fz, *_ = (*wrench[:axes], 0.0, 0.0, 0.0)
+            _show_arrow(write, marker, self._arrows.force_arrow(start, (fx, fy, fz)))
+        efforts = motion.efforts or [0.0] * len(pile.efforts)
+        for marker, arm, effort in zip(pile.efforts, placed.drives, efforts, strict=True):
+            _show_arrow(write, marker, self._arrows.effort_arrow(arm, effort))
+        write.show_marker(pile.status, False)
         return write.message_at(now)
 
     def due(self, now: int) -> bool:
@@ -181,15 +164,15 @@ class Markers:
             said = f'open: the links miss each other by {position.gap:.3g} m'
         elif position.status is Status.LIMITED:
             said = 'limited: a joint is beyond its limits'
-        shapes = self._shapes
+        pile = self._pile
         markers = [
             marker._replace(text=said)
-            if index == shapes.status
+            if index == pile.status
             else marker._replace(points=(), action=DELETE)
-            for index, marker in enumerate(shapes.moving)
+            for index, marker in enumerate(pile.markers)
         ]
         if self._still_due(now):
-            markers += shapes.still
+            markers += pile.still
         return MarkerArrayWriter(self._frame, markers).message_at(now)
 
     def _still_due(self, now: int) -> bool:
@@ -201,10 +184,21 @@ class Markers:
         """Return the links near a toggle."""
         nearness = self._closure.singularity_margin(position)
         near = nearness.conditioning < self._near and nearness.group >= 0
-        return self._groups[nearness.group] if near else frozenset()
+        return self._figure.groups[nearness.group] if near else frozenset()
 
 
-def _show_arrow(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
+def _markers_of(closure: Any, wanted: MarkersWanted) -> Any:
+    """Return the markers of a linkage in the plane or in space."""
+    if isinstance(closure, PlanarClosure):
+        return PlanarMarkers(closure, wanted)
+    from linkage_ros.stages.effects.spatial_markers import (
+        SpatialMarkers,  # local import: loads numpy
+    )
+
+    return SpatialMarkers(closure, wanted)
+
+
+def _show_arrow(write: MarkerArrayWriter, marker: int, drawn: list[Place]) -> None:
     write.show_marker(marker, bool(drawn))
     write.move_points(marker, drawn)
 

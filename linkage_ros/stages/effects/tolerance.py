@@ -24,10 +24,15 @@ of the normal distribution before truncation is larger by a factor w, with c = 3
 1994, ch. 13, 10.1). For three standard deviations as the limits of a drawing see JCGM 100:2008,
 Guide to the expression of uncertainty in measurement, 4.3.
 
+In space the holes are points and the places of hinges, on both links; those of hinges that meet in
+one place do not deviate, nor do directions. The parts are put together anew at the inputs of the
+pose, see `linkage_ros.kinematics.space.deviating_parts`. Where a linkage has more equations than
+it needs, as with parallel axes, parts that deviate may not fit, which is an error.
+
 All coordinates are drawn, link by link and point by point in the order of the linkage file, x
-before y, and then scaled. So neither the deviation nor the choice of links changes the draws of
-the others, and a doubled deviation gives the same mechanism with doubled errors. The direction of
-a slider does not deviate.
+before y and z, and then scaled. So neither the deviation nor the choice of links changes the draws
+of the others, and a doubled deviation gives the same mechanism with doubled errors. The direction
+of a slider does not deviate.
 
 The altered linkage stays on the branch of the one in the file: where that passes a change point,
 it changes its side too, although its own lengths make none.
@@ -38,10 +43,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
+from typing import Any
 
-from linkage_ros.description import each_part, number, part_names, Point
+from linkage_ros.description import Components, each_part, number, part_names
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Linkage, PlanarClosure
+from linkage_ros.kinematics import Closure, Linkage, put_together, SpaceLinkage
 from linkage_ros.stages.effects.effect import LinkageEffect
 
 TRUNCATED = 3.0
@@ -69,29 +75,45 @@ class ToleranceEffect(LinkageEffect):
     links: tuple[str, ...] = part_names(
         'links with such deviations, which may include the ground', 'body'
     )
-    given: Mapping[str, tuple[float, float]] = each_part(
-        'known deviations, in the frame of the link; they replace the drawn ones',
-        'point',
-        Point('from the place in the file to the real one', 'm', _FARTHEST),
+    given: Mapping[str, tuple[float, ...]] = each_part(
+        'known deviations, in the frame of the link, in space in that of the ground in the pose; '
+        'they replace the drawn ones',
+        'hole',
+        Components('from the place in the file to the real one', 'm', _FARTHEST),
     )
 
     sample = '{standard_deviation: 2.0e-5}'
 
-    def alter(self, linkage: Linkage, random: Random) -> Linkage:
+    def alter(self, linkage: Linkage | SpaceLinkage, random: Random) -> Linkage | SpaceLinkage:
         """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
-        deviating = self.links or tuple(linkage.links)
-        links = {}
-        for link, points in linkage.links.items():
-            scale = self.standard_deviation if link in deviating else 0.0
-            made = {}
-            for point, (x, y) in points.items():
-                drawn = scale * _draw_deviation(random), scale * _draw_deviation(random)
-                dx, dy = self.given.get(f'{link}.{point}', drawn)
-                made[point] = (x + dx, y + dy)
-            links[link] = made
-        altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
+        altered: Linkage | SpaceLinkage
+        if isinstance(linkage, SpaceLinkage):
+            holes = linkage.holes
+            found: Any = {hole: self._deviation_of(hole, 3, random) for hole in holes}
+            if not any(map(any, found.values())):
+                return linkage
+            try:
+                altered = put_together(linkage, found)
+            except DefinitionError as error:
+                raise _closing_error(error) from None
+        else:
+            links = {}
+            for link, points in linkage.links.items():
+                made = {}
+                for point, (px, py) in points.items():
+                    dx, dy = self._deviation_of((link, point), 2, random)
+                    made[point] = (px + dx, py + dy)
+                links[link] = made
+            altered = replace(linkage, links=links, nominal=linkage.nominal or linkage)
         _check_closes(altered)
         return altered
+
+    def _deviation_of(self, hole: tuple[str, str], axes: int, random: Random) -> tuple[float, ...]:
+        """Return by how much a hole deviates; each is drawn, whether it is wanted or not."""
+        is_wanted = not self.links or hole[0] in self.links
+        scale = self.standard_deviation if is_wanted else 0.0
+        drawn = tuple(scale * _draw_deviation(random) for _ in range(axes))
+        return self.given.get('.'.join(hole), drawn)
 
 
 def _draw_deviation(random: Random) -> float:
@@ -102,15 +124,19 @@ def _draw_deviation(random: Random) -> float:
             return value
 
 
-def _check_closes(linkage: Linkage) -> None:
-    reason = 'at no value of the input'
+def _check_closes(linkage: Linkage | SpaceLinkage) -> None:
     try:
-        closure = PlanarClosure(linkage)
+        closure = Closure(linkage)
         if len(linkage.inputs) > 1 or closure.input_ranges:
             return
     except DefinitionError as error:
-        reason = f'{error.where}: {error.reason}'
-    raise DefinitionError(
+        raise _closing_error(error) from None
+    raise _closing_error(DefinitionError('', 'at no value of the input', ''))
+
+
+def _closing_error(error: DefinitionError) -> DefinitionError:
+    reason = f'{error.where}: {error.reason}' if error.where else error.reason
+    return DefinitionError(
         _KEY,
         f'with its deviations the linkage does not close: {reason}',
         'let it deviate less, or by another seed',

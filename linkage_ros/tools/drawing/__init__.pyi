@@ -17,6 +17,10 @@ from linkage_ros.tools.drawing.animation import (
     range_motion as range_motion,
     RATE as RATE,
 )
+from linkage_ros.tools.drawing.draw_command import (
+    add_camera as add_camera,
+    camera_of as camera_of,
+)
 from linkage_ros.tools.drawing.drawing_data import (
     drawn_in_frames as drawn_in_frames,
     pose_in_frames as pose_in_frames,
@@ -55,7 +59,8 @@ from linkage_ros.tools.drawing.plot_command import (
 )
 from linkage_ros.tools.drawing.space_drawing import (
     Camera as Camera,
-    SpaceDrawing as SpaceDrawing,
+    choose_camera as choose_camera,
+    space_page_data as space_page_data,
 )
 from linkage_ros.tools.drawing.spread import draw_spread as draw_spread, JointSpread as JointSpread
 from linkage_ros.tools.drawing.svg_picture import svg as svg

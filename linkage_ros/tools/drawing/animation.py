@@ -11,7 +11,8 @@ A moving picture of a linkage: its links, and beside them its joints with a mark
 
 The shapes are made once, in one pose, and each moves with its link. A GIF and a video are painted
 picture by picture. An SVG is the first picture, whose shapes a style sheet moves, so that it needs
-no script; a reader who prefers reduced motion sees the first picture.
+no script; a reader who prefers reduced motion sees the first picture. A spatial linkage is
+projected anew for each picture, so it has no SVG.
 """
 
 from __future__ import annotations
@@ -36,8 +37,11 @@ from linkage_ros.kinematics import (
     GROUND,
     InputSweep,
     LinkageView,
+    Position,
     Shape,
     shape_outline,
+    SpaceClosure,
+    SpaceDrawing,
     symbol_size,
 )
 from linkage_ros.names import picture_text
@@ -50,11 +54,14 @@ from linkage_ros.tools.drawing.figure import (
 )
 from linkage_ros.tools.drawing.painting import (
     LAYERS,
+    make_faint,
+    paint_frame,
     paint_shapes,
     picture_settings,
     plot_places,
     set_plane,
 )
+from linkage_ros.tools.drawing.space_drawing import draw_spatial, projected_shapes
 import numpy as np
 
 ANIMATION_KINDS = ('.gif', '.mp4', '.svg')
@@ -73,6 +80,15 @@ _COMPACT = 0.64
 _PALETTE = 64
 """Colours of a GIF; with more it looks the same."""
 
+_LOOKED_AT = 6
+"""Pictures from which the colours are taken, where these change."""
+
+_BEFORE_END = 1e-7
+"""So far from the ends of a range a linkage in space is shown, relative to its length."""
+
+_CURVE: Any = {'linewidth': 1.1, 'linestyle': (0, (5, 2)), 'zorder': LAYERS['path']}
+_DOT: Any = {'markersize': 3.5, 'zorder': LAYERS['label']}
+
 _SVG = '{http://www.w3.org/2000/svg}'
 _STYLE = (
     '.moving {{ animation: {seconds:g}s linear infinite }}\n'
@@ -90,9 +106,9 @@ class AnimatedMotion(NamedTuple):
 
     title: str  # What moves
     view: LinkageView  # The linkage, in the pose in which its shapes are made
-    links: Sequence[str]  # The links and the blocks of sliders that move
+    links: Sequence[str]  # The links and the blocks of sliders that move; () in space
     # Position, in [m], and angle, in [rad], of their frames, of shape (instants, links, 3); NaN if
-    # unknown: the linkage is hidden then.
+    # unknown: the linkage is hidden then. In space the places of the drawing, in [m].
     frames: Any
     # Abscissa of the mark at the instants: the first input, in [rad] or [m].
     x: Any
@@ -102,6 +118,7 @@ class AnimatedMotion(NamedTuple):
     joints: Sequence[Curve]  # The curves of the joints
     # The joints at the instants, of shape (instants, joints), in [rad] or [m]; NaN if unknown.
     values: Any
+    camera: Sequence[float | None] = (None, None)  # In space, as `choose_camera` takes it
 
 
 def count_of(seconds: float) -> int:
@@ -132,11 +149,17 @@ def check_kind(file: Path) -> None:
             raise LinkageError('ffmpeg', 'is not installed', 'apt install ffmpeg, or name a GIF')
 
 
-def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMotion:
+def range_motion(
+    shown: LinkageView,
+    title: str,
+    seconds: float,
+    camera: Sequence[float | None] = (None, None),
+) -> AnimatedMotion:
     """
     Return the motion through the range of the first input: a turn, or there and back.
 
-    A LinkageError is raised if the time is too short or too long.
+    A spatial linkage is seen from a camera, whose angles `choose_camera` takes. A LinkageError is
+    raised if the time is too short or too long.
     """
     count = count_of(seconds)
     low, high = shown.interval.lowest, shown.interval.highest
@@ -147,18 +170,14 @@ def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMoti
     else:
         x = [low + (high - low) * 0.5 * (1.0 - cos(2.0 * pi * i / count)) for i in range(count)]
     way = InputSweep(shown.closure, shown.inputs)
-    links = tuple(
-        link for link in frames_of_links(shown.closure, shown.position) if link != GROUND
-    )
-    frames = np.full((count, len(links), 3), nan)
+    links, frames_at = _frames_of(shown)
+    frames = np.full((count, *frames_at(shown.position).shape), nan)
+    # In space the end of a range is known to its rounding: it may be open.
+    slack = 0.0 if links or shown.interval.is_whole else _BEFORE_END * (high - low)
     for i, value in enumerate(x):
-        position = way.position_at(min(max(value, low), high))
-        if not position.joints:
-            continue
-        found = frames_of_links(shown.closure, position)
-        for index, link in enumerate(links):
-            place, angle = found[link]
-            frames[i, index] = place.real, place.imag, angle
+        position = way.position_at(min(max(value, low + slack), high - slack))
+        if position.joints:
+            frames[i] = frames_at(position)
     joints = shown.sweep.joints
     return AnimatedMotion(
         title,
@@ -169,7 +188,22 @@ def range_motion(shown: LinkageView, title: str, seconds: float) -> AnimatedMoti
         *moved_input(shown),
         joints,
         np.column_stack([np.interp(x, joint.x, joint.y) for joint in joints]),
+        camera,
     )
+
+
+def _frames_of(shown: LinkageView) -> tuple[tuple[str, ...], Callable[[Position], Any]]:
+    """Return the links that move, and their frames at a position; in space places instead."""
+    if isinstance(shown.closure, SpaceClosure):
+        return (), SpaceDrawing(shown.closure).places
+    moving = [link for link in frames_of_links(shown.closure, shown.position) if link != GROUND]
+
+    def frames_at(position: Position) -> Any:
+        found = frames_of_links(shown.closure, position)
+        frames = [found[link] for link in moving]
+        return np.array([(place.real, place.imag, angle) for place, angle in frames])
+
+    return tuple(moving), frames_at
 
 
 def animate(
@@ -188,6 +222,12 @@ def animate(
     """
     check_kind(file)
     kind = file.suffix.lower()
+    if kind == '.svg' and isinstance(motion.view.closure, SpaceClosure):
+        raise LinkageError(
+            str(file),
+            'a style sheet moves shapes, and does not project them from a camera',
+            f'write {file.with_suffix(".gif").name}',
+        )
     write = {'.gif': _encode_gif, '.mp4': _encode_mp4, '.svg': _encode_svg}[kind]
     with picture_settings():
         scene = _MovingPicture(motion, _DPI[kind], compact=compact)
@@ -203,11 +243,10 @@ class _MovingPicture:
 
         self.motion = motion
         shown = motion.view
-        size = symbol_size(shown)
-        drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
-        low, high = _motion_bounds(motion, drawn)
-        margin = complex(2.0, 2.0) * size
-        across = high - low + 2.0 * margin
+        in_space = isinstance(shown.closure, SpaceClosure)
+        self.linkage: Any = _SpatialShapes(motion) if in_space else _PlanarShapes(motion)
+        low, high = self.linkage.low, self.linkage.high
+        across = high - low
         wide = min(max(3.6 * across.real / across.imag, 2.6), 5.0)
         tall = min(max(wide * across.imag / across.real, 2.6), 3.8)
         scale = _COMPACT if compact else 1.0
@@ -217,29 +256,10 @@ class _MovingPicture:
         grid = self.figure.add_gridspec(1, 2, width_ratios=(wide, 4.8 if compact else 3.4))
         self.plane = self.figure.add_subplot(grid[0])
         self.plane.set_title(picture_text(motion.title, 100), loc='left', fontsize=9)
-        set_plane(self.plane, low - margin, high + margin, shown.length)
-        if compact:
+        set_plane(self.plane, low, high, shown.length)
+        if compact or in_space:
             self.plane.set_axis_off()
-        colours = dict(zip(shown.sweep.paths, COLOURS, strict=False))
-        if len(shown.inputs) == 1:
-            for name, path in shown.sweep.paths.items():
-                plot_places(
-                    self.plane, path, color=colours[name], linewidth=1.1, linestyle=(0, (5, 2)),
-                    zorder=LAYERS['path'],
-                )  # fmt: skip
-        self.parts: list[tuple[str, Any]] = []
-        for (link, _), artist in zip(
-            drawn, paint_shapes(self.plane, [shape for _, shape in drawn]), strict=True
-        ):
-            artist.set_clip_on(False)
-            self.parts.append((link, artist))
-        for (link, point), place in shown.closure.points(shown.position).items():
-            if point in shown.sweep.paths and link in motion.links:
-                (dot,) = plot_places(
-                    self.plane, [place], 'o', color=colours[point], markersize=3.5,
-                    zorder=LAYERS['label'],
-                )  # fmt: skip
-                self.parts.append((link, dot))
+        self.linkage.paint(self.plane)
         self.panels = joint_axes(grid[1], motion.joints)
         lines = plot_joints(
             self.panels,
@@ -265,16 +285,17 @@ class _MovingPicture:
         label_joints(self.panels, motion.joints, lines)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine('none')  # the same places in all pictures
-        frames = frames_of_links(shown.closure, shown.position)
-        self.origin = {link: frames[link] for link in motion.links}
-        moving = [artist for _, artist in self.parts] + self.marks + self.dots
-        self._front = [
+        self._behind: Any = None
+
+    def _artists_in_front(self) -> list[Any]:
+        """Return what is painted anew in each picture: all from the lowest part that moves on."""
+        moving = [*self.linkage.artists, *self.marks, *self.dots]
+        return [
             artist
             for axes in (self.plane, *self.panels.values())
             for artist in sorted(axes.get_children(), key=lambda artist: artist.zorder)
             if artist.zorder >= min(part.zorder for part in moving if part.axes is axes)
         ]
-        self._behind: Any = None
 
     def mark_x(self, i: int) -> float:
         """Return the place of the mark at an instant, as its axis shows it."""
@@ -288,22 +309,7 @@ class _MovingPicture:
 
     def move_to(self, i: int) -> None:
         """Move everything to an instant."""
-        from matplotlib.transforms import Affine2D
-
-        moves = {}
-        for index, link in enumerate(self.motion.links):
-            x, y, angle = self.motion.frames[i, index]
-            if isnan(x):
-                continue
-            place, made = self.origin[link]
-            moves[link] = Affine2D().translate(-place.real, -place.imag)
-            moves[link].rotate(angle - made).translate(x, y)
-        for link, artist in self.parts:
-            if link == GROUND:
-                continue
-            artist.set_visible(link in moves)
-            if link in moves:
-                artist.set_transform(moves[link] + self.plane.transData)
+        self.linkage.move_to(i)
         for mark in self.marks:
             mark.set_xdata([self.mark_x(i)] * 2)
         for index, dot in enumerate(self.dots):
@@ -316,12 +322,12 @@ class _MovingPicture:
         What lies behind all that moves, most of all the letters of the axes, is painted once.
         """
         if self._behind is None:
-            for artist in self._front:
+            for artist in self._artists_in_front():
                 artist.set_animated(True)
             self.canvas.draw()
             self._behind = self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self._behind)
-        for artist in self._front:
+        for artist in self._artists_in_front():
             artist.axes.draw_artist(artist)
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
@@ -329,6 +335,117 @@ class _MovingPicture:
         """Return places of axes in the coordinates of the SVG, of shape (n, 2)."""
         across, up = axes.transData.transform(np.column_stack([x, y])).T
         return np.column_stack([across, self.figure.bbox.height - up])
+
+
+class _PlanarShapes:
+    """A planar linkage: shapes in one pose, each moved with its link."""
+
+    changes_colours = False
+
+    def __init__(self, motion: AnimatedMotion) -> None:
+        self._motion, shown = motion, motion.view
+        size = symbol_size(shown)
+        self._drawn = carried_shapes(shown.closure, shown.position, size, shown.sweep.travels)
+        low, high = _motion_bounds(motion, self._drawn)
+        margin = complex(2.0, 2.0) * size
+        self.low, self.high = low - margin, high + margin
+        frames = frames_of_links(shown.closure, shown.position)
+        self.origin = {link: frames[link] for link in motion.links}
+        self.parts: list[tuple[str, Any]] = []
+
+    @property
+    def artists(self) -> list[Any]:
+        """Return the artists of all parts."""
+        return [artist for _, artist in self.parts]
+
+    def paint(self, plane: Any) -> None:
+        """Paint the parts and the curves of traced points."""
+        motion, shown = self._motion, self._motion.view
+        self._plane = plane
+        colours = dict(zip(shown.sweep.paths, COLOURS, strict=False))
+        if len(shown.inputs) == 1:
+            for name, path in shown.sweep.paths.items():
+                plot_places(plane, path, color=colours[name], **_CURVE)
+        shapes = [shape for _, shape in self._drawn]
+        for (link, _), artist in zip(self._drawn, paint_shapes(plane, shapes), strict=True):
+            artist.set_clip_on(False)
+            self.parts.append((link, artist))
+        for (link, point), place in shown.closure.points(shown.position).items():
+            if point in shown.sweep.paths and link in motion.links:
+                (dot,) = plot_places(plane, [place], 'o', color=colours[point], **_DOT)
+                self.parts.append((link, dot))
+
+    def move_to(self, i: int) -> None:
+        """Move all parts to an instant."""
+        from matplotlib.transforms import Affine2D
+
+        moves = {}
+        for index, link in enumerate(self._motion.links):
+            x, y, angle = self._motion.frames[i, index]
+            if isnan(x):
+                continue
+            place, made = self.origin[link]
+            moves[link] = Affine2D().translate(-place.real, -place.imag)
+            moves[link].rotate(angle - made).translate(x, y)
+        for link, artist in self.parts:
+            if link == GROUND:
+                continue
+            artist.set_visible(link in moves)
+            if link in moves:
+                artist.set_transform(moves[link] + self._plane.transData)
+
+
+class _SpatialShapes:
+    """A spatial linkage: its parts, projected anew at each instant, those far away fainter."""
+
+    changes_colours = True
+
+    def __init__(self, motion: AnimatedMotion) -> None:
+        self._motion, self._drawing = motion, SpaceDrawing(motion.view.closure)
+        known = motion.frames[np.isfinite(motion.frames).all(axis=(1, 2))]
+        shown = self._drawing.places(motion.view.position)
+        self._drawn = draw_spatial(motion.view, motion.camera)
+        seen, _ = self._drawn.camera.project(np.concatenate([shown, *known]))
+        margin = 3.0 * (1 + 1j) * self._drawing.size
+        low, high = bounding_corners(seen.tolist())
+        self.low, self.high = low - margin, high + margin
+        self.artists: list[Any] = []
+
+    def paint(self, plane: Any) -> None:
+        """Paint the parts in the pose, the directions of the axes, and the curves."""
+        self._plane, drawn = plane, self._drawn
+        # Beside the linkage, where nothing comes by.
+        self.low -= 0.1 * (self.high - self.low)
+        plane.set_xlim(self.low.real, self.high.real)
+        plane.set_ylim(self.low.imag, self.high.imag)
+        paint_frame(plane, drawn, self.low, self.high)
+        self._colours = dict(zip(drawn.paths, COLOURS, strict=False))
+        if len(self._motion.view.inputs) == 1:
+            for name, path in drawn.paths.items():
+                plot_places(plane, path, color=self._colours[name], **_CURVE)
+        self._show(self._drawing.places(self._motion.view.position))
+
+    def move_to(self, i: int) -> None:
+        """Project all parts at an instant; where nothing is known, there are none."""
+        self._show(self._motion.frames[i])
+
+    def _show(self, places: Any) -> None:
+        for artist in self.artists:
+            artist.remove()
+        hidden = not np.isfinite(places).all()
+        if hidden:
+            places = self._drawing.places(self._motion.view.position)
+        camera = self._drawn.camera
+        shapes = projected_shapes(self._drawing, places, camera)
+        self.artists = paint_shapes(self._plane, [shape for shape, _ in shapes])
+        for artist, (_, strength) in zip(self.artists, shapes, strict=True):
+            make_faint(artist, strength)
+        seen, _ = camera.project(places)
+        for name, colour in self._colours.items():
+            at = complex(seen[self._drawing.points[name]])
+            self.artists += plot_places(self._plane, [at], 'o', color=colour, **_DOT)
+        for artist in self.artists:
+            artist.set_visible(not hidden)
 
 
 def _motion_bounds(
@@ -354,8 +471,11 @@ def _encode_gif(scene: _MovingPicture, advance: Advance) -> bytes:
 
     # One palette for all: equal pixels of successive pictures are stored once. At first every
     # part is visible, so the palette has all colours; with this method white stays white.
-    palette = Image.fromarray(scene.render_pixels()).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)
-    count = len(scene.motion.x)
+    count, seen = len(scene.motion.x), [scene.render_pixels()]
+    for i in range(0, count if scene.linkage.changes_colours else 0, max(1, count // _LOOKED_AT)):
+        scene.move_to(i)
+        seen.append(scene.render_pixels())
+    palette = Image.fromarray(np.concatenate(seen)).quantize(_PALETTE, Image.Quantize.MAXCOVERAGE)
 
     def paletted_pictures() -> Iterator[Image.Image]:
         for i in range(count):
@@ -393,7 +513,7 @@ def _encode_mp4(scene: _MovingPicture, advance: Advance) -> bytes:
 
 def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
     motion = scene.motion
-    moving = [(link, artist) for link, artist in scene.parts if link != GROUND]
+    moving = [(link, artist) for link, artist in scene.linkage.parts if link != GROUND]
     marks = (*scene.marks, *scene.dots)
     for index, (_, artist) in enumerate(moving):
         artist.set_gid(f'part{index}')
@@ -415,13 +535,13 @@ def _encode_svg(scene: _MovingPicture, advance: Advance) -> bytes:
         x, y, angle = motion.frames[keys, index].T
         turns = np.full(len(keys), nan)
         known = np.isfinite(angle)
-        turns[known] = -np.degrees(np.unwrap(angle[known] - scene.origin[link].angle))
+        turns[known] = -np.degrees(np.unwrap(angle[known] - scene.linkage.origin[link].angle))
         places = scene.svg_places(scene.plane, x, y)
         rule, firsts[link] = _keyframe_rules(f'link{index}', times, places, turns)
         rules.append(rule)
     for index, (link, _) in enumerate(moving):
         group = groups[f'part{index}']
-        origin = scene.origin[link].place
+        origin = scene.linkage.origin[link].place
         ((x, y),) = scene.svg_places(scene.plane, [origin.real], [origin.imag])
         inner = ET.Element(f'{_SVG}g')
         inner.set('transform', f'translate({-x:.2f} {-y:.2f})')

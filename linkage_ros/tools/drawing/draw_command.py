@@ -80,6 +80,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='draw each assembly that closes, with the pose for the file, which is printed too',
     )
 
+    add_camera(parser)
+    parts = parser.add_argument_group('parts, in a DXF')
+    parts.add_argument(
+        '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
+    )
+    parts.add_argument(
+        '--hole', type=bounded_number(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
+    )
+
+
+def add_camera(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that say where a camera stands."""
     camera = parser.add_argument_group('camera, for a spatial linkage')
     camera.add_argument(
         '--azimuth',
@@ -93,13 +105,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DEGREES',
         help='how far it stands above the x-y plane',
     )
-    parts = parser.add_argument_group('parts, in a DXF')
-    parts.add_argument(
-        '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
-    )
-    parts.add_argument(
-        '--hole', type=bounded_number(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
-    )
+
+
+def camera_of(arguments: argparse.Namespace, closure: Any) -> list[float | None]:
+    """Return azimuth and elevation of the camera, in [rad]; a planar linkage has none."""
+    given = {option: getattr(arguments, option) for option in ('azimuth', 'elevation')}
+    for option, angle in given.items():
+        if angle is not None and not isinstance(closure, SpaceClosure):
+            raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
+    return [None if angle is None else radians(angle) for angle in given.values()]
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
@@ -117,9 +131,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             *([f'write -o {arguments.output.with_suffix(".svg")}'] if is_dxf else []),
         ]
         raise LinkageError(arguments.file, 'is a spatial linkage', ', and '.join(remedies))
-    for option in () if spatial else ('azimuth', 'elevation'):
-        if getattr(arguments, option) is not None:
-            raise LinkageError(f'--{option}', 'is of a spatial linkage', 'leave it out')
+    camera = camera_of(arguments, closure)
     if arguments.assemblies:
         if not chosen:
             content = parse_yaml(linkage_text(closure.linkage).encode(), content.file)
@@ -135,10 +147,6 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
     shown = prepare_view(closure, pose, ghosts)._replace(length=units.length)
-    camera = [
-        None if angle is None else radians(angle)
-        for angle in (arguments.azimuth, arguments.elevation)
-    ]
     paint_picture(shown, name, file, names=arguments.names, camera=camera)
     print(file)
     return 0

@@ -29,7 +29,7 @@ from linkage_ros.tools.drawing.painting import DrawnLinkage, DrawnName
 def draw_linkage(
     shown: LinkageView, camera: Sequence[float | None] = (None, None)
 ) -> DrawnLinkage:
-    """Draw a linkage; a spatial one from a camera, as `SpaceDrawing.choose_camera` has it."""
+    """Draw a linkage; a spatial one from a camera, as `choose_camera` has it."""
     if isinstance(shown.closure.linkage, Linkage):
         return _draw_planar(shown)._replace(length=shown.length)
     from linkage_ros.tools.drawing.space_drawing import draw_spatial  # local import: loads numpy

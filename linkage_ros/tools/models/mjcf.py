@@ -11,7 +11,8 @@ Export of a linkage as MJCF, the format of MuJoCo.
 
 Bodies are nested, and equality constraints hold the pins that are cut. The axes of a body are
 parallel to its link's own; its origin lies at the pin or slider that connects it to its parent.
-Springs are spatial tendons, which pull as in `linkage_ros.dynamics`.
+Springs are spatial tendons, which pull as in `linkage_ros.dynamics`. Bodies of spatial linkages
+are in `linkage_ros.tools.models.space_mjcf`.
 """
 
 from __future__ import annotations
@@ -19,24 +20,27 @@ from __future__ import annotations
 from cmath import phase, rect
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from math import inf, prod, remainder, tau
-from typing import NamedTuple
+from math import prod, remainder, tau
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics import (
     GROUND,
-    Limits,
     links_by_point,
     Mass,
     NO_LIMITS,
     PlanarClosure,
     RevoluteJoint,
     SlideJoint,
+    SpaceClosure,
+    SpaceDrawing,
     usual_inputs,
 )
 from linkage_ros.tools.models.bodies import bar_width, link_bodies, LinkBody, Solid
+from linkage_ros.tools.models.mjcf_elements import DENSITY, DIFFERENCE, LEAST_INERTIA, write_limits
 from linkage_ros.tools.models.orientation import joint_spans
 from linkage_ros.tools.models.part import ModelPart, PartError, prefix_names, PrefixedNames
+from linkage_ros.tools.models.space_mjcf import SpaceBodies
 from linkage_ros.tools.models.xml import (
     format_number,
     format_numbers,
@@ -45,20 +49,8 @@ from linkage_ros.tools.models.xml import (
     xml_document,
 )
 
-DENSITY = 7850.0
-"""Density of links without a given mass: steel, in [kg/m³]."""
-
 LIGHT = 10.0
 """Density of the blocks of pins in slots, in [kg/m³]: negligible."""
-
-_DIFFERENCE = 1e-4
-"""Step of the finite differences, in [rad] or as a fraction of a length."""
-
-_FARTHEST = 1e9
-"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
-
-_LEAST_INERTIA = 1e-12
-"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
 
 _STEP = 5e-4
 """Step of the integration, in [s]."""
@@ -70,11 +62,12 @@ _PACE = 30.0
 """Bandwidth of the position servo of an input, in [rad/s]."""
 
 _HEAD = f"""\
-A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
-are equality constraints between sites. A hinge or slide that is a published joint has its name,
-sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
-Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
-pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
+Bodies hang by their joints; what closes loops are equality constraints. A planar linkage lies in
+the plane z = 0. A joint that is published or driven has its name, sign and zero; others of a
+planar linkage are CHILD_at_PIN. Lengths in [m], angles in [rad].
+Planar links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are
+drawn. A pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing
+collides.
 Friction, tolerances and other effects of a scene are not here, nor its loads on joints and points;
 its gravity and its springs between points are."""
 
@@ -205,6 +198,7 @@ class Bodies:
         self._driven = dict(
             zip((given.joint for given in closure.linkage.inputs), self.inputs, strict=True)
         )
+        self.welds: list[tuple[str, str]] = []  # In the plane there are none
         # Elements of the joints that have a name in messages, by that name.
         self.joints: dict[str, ET.Element] = {}
         # Value of every joint at the start, in [rad] or [m], in the order of the model.
@@ -236,7 +230,7 @@ class Bodies:
         and each link's mass is spread over its points.
         """
         closure = self._closure
-        step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
+        step = DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
         for sign in (1.0, -1.0):
             moved = [*self.inputs]
             moved[index] += sign * step
@@ -282,7 +276,7 @@ class Bodies:
         if branch.joint:
             joint.set('name', self._names.own_name(branch.joint))
             self.joints[branch.joint] = joint
-            _write_limits(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
+            write_limits(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
         else:
             joint.set('name', self._names.free_joint(f'{child}_at_{branch.name}'))
         flat = format_numbers(axis.real, axis.imag, 0.0)
@@ -353,19 +347,9 @@ def _approximate_mass(body: LinkBody) -> float:
     )
 
 
-def _write_limits(joint: ET.Element, limits: Limits) -> None:
-    """Write the limits of a joint that MJCF can express: it has none for rates."""
-    if limits.is_bounded:
-        joint.set(
-            'range', format_numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST))
-        )
-    if limits.effort < inf:
-        joint.set('actuatorfrcrange', format_numbers(-limits.effort, limits.effort))
-
-
 def _write_inertial(body: ET.Element, mass: Mass, origin: complex) -> None:
     centre = complex(*mass.center) - origin
-    about = max(mass.inertia, _LEAST_INERTIA)
+    about = max(mass.inertia, LEAST_INERTIA)
     ET.SubElement(
         body,
         'inertial',
@@ -404,13 +388,13 @@ def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     model = ET.Element('mujoco', model=name)
     model.append(xml_comment(_HEAD.splitlines()))
     ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
-    gravity = format_numbers(*_common_gravity(parts), 0.0)
+    gravity = format_numbers(*_common_gravity(parts))
     option = {'timestep': format_number(_STEP), 'gravity': gravity, 'integrator': 'implicitfast'}
     ET.SubElement(model, 'option', option, solver='Newton', iterations='200', tolerance='1e-12')
     default = ET.SubElement(model, 'default')
     ET.SubElement(default, 'geom', contype='0', conaffinity='0', density=format_number(DENSITY))
     ET.SubElement(default, 'equality', _STIFF)
-    width = max(bar_width(part.closure) for part in parts)
+    width = max(_width_of(part.closure) for part in parts)
     ET.SubElement(default, 'site', size=format_rough(0.2 * width), group='4')
     sections = {
         key: ET.SubElement(model, key)
@@ -421,7 +405,11 @@ def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     layers = 0
     _, names = prefix_names([(part.prefix, part.closure.linkage) for part in parts])
     for part, own in zip(parts, names, strict=True):
-        bodies = Bodies(sections['worldbody'], part, own, layers)
+        bodies: Any
+        if isinstance(part.closure, SpaceClosure):
+            bodies = SpaceBodies(sections['worldbody'], part, own)
+        else:
+            bodies = Bodies(sections['worldbody'], part, own, layers)
         _write_connections(sections, part, bodies)
         _write_servos(sections['actuator'], part, bodies)
         start += bodies.start
@@ -435,10 +423,18 @@ def mujoco_model(name: str, parts: Sequence[ModelPart]) -> bytes:
     return xml_document(model)
 
 
+def _width_of(closure: Any) -> float:
+    """Return the width of bars, in [m]."""
+    if isinstance(closure, SpaceClosure):
+        return 2.0 * SpaceDrawing(closure).size
+    return bar_width(closure)
+
+
 def _refuse_massless(parts: Sequence[ModelPart]) -> None:
     for count, part in enumerate(parts):
         for link, mass in part.closure.linkage.masses.items():
-            if not mass.mass:
+            # In space links without points are joints of other bodies, or have a light one.
+            if not mass.mass and link in part.closure.linkage.links:
                 raise PartError(
                     count,
                     f'masses.{link}.mass',
@@ -448,7 +444,10 @@ def _refuse_massless(parts: Sequence[ModelPart]) -> None:
 
 
 def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, ...]:
-    gravities = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
+    # In the plane there is none across it.
+    gravities = [
+        (*(part.loads.gravity if part.loads else ()), 0.0, 0.0, 0.0)[:3] for part in parts
+    ]
     for count, gravity in enumerate(gravities):
         if gravity != gravities[0]:
             raise PartError(
@@ -461,9 +460,7 @@ def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, ...]:
     return gravities[0]
 
 
-def _write_connections(
-    sections: Mapping[str, ET.Element], part: ModelPart, bodies: Bodies
-) -> None:
+def _write_connections(sections: Mapping[str, ET.Element], part: ModelPart, bodies: Any) -> None:
     """Write the connections that are not joints: cut pins and springs."""
     linkage = part.closure.linkage
     links = links_by_point(linkage.links)
@@ -473,7 +470,13 @@ def _write_connections(
         ends = {'site1': bodies.site_name(one, point), 'site2': bodies.site_name(other, point)}
         name = f'{ends["site1"]} = {ends["site2"]}'
         ET.SubElement(sections['equality'], 'connect', {'name': name, **ends})
+    for one, other in bodies.welds:
+        ET.SubElement(sections['equality'], 'weld', body1=one, body2=other)
     for name, ratio in linkage.ratios.items():
+        if ratio.also:
+            raise PartError(
+                0, f'ratios.{name}', 'adds joints, and MuJoCo follows one', 'follow one joint'
+            )
         if not {name, ratio.of} <= {*bodies.joints}:
             raise PartError(
                 0,
@@ -495,13 +498,13 @@ def _write_connections(
             stiffness=format_number(spring.stiffness),
             springlength=format_number(spring.free_length),
             damping=format_number(spring.damping),
-            width=format_rough(0.15 * bar_width(part.closure)),
+            width=format_rough(0.15 * _width_of(part.closure)),
         )
         for end in spring.ends:
             ET.SubElement(tendon, 'site', site=bodies.site_name(*end))
 
 
-def _write_servos(actuators: ET.Element, part: ModelPart, bodies: Bodies) -> None:
+def _write_servos(actuators: ET.Element, part: ModelPart, bodies: Any) -> None:
     """Drive the inputs by servos whose stiffness suits the inertia that they move."""
     motor = part.loads.drive_inertia if part.loads else 0.0
     for count, given in enumerate(part.closure.linkage.inputs):

@@ -29,7 +29,6 @@ from linkage_ros.description import (
     read_any_closure,
     read_content,
 )
-from linkage_ros.kinematics import check_planar
 from linkage_ros.resources import named_file
 from linkage_ros.tools.models.mjcf import mujoco_model
 from linkage_ros.tools.models.part import ModelPart, PartError
@@ -78,8 +77,6 @@ def model_of(named: str, write: Write, robot: Mapping[str, Any] | None = None) -
         return make_scene_model(scene, Pipeline(scene).closures, write)
     is_urdf = write is urdf_model
     closure: Any = read_any_closure(content, file.stem, publish_model_joints=is_urdf)
-    if not is_urdf:
-        check_planar(content.file, closure.linkage)
     try:
         return write(file.stem, [ModelPart(closure)])
     except PartError as error:

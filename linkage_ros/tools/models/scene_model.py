@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from linkage_ros.description import Scene
-from linkage_ros.kinematics import check_planar, Closure
+from linkage_ros.kinematics import Closure
 from linkage_ros.tools.models.part import ModelPart, PartError
 from linkage_ros.tools.models.urdf import urdf_model
 
@@ -33,8 +33,6 @@ def make_scene_model(scene: Scene, closures: Sequence[Closure], write: Write) ->
     The closures have the deviations of their parts; ``write`` is `urdf_model` or the writer of
     MJCF. A FileError with a remedy is raised if a linkage cannot be a robot model.
     """
-    for each in scene.linkages if write is not urdf_model else ():
-        check_planar(scene.name, each.linkage)
     parts = [
         ModelPart(closure, scene_linkage.prefix, scene_linkage.loads, scene.wrapped)
         for scene_linkage, closure in zip(scene.linkages, closures, strict=True)

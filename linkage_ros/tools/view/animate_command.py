@@ -9,7 +9,8 @@
 """
 Animate a linkage through the range of its first input, beside its joints.
 
-A turn begins at the usual pose; a limited range is shown there and back.
+A turn begins at the usual pose; a limited range is shown there and back. A spatial linkage is seen
+from a camera, as linkage draw sees it.
 """
 
 from __future__ import annotations
@@ -27,13 +28,15 @@ from linkage_ros.cli import (
     show_progress,
 )
 from linkage_ros.description import linkage_content, read_any_closure
-from linkage_ros.kinematics import check_planar, prepare_view, usual_inputs
+from linkage_ros.kinematics import prepare_view, usual_inputs
 from linkage_ros.resources import named_file
 from linkage_ros.signals import StoppedError
 from linkage_ros.tools.drawing import (
+    add_camera,
     animate,
     AnimatedMotion,
     ANIMATION_KINDS,
+    camera_of,
     check_kind,
     range_motion,
 )
@@ -55,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='SECONDS',
         help='how long it lasts (default: %(default)g)',
     )
+    add_camera(parser)
     add_robot(parser)
 
 
@@ -79,6 +83,6 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 def _load_motion(arguments: argparse.Namespace, given: Path) -> AnimatedMotion:
     content = linkage_content(named_file(arguments.file, 'linkages'), robot_of(arguments))
     closure: Any = read_any_closure(content, given.stem)
-    check_planar(arguments.file, closure.linkage)
+    camera = camera_of(arguments, closure)
     shown = prepare_view(closure, usual_inputs(closure))._replace(length=content.units.length)
-    return range_motion(shown, given.stem, arguments.seconds)
+    return range_motion(shown, given.stem, arguments.seconds, camera)

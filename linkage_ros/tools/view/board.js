@@ -237,5 +237,17 @@ const Board = (() => {
     }
   }
 
-  return { Drawing };
+  class Spatial extends Space.drawn(Drawing) {
+    reachOfAll() {
+      return null; // it is seen from wherever the camera is
+    }
+
+    drawAside() {} // it has one assembly
+
+    linkAt() {
+      return null; // its points are taken
+    }
+  }
+
+  return { Drawing, Spatial };
 })();

@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import did_you_mean, LinkageError, list_names, quote
-from linkage_ros.kinematics import LinkageView, PlanarClosure, prepare_view, usual_inputs
+from linkage_ros.kinematics import Closure, LinkageView, prepare_view, usual_inputs
 from linkage_ros.tools.drawing import animate, paint_picture, range_motion
 from linkage_ros.tools.models.source_code import c_name, LANGUAGES, Subject, write_source
 
@@ -35,7 +35,7 @@ class Export(NamedTuple):
 
 
 class _ExportedLinkage(NamedTuple):
-    closure: PlanarClosure
+    closure: Any
     text: str
     name: str
     inputs: tuple[float, ...]
@@ -46,7 +46,7 @@ class _ExportedLinkage(NamedTuple):
 
 
 def export_linkage(
-    kind: str, closure: PlanarClosure, text: str, name: str, inputs: Sequence[float] | None = None
+    kind: str, closure: Closure, text: str, name: str, inputs: Sequence[float] | None = None
 ) -> Export:
     """
     Return a linkage as a file of one of `EXPORT_KINDS`.

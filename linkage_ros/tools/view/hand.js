@@ -8,7 +8,8 @@ const Hand = (() => {
    * Listen on the canvas of a drawing.
    *
    * `act` has `mayEdit()`, `tool()`, `turnTo(angle or place)`, `movePin(pin, place)`, `pointed(link,
-   * place)`, `choose(pin)`, `ended()` and `nudge(dx, dy)`.
+   * place)`, `choose(pin)`, `ended()` and `nudge(dx, dy)`; of a linkage in space, where
+   * `isSpatial()`, `follow(point, place)` if it `follows()`, and `turned()`.
    */
   function attach(board, act) {
     const { canvas } = board;
@@ -19,9 +20,10 @@ const Hand = (() => {
       return [event.clientX - left, event.clientY - top];
     };
 
-    /** Return what a press takes: a pin to be moved, or the crank. */
+    /** Return what a press takes: a pin to be moved, or the crank; in space a point, or nothing. */
     function taken(pixel, coarse) {
       const pin = board.pinAt(pixel, coarse);
+      if (act.isSpatial()) return pin && act.follows() ? { point: pin } : null;
       if (pin && act.mayEdit() && act.tool() === 'shape') return { pin };
       const link = pin ? pin.links.find(act.isDriven) : board.linkAt(pixel);
       if (link && act.isDriven(link)) return { crank: link };
@@ -43,7 +45,7 @@ const Hand = (() => {
       held = { ...what, id: down.pointerId };
       canvas.setPointerCapture(down.pointerId);
       canvas.focus({ preventScroll: true }); // its keys go on from here
-      if (held.pin) act.choose(held.pin.name);
+      if (held.pin ?? held.point) act.choose((held.pin ?? held.point).name);
       else act.turnTo(board.toPlace(pixel), true);
       down.preventDefault();
     });
@@ -57,6 +59,7 @@ const Hand = (() => {
       }
       if (move.pointerId !== held.id) return;
       if (held.pin) act.movePin(held.pin.name, board.toPlace(pixel));
+      else if (held.point) act.follow(held.point, board.toPlace(pixel));
       else act.turnTo(board.toPlace(pixel), false);
     });
 
@@ -67,6 +70,11 @@ const Hand = (() => {
         held = null;
         act.ended(pinned);
       });
+    }
+
+    if (act.isSpatial()) {
+      board.listen(act.turned, (down) => !down.button
+        && !taken(pixelOf(down), down.pointerType === 'touch'));
     }
 
     // Of the keys, those with which the chosen pin is moved; without one, they turn the crank.

@@ -18,9 +18,15 @@ const Motion = (() => {
       this.poses.sort((one, other) => one.inputs[0] - other.inputs[0]);
     }
 
-    /** Return the pose at an input, between the two nearest; null where none is known. */
-    at([input]) {
-      const { poses } = this;
+    /**
+     * Return the pose at inputs, between the two nearest; null where there is none.
+     *
+     * Undefined where none is known at all with these inputs beside the first one.
+     */
+    at([input, ...others]) {
+      const poses = this.poses.filter(({ inputs }) => (
+        others.every((value, i) => Math.abs(inputs[i + 1] - value) < BETWEEN)));
+      if (!poses.length) return undefined;
       const after = poses.findIndex((pose) => pose.inputs[0] >= input - BETWEEN);
       if (after < 0) return null;
       const next = poses[after];
@@ -37,6 +43,9 @@ const Motion = (() => {
     }
   }
 
+  const NEARBY = 24; // inputs to either side that are tried, to follow a hand
+  const FINE = 1e-6; // of the range
+
   const nothing = { status: 6, joints: [], rates: [], accelerations: [], frames: [], frameRates: [] };
 
   class Linkage {
@@ -47,7 +56,7 @@ const Motion = (() => {
       // The program is what the server has compiled; nothing of a file is in it but numbers.
       this.run = model.program
         ? new Function(`${model.program}\nreturn motion;`)()
-        : (inputs) => this.known.at(inputs) ?? nothing;
+        : (inputs) => this.known.at(inputs);
       this.places = new Map(model.links.map((link, i) => [link, i]));
       this.begin();
     }
@@ -71,13 +80,19 @@ const Motion = (() => {
 
     /** Return the motion at inputs; a first input that turns at a rate of 1, the others at rest. */
     motion(inputs) {
+      return this.tell(inputs) ?? nothing;
+    }
+
+    tell(inputs) {
       const rates = inputs.map((_, i) => (i ? 0 : 1));
       return this.run(inputs, rates, inputs.map(() => 0));
     }
 
     seek(inputs) {
       this.inputs = [...inputs];
-      this.now = this.motion(this.inputs);
+      const told = this.tell(this.inputs);
+      // What a server is yet to tell stands where it was.
+      this.now = (told === undefined ? this.now : told) ?? nothing;
       return this.now;
     }
 
@@ -106,6 +121,11 @@ const Motion = (() => {
       return [left + cos * x - sin * y, up + sin * x + cos * y];
     }
 
+    /** Return the coordinates of a place in the frame of the ground. */
+    coordinates(link, ...at) {
+      return this.place(link, ...at);
+    }
+
     /** Return a place in the frame of a link. */
     within(link, [x, y]) {
       const [left, up, angle] = this.frame(link);
@@ -116,6 +136,38 @@ const Motion = (() => {
     /** Return each pin with its place. */
     pins() {
       return this.model.pins.map((pin) => ({ ...pin, place: this.place(pin.link, ...pin.at) }));
+    }
+
+    /**
+     * Return the first input that brings a place of a link nearest to where a hand is.
+     *
+     * It is sought about the input, so that the linkage does not leap to another part of its way.
+     */
+    following(link, at, hand) {
+      const [low, high] = this.range();
+      const { now, inputs: [input, ...others] } = this;
+      const isWhole = this.model.inputs[0].unit === 'rad' && high - low > 2 * Math.PI - 1e-6;
+      const within = (value) => (isWhole ? value : Math.min(Math.max(value, low), high));
+      const far = (value) => {
+        this.now = this.motion([value, ...others]);
+        const place = this.closed ? this.place(link, ...at) : null;
+        return place ? Math.hypot(place[0] - hand[0], place[1] - hand[1]) : Infinity;
+      };
+      let [found, step] = [input, (high - low) / 8];
+      let least = far(found);
+      for (let i = -NEARBY; i <= NEARBY; i++) {
+        const value = within(input + (i * step) / NEARBY);
+        const away = far(value);
+        if (away < least) [found, least] = [value, away];
+      }
+      for (step /= NEARBY; step > FINE * (high - low); step /= 2) {
+        for (const value of [within(found - step / 2), within(found + step / 2)]) {
+          const away = far(value);
+          if (away < least) [found, least] = [value, away];
+        }
+      }
+      this.now = now;
+      return found;
     }
 
     /** Return the instant centre of a link relative to the ground; null if it only slides. */
@@ -143,5 +195,32 @@ const Motion = (() => {
     }
   }
 
-  return { Linkage, Known };
+  /** A spatial linkage: what its program calls frames are the places of its drawing. */
+  class Spatial extends Space.seen(Linkage) {
+    spot(row) {
+      const tube = this.tubes.get(row);
+      if (!tube) return this.now.frames.slice(3 * row, 3 * row + 3);
+      const [, start, end, length] = tube;
+      const [from, to] = [this.spot(start), this.spot(end)];
+      const part = Math.min(length / Math.hypot(...to.map((value, i) => value - from[i])), 0.9);
+      return from.map((value, i) => value + part * (to[i] - value));
+    }
+
+    get tubes() {
+      this.struts ??= new Map(this.drawn.tubes.map((tube) => [tube[0], tube]));
+      return this.struts;
+    }
+
+    coordinates(row) {
+      return this.spot(row);
+    }
+
+    centre() {
+      return null; // a link in space turns about an axis
+    }
+  }
+
+  const made = (model) => new (model.drawn.camera ? Spatial : Linkage)(model);
+
+  return { Linkage, Known, made };
 })();

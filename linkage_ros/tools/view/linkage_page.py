@@ -17,7 +17,7 @@ from linkage_ros.tools.view.model import model_of
 from linkage_ros.tools.view.page import page_html
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics import PlanarClosure
+    from linkage_ros.kinematics import Closure
 
 _HEIGHT = 900
 """Of the cell, in pixels; what is below is scrolled to."""
@@ -41,7 +41,7 @@ class LinkagePage:
 
     """
 
-    def __init__(self, closure: PlanarClosure) -> None:
+    def __init__(self, closure: Closure) -> None:
         self.text = page_html(model_of(closure, closure.name or 'linkage'), mode='still')
         """The page, as a browser opens it from a file."""
 

@@ -22,8 +22,10 @@ from typing import Any, NamedTuple
 from linkage_ros.description import (
     checked_closure,
     find_closures,
+    is_planar_file,
     linkage_notes,
     parse_yaml,
+    read_any_closure,
     Section,
     Units,
     written_linkage,
@@ -31,6 +33,7 @@ from linkage_ros.description import (
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics import (
     assembly_sides,
+    Closure,
     driven_links,
     GROUND,
     InputSweep,
@@ -39,12 +42,15 @@ from linkage_ros.kinematics import (
     links_by_point,
     PlanarClosure,
     prepare_view,
+    SpaceClosure,
+    SpaceDrawing,
     Status,
     usual_inputs,
     written_sides,
 )
-from linkage_ros.tools.drawing import drawn_in_frames, pose_in_frames
+from linkage_ros.tools.drawing import drawn_in_frames, pose_in_frames, space_page_data
 from linkage_ros.tools.models.source_code import JavaScript, STATUSES, Subject, write_source
+import numpy as np
 
 _STATUSES = {name: index for index, name in enumerate(STATUSES)}
 
@@ -81,6 +87,8 @@ def build_model(
     A FileError is raised if the text is not a linkage that closes.
     """
     content = parse_yaml(text.encode(), name)
+    if not is_planar_file(content):
+        return model_of(read_any_closure(content, name), name, text, content)
     written, shorthand = written_linkage(content)
     try:
         quick = (
@@ -103,14 +111,39 @@ def build_model(
     return found
 
 
-def model_of(closure: PlanarClosure, name: str = '') -> dict[str, Any]:
-    """Return the model of a linkage without a file, without its other assemblies."""
-    inputs = usual_inputs(closure)
-    drawn = drawn_in_frames(prepare_view(closure, inputs))
-    return _model_json(closure, name or closure.name, '', Units(), inputs, drawn) | {
-        'others': [],
-        **_analyse_linkage(closure, Section('', '', {'units': 'm'})),
-    }
+def model_of(
+    closure: Closure, name: str = '', text: str = '', content: Section | None = None
+) -> dict[str, Any]:
+    """Return the model of a linkage without its other assemblies."""
+    inputs, content = usual_inputs(closure), content or Section('', '', {'units': 'm'})
+    name, analysed = name or closure.name, _analyse_linkage(closure, content)
+    if isinstance(closure, SpaceClosure):
+        found = _space_json(closure, name, text, content.units, inputs)
+    else:
+        planar: Any = closure
+        drawn = drawn_in_frames(prepare_view(planar, inputs))
+        found = _model_json(planar, name, text, content.units, inputs, drawn)
+    return found | {'others': [], **analysed}
+
+
+def _space_json(
+    closure: SpaceClosure, name: str, text: str, units: Units, inputs: tuple[float, ...]
+) -> dict[str, Any]:
+    """Return what a page needs of a spatial linkage: frames are places of its drawing."""
+    shown, drawing = prepare_view(closure, inputs), SpaceDrawing(closure)
+    positions = (shown.position, *shown.ghosts)
+    seen = np.array([drawing.places(position) for position in positions])
+    return {
+        **_motion_json(closure, name, text, units, inputs),
+        'links': [],
+        'driven': [],
+        'drawn': space_page_data(drawing, seen),
+        'pins': [
+            {'name': point, 'links': [], 'link': row, 'at': [], 'ground': False}
+            for point, row in drawing.points.items()
+        ],
+        'sliders': [], 'lengths': [], 'choices': {}, 'inputs_possible': [],
+    }  # fmt: skip
 
 
 def _quick_model(
@@ -132,30 +165,12 @@ def _model_json(
     drawn: dict[str, Any],
 ) -> dict[str, Any]:  # fmt: skip
     linkage = closure.linkage
-    program = program_of(closure)
     carried = links_by_point(linkage.links)
     sides, now = assembly_sides(closure.structure), written_sides(closure)
     return {
-        'name': name,
-        'text': text,
-        'inputs': [
-            {
-                'name': given.joint,
-                'unit': given.unit,
-                'low': _finite_or_none(given.limits.low),
-                'high': _finite_or_none(given.limits.high),
-                'value': value,
-            }
-            for given, value in zip(linkage.inputs, inputs, strict=True)
-        ],
-        'joints': [
-            {'name': joint, 'unit': 'rad' if turning else 'm'}
-            for joint, turning in zip(closure.joint_names, closure.turning, strict=True)
-        ],
+        **_motion_json(closure, name, text, units, inputs),
         'links': list(closure.link_frames.links),
         'driven': sorted(driven_links(closure)),
-        'program': program,
-        'poses': [] if program else _range_poses(closure, inputs),
         'drawn': drawn,
         'pins': [
             {
@@ -178,7 +193,6 @@ def _model_json(
             for slider, its in linkage.sliders.items()
         ],
         'lengths': list(_point_distances(closure)),
-        'unit': {'length': units.length, 'factor': units.to_si(1.0, 'm')},
         'choices': {key: {'now': now.get(key), 'sides': list(of)} for key, of in sides.items()},
         'inputs_possible': [
             link
@@ -188,7 +202,35 @@ def _model_json(
     }
 
 
-def program_of(closure: PlanarClosure) -> str | None:
+def _motion_json(
+    closure: Closure, name: str, text: str, units: Units, inputs: tuple[float, ...]
+) -> dict[str, Any]:
+    """Return what a page needs to know of any linkage to move it."""
+    program = program_of(closure)
+    return {
+        'name': name,
+        'text': text,
+        'inputs': [
+            {
+                'name': given.joint,
+                'unit': given.unit,
+                'low': _finite_or_none(given.limits.low),
+                'high': _finite_or_none(given.limits.high),
+                'value': value,
+            }
+            for given, value in zip(closure.linkage.inputs, inputs, strict=True)
+        ],
+        'joints': [
+            {'name': joint, 'unit': 'rad' if turning else 'm'}
+            for joint, turning in zip(closure.joint_names, closure.turning, strict=True)
+        ],
+        'program': program,
+        'poses': [] if program else _range_poses(closure, inputs),
+        'unit': {'length': units.length, 'factor': units.to_si(1.0, 'm')},
+    }
+
+
+def program_of(closure: Any) -> str | None:
     """Return the program of a linkage; None if it is solved by iteration."""
     subject = Subject(closure, closure.name, closure.name, 2, closure.joint_names, frames=True)
     try:
@@ -197,7 +239,7 @@ def program_of(closure: PlanarClosure) -> str | None:
         return None
 
 
-def _range_poses(closure: PlanarClosure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
+def _range_poses(closure: Closure, inputs: tuple[float, ...]) -> list[dict[str, Any]]:
     """Return poses over the range of the first input, the others held."""
     sweep = InputSweep(closure, inputs)
     values = {inputs[0]}
@@ -235,7 +277,7 @@ def _other_assemblies(closure: PlanarClosure, content: Section) -> list[dict[str
     return [{'text': text, 'program': program_of(other)} for text, other in others[:_MOST_GHOSTS]]
 
 
-def _analyse_linkage(closure: PlanarClosure, content: Section) -> dict[str, Any]:
+def _analyse_linkage(closure: Closure, content: Section) -> dict[str, Any]:
     """Return ranges, toggles, quality over the first input, and warnings."""
     sweep = InputSweep(closure, usual_inputs(closure))
     values: list[float] = []
@@ -258,7 +300,7 @@ def _analyse_linkage(closure: PlanarClosure, content: Section) -> dict[str, Any]
     }
 
 
-def _quality_at(closure: PlanarClosure, sweep: InputSweep, value: float) -> tuple[float, float]:
+def _quality_at(closure: Closure, sweep: InputSweep, value: float) -> tuple[float, float]:
     """Return transmission angle and conditioning at an input; infinite if they are unknown."""
     position = sweep.position_at(value)
     if not position.joints:
@@ -269,9 +311,7 @@ def _quality_at(closure: PlanarClosure, sweep: InputSweep, value: float) -> tupl
     return margin.transmission_angle, margin.conditioning
 
 
-def _linkage_warnings(
-    closure: PlanarClosure, content: Section, angles: list[float]
-) -> Iterator[str]:
+def _linkage_warnings(closure: Closure, content: Section, angles: list[float]) -> Iterator[str]:
     for note in linkage_notes(closure.linkage, content):
         yield str(note)
     if angles and min(angles) < _POOR:
@@ -287,7 +327,7 @@ def _finite_or_none(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def compute_pose(closure: PlanarClosure, inputs: Sequence[float]) -> dict[str, Any]:
+def compute_pose(closure: Any, inputs: Sequence[float]) -> dict[str, Any]:
     """Return a pose as the program would, if a linkage has none; rates at a first input of 1."""
     position = closure.position(*inputs)
     found: dict[str, Any] = {
@@ -300,8 +340,11 @@ def compute_pose(closure: PlanarClosure, inputs: Sequence[float]) -> dict[str, A
     }
     if not position.joints:
         return found
-    frames = closure.link_frames
-    found['frames'] = _flatten_frames(frames.frames_at(position))
+    in_space = isinstance(closure, SpaceClosure)
+    if in_space:
+        found['frames'] = SpaceDrawing(closure).places(position).ravel().tolist()
+    else:
+        found['frames'] = _flatten_frames(closure.link_frames.frames_at(position))
     if position.status.has_rates:
         rest = [0.0] * (len(inputs) - 1)
         velocity = closure.velocity(position, 1.0, *rest)
@@ -309,7 +352,9 @@ def compute_pose(closure: PlanarClosure, inputs: Sequence[float]) -> dict[str, A
         motion = {
             'rates': list(velocity.joints),
             'accelerations': list(acceleration.joints),
-            'frameRates': _flatten_frames(frames.frame_rates(position, velocity)),
+            'frameRates': []
+            if in_space
+            else _flatten_frames(closure.link_frames.frame_rates(position, velocity)),
         }
         # Beside a toggle they may be larger than a number can be.
         if all(map(isfinite, chain(*motion.values()))):

@@ -80,7 +80,7 @@ const OverInput = (() => {
       const closed = found.filter(([, state]) => state.frames.length);
       return [point, closed.flatMap(([, state]) => {
         linkage.now = state;
-        return linkage.place(link, ...at);
+        return linkage.place(link, ...at).slice(0, 2);
       })];
     }));
     linkage.now = there;

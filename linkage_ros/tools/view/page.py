@@ -73,33 +73,35 @@ def page_html(
         'node': node,
     }
     title = escape_unprintable(node or model['name'])
-    body = _page_body(title, mode, can_save)
+    body = _page_body(title, mode, can_save, in_space='camera' in model['drawn'])
     return html_document(title, body, data, _PACKAGE, _FILES, is_served=True)
 
 
-def _page_body(title: str, mode: str, can_save: bool) -> Iterator[str]:
-    editing = mode == 'edit'
-    yield from _header(title, editing, can_save)
+def _page_body(title: str, mode: str, can_save: bool, *, in_space: bool) -> Iterator[str]:
+    served = mode == 'edit'
+    editing = served and not in_space
+    yield from _header(title, served, editing, can_save)
     yield '<p id="lost" role="status" hidden>Not connected: <span id="lost-why"></span>. '
     yield 'The linkage still moves; the page tries again.</p>'
     yield '<p id="wrong" role="alert" hidden></p>'
     yield '<noscript><p class="warnings">This page needs JavaScript.</p></noscript>'
     yield '<main><section class="player" aria-label="The linkage">'
-    yield from _player()
+    yield from _player(in_space)
     if editing:
         yield from _tool_choice()
     yield '<dl class="readout" id="readout" aria-live="off"></dl>'
     yield '<ul class="warnings" id="warnings" hidden></ul>'
     yield '</section><section>'
     yield from _plots()
-    yield '<div class="forms"><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
+    hidden = ' hidden' if in_space else ''
+    yield f'<div class="forms"{hidden}><div><h2>Lengths [<span id="unit-of-length"></span>]</h2>'
     yield '<table><tbody id="lengths"></tbody></table></div>'
     yield '<div><h2>Assembly</h2><table><tbody id="choices"></tbody></table></div>'
     yield '<div><h2>Traced points</h2><div id="traced"></div></div></div>'
     yield '</section></main>'
 
 
-def _header(title: str, editing: bool, can_save: bool) -> Iterator[str]:
+def _header(title: str, served: bool, editing: bool, can_save: bool) -> Iterator[str]:
     yield '<header class="bar">'
     yield f'<h1 id="title">{escape(title)}</h1>'
     if editing:
@@ -109,18 +111,26 @@ def _header(title: str, editing: bool, can_save: bool) -> Iterator[str]:
             yield '<button type="button" id="save" title="Save (Ctrl+S)">Save</button>'
         yield '<select id="open" class="edit" aria-label="New from a shipped linkage">'
         yield '<option value="">New from …</option></select>'
+    if served:
         yield '<select id="download" class="edit" aria-label="Download">'
         yield '<option value="">Download …</option>'
         for kind, what in _DOWNLOADS.items():
+            if kind == 'dxf' and not editing:
+                continue  # links in space are no flat parts
             yield f'<option value="{kind}">{what}</option>'
         yield '</select>'
     yield '</header>'
 
 
-def _player() -> Iterator[str]:
+def _player(in_space: bool) -> Iterator[str]:
     """Yield the drawing and its controls."""
+    does = (
+        'the arrows turn the camera'
+        if in_space
+        else 'n and p choose a pin, the arrows move it, or turn the crank'
+    )
     yield '<figure><canvas id="drawing" tabindex="0" role="application" aria-label="The linkage; '
-    yield 'n and p choose a pin, the arrows move it, or turn the crank"></canvas></figure>'
+    yield f'{does}"></canvas></figure>'
     yield '<p id="status" role="status"></p>'
     yield '<div class="controls"><button type="button" id="play" aria-label="Play">▶</button>'
     yield '<label>angles in <select id="angles"><option value="degrees">degrees</option>'
@@ -130,6 +140,8 @@ def _player() -> Iterator[str]:
     for what, checked in {
         'names': 'names', 'ghosts': 'other assemblies', 'centres': 'instant centres'
     }.items():  # fmt: skip
+        if in_space and what != 'names':
+            continue
         on = '' if what == 'centres' else ' checked'
         yield f'<label><input type="checkbox" id="{what}"{on}> {checked}</label>'
     yield '</div><div id="inputs"></div>'

@@ -22,7 +22,7 @@ from functools import lru_cache, partial
 import json
 from typing import Any, NamedTuple, NoReturn
 
-from linkage_ros.description import parse_yaml, read_closure
+from linkage_ros.description import parse_yaml, read_any_closure
 from linkage_ros.errors import (
     did_you_mean,
     escape_unprintable,
@@ -32,7 +32,7 @@ from linkage_ros.errors import (
     quote,
     shorten,
 )
-from linkage_ros.kinematics import PlanarClosure
+from linkage_ros.kinematics import Closure
 from linkage_ros.resources import linkage_names, shipped_path
 from linkage_ros.tools.view.edit import edit_text, pin_of, read_numbers
 from linkage_ros.tools.view.exports import export_linkage
@@ -180,7 +180,7 @@ class _RequestFields(NamedTuple):
         return max(0.0, size)
 
     @property
-    def closure(self) -> PlanarClosure:
+    def closure(self) -> Closure:
         """Return the linkage."""
         return closure_of(self.text, self.name)
 
@@ -270,9 +270,9 @@ _HANDLERS: dict[str, Callable[[_RequestFields], dict[str, Any]]] = {
 
 
 @lru_cache(maxsize=4)
-def closure_of(text: str, name: str) -> PlanarClosure:
+def closure_of(text: str, name: str) -> Closure:
     """Return the closure of a linkage file's text; errors are as in `linkage_ros.load`."""
-    return read_closure(parse_yaml(encode_text(text, name), name), name)
+    return read_any_closure(parse_yaml(encode_text(text, name), name), name)
 
 
 def encode_text(text: str, name: str) -> bytes:

@@ -21,7 +21,7 @@ from math import floor
 from typing import Any, NamedTuple
 
 from linkage_ros.description import parse_scene, SCENE_FILE, SceneLinkage
-from linkage_ros.kinematics import Closure
+from linkage_ros.kinematics import Closure, PlanarClosure
 from linkage_ros.stages.drives import SampledCrank, SampledInputs, TopicDrive
 from linkage_ros.stages.effects import ForceEffect, SensorReading
 from linkage_ros.tick import LinkagePipeline
@@ -75,7 +75,7 @@ class Sensors:
         Inputs and rates are in [rad] and [rad/s], or [m] and [m/s]. The result has ``read``: the
         value of each published joint, in [rad] or [m], empty where nothing is published; and
         ``frames``: x, y and angle of each link where these values put it, as the program of a
-        model gives them, empty where they put it nowhere.
+        model gives them, empty where they put it nowhere, and in space.
         """
         since, before = self._last
         line = self._linkage
@@ -112,12 +112,13 @@ class Sensors:
             return {'read': {}, 'frames': []}
         scene_linkage = self._scene_linkage
         read = dict(zip(scene_linkage.joint_names, self._reading.joints, strict=True))
-        values = dict(zip(scene_linkage.input_names, inputs, strict=True)) | read
-        arrays = {name: np.array([value]) for name, value in values.items()}
-        closure: Any = scene_linkage.closure  # planar: the page shows others without sensors
-        frames = link_poses(
-            closure, scene_linkage.prefix, arrays, scene_linkage.input_names
-        ).frames[0]
+        closure, frames = scene_linkage.closure, np.zeros(0)
+        if isinstance(closure, PlanarClosure):
+            values = dict(zip(scene_linkage.input_names, inputs, strict=True)) | read
+            arrays = {name: np.array([value]) for name, value in values.items()}
+            frames = link_poses(
+                closure, scene_linkage.prefix, arrays, scene_linkage.input_names
+            ).frames[0]
         finite = bool(np.isfinite(frames).all())
         # A fault of a sensor may publish NaN, which JSON does not hold.
         read = {name: value for name, value in read.items() if np.isfinite(value)}

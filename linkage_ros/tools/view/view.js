@@ -8,13 +8,16 @@ const View = (() => {
   const WHOLE_AFTER = 250; // ms without an edit, until what takes longer is asked for
   const KEY = 1 / 400; // of the picture: a step of a key
   const SLIDER_STEPS = 1000;
+  const RANGE = 60; // poses that the server tells over a range
   const named = (id) => document.getElementById(id);
   const listeners = [];
   const editing = data.mode === 'edit';
-  let linkage = new Motion.Linkage(data.model);
+  const isSpatial = Boolean(data.model.drawn.camera); // then it moves, and is not edited
+  let linkage = Motion.made(data.model);
   let board = null;
   let plots = [];
   let history = new Edits.History(data.model.text, linkage.inputs);
+  let states = []; // over the range of the first input
   let playing = false;
   let forth = 1;
   let last = 0;
@@ -22,13 +25,14 @@ const View = (() => {
   let drawnAt = -SLOWER;
   let curvesDue = null;
   let wholeDue = null;
+  let rangeDue = null;
   let settling = 0; // requests for a whole model
   let dragged = null; // { pin, inputs }: the drag that is under way
   let grip = 0; // angle between the hand and the crank it turns
   let rate = 1; // of the first input, in [rad/s] or [m/s]
 
   const driven = () => linkage.model.driven;
-  const mayEdit = () => editing && there;
+  const mayEdit = () => editing && there && !isSpatial;
 
   /** Ask the server about the linkage that is shown; the name tells a file from what is new. */
   const ask = (what, content) => Talk.ask(what, { name: linkage.model.name, ...content });
@@ -46,7 +50,7 @@ const View = (() => {
     };
     // A quick answer draws the links; where they go follows from the program.
     const { frame, paths } = before.drawn;
-    linkage = new Motion.Linkage({ ...kept, ...model, drawn: { frame, paths, ...model.drawn } });
+    linkage = Motion.made({ ...kept, ...model, drawn: { frame, paths, ...model.drawn } });
     const same = model.inputs.length === before.inputs.length;
     linkage.seek(inputs ?? (same ? before.inputs : linkage.inputs));
     if (!linkage.closed && !inputs) linkage.seek(model.inputs.map((input) => input.value));
@@ -77,21 +81,43 @@ const View = (() => {
       curvesDue = setTimeout(curves, wait);
       return;
     }
-    const found = OverInput.states(linkage);
-    if (linkage.inputs.length === 1) linkage.drawn.paths = OverInput.paths(linkage, found);
-    plots.forEach((plot) => plot.draw(linkage, found));
+    states = OverInput.states(linkage);
+    paths();
+    plots.forEach((plot) => plot.draw(linkage, states));
     OverInput.paintBand(named('band'), linkage);
     drawnAt = performance.now();
   }
 
+  function paths() {
+    if (linkage.inputs.length === 1) linkage.drawn.paths = OverInput.paths(linkage, states);
+  }
+
   /** Ask the server for the pose of a linkage that is solved by iteration, between known ones. */
   const askForPose = Talk.newest(async (asked) => {
-    if (asked.model.program || !mayEdit()) return;
+    if (asked.model.program || !editing || !there) return;
     const inputs = [...asked.inputs];
     try {
       const { poses: [pose] } = await ask('poses', { text: history.now.text, inputs: [inputs] });
       if (linkage !== asked || asked.inputs.some((value, i) => value !== inputs[i])) return;
       asked.now = pose;
+      moved();
+    } catch (error) {
+      said(error);
+    }
+  });
+
+  /** Ask the server for the poses over the first input, where another one has changed. */
+  const askForRange = Talk.newest(async (asked) => {
+    const [low, high] = asked.range();
+    const others = asked.inputs.slice(1);
+    const inputs = [...Array(RANGE + 1).keys()].map((i) => [low + ((high - low) * i) / RANGE, ...others]);
+    try {
+      const { poses } = await ask('poses', { text: history.now.text, inputs });
+      asked.known.poses = [];
+      asked.known.take(poses.map((pose, i) => ({ ...pose, inputs: inputs[i] })));
+      if (linkage !== asked) return;
+      asked.seek(asked.inputs);
+      curves();
       moved();
     } catch (error) {
       said(error);
@@ -113,7 +139,7 @@ const View = (() => {
     if (linkage.closed) {
       const { unit, factor } = Angles.shown('m');
       for (const { point, link, at } of linkage.drawn.traced) {
-        const place = linkage.place(link, ...at).map((value) => (value * factor).toFixed(decimals()));
+        const place = linkage.coordinates(link, ...at).map((value) => (value * factor).toFixed(decimals()));
         facts.push([point, `${place.join(', ')} ${unit}`]);
       }
     }
@@ -181,7 +207,13 @@ const View = (() => {
   function seek(inputs) {
     const others = inputs.some((value, i) => i && value !== linkage.inputs[i]);
     linkage.seek(inputs);
-    if (others) curves(); // over the first input, the others held
+    if (others) { // over the first input, the others held
+      if (linkage.model.program) curves();
+      else if (editing && there) {
+        clearTimeout(rangeDue);
+        rangeDue = setTimeout(() => askForRange(linkage), WHOLE_AFTER);
+      }
+    }
     moved();
     read();
     askForPose(linkage);
@@ -396,8 +428,8 @@ const View = (() => {
 
   function buttons() {
     if (!editing) return;
-    named('undo').disabled = !there || !history.can(-1);
-    named('redo').disabled = !there || !history.can(1);
+    if (named('undo')) named('undo').disabled = !there || !history.can(-1);
+    if (named('redo')) named('redo').disabled = !there || !history.can(1);
     if (named('save')) named('save').disabled = !there || history.isSaved;
     for (const control of document.querySelectorAll('.edit')) control.disabled = !there;
   }
@@ -457,6 +489,16 @@ const View = (() => {
 
   const act = {
     mayEdit,
+    isSpatial: () => isSpatial,
+    follows: () => linkage.inputs.length === 1,
+    follow(point, place) {
+      pause();
+      setInput(0, linkage.following(point.link, point.at, place));
+    },
+    turned() {
+      paths();
+      moved();
+    },
     tool: () => document.querySelector('input[name=tool]:checked')?.value ?? 'turn',
     isDriven: (link) => driven().includes(link),
     turnTo,
@@ -571,7 +613,9 @@ const View = (() => {
     });
     named('warnings').replaceChildren(...(model.warnings ?? []).map((text) => cell('li', text)));
     named('warnings').hidden = !(model.warnings ?? []).length;
-    fill('inputs', model.inputs.map(({ name }) => name), (name, i) => {
+    // Without a program and a server, what other inputs move is not known.
+    const moving = model.inputs.slice(0, model.program || editing ? undefined : 1);
+    fill('inputs', moving.map(({ name }) => name), (name, i) => {
       const slider = document.createElement('input');
       Object.assign(slider, { type: 'range', min: 0, max: SLIDER_STEPS, step: 1 });
       slider.addEventListener('input', () => {
@@ -591,7 +635,7 @@ const View = (() => {
     Angles.chosen.degrees = true;
     Looks.order(data.model.joints.map((joint) => joint.name));
     Angles.chosen.length = data.model.unit;
-    board = new Board.Drawing(named('drawing'), linkage);
+    board = new (isSpatial ? Board.Spatial : Board.Drawing)(named('drawing'), linkage);
     board.take(linkage);
     Hand.attach(board, act);
     plots = [...document.querySelectorAll('figure[data-key]')].map((f) => new OverInput.Plot(f, () => rate));
@@ -635,7 +679,7 @@ const View = (() => {
   function controls() {
     named('play').addEventListener('click', () => (playing ? pause() : play()));
     for (const what of ['ghosts', 'centres', 'names']) {
-      named(what).addEventListener('change', (event) => {
+      named(what)?.addEventListener('change', (event) => {
         board.shown[what] = event.target.checked;
         if (what === 'ghosts') board.fit(Picture.ink());
         board.paint();
@@ -655,10 +699,10 @@ const View = (() => {
     });
     document.addEventListener('keydown', press);
     if (!editing) return;
-    named('undo').addEventListener('click', () => go(-1));
-    named('redo').addEventListener('click', () => go(1));
+    named('undo')?.addEventListener('click', () => go(-1));
+    named('redo')?.addEventListener('click', () => go(1));
     named('save')?.addEventListener('click', save);
-    named('open').addEventListener('change', (event) => {
+    named('open')?.addEventListener('change', (event) => {
       openShipped(event.target.value);
       event.target.value = '';
     });

@@ -29,13 +29,16 @@ import webbrowser
 from linkage_ros.bag import is_bag_name
 from linkage_ros.cli import add_output, add_robot, robot_of
 from linkage_ros.description import (
+    is_planar_file,
     kind_of,
+    linkage_text,
     load_scene,
+    read_any_closure,
     read_closure,
     read_content,
     read_yaml,
     SCENE_FILE,
-    text_in_plane,
+    Section,
 )
 from linkage_ros.errors import (
     check_installed,
@@ -43,7 +46,7 @@ from linkage_ros.errors import (
     LinkageError,
     missing_packages_reported,
 )
-from linkage_ros.kinematics import check_planar
+from linkage_ros.kinematics import SpaceClosure
 from linkage_ros.resources import linkage_names, named_file, scene_names
 from linkage_ros.signals import heed_signals
 from linkage_ros.tools.view.report import Window
@@ -114,22 +117,27 @@ def _read_linkage(named: str, robot: Mapping[str, Any]) -> _NamedLinkage:
     file = named_file(named, 'linkages', 'scenes')
     content, data = read_content(file, robot)
     if kind_of(content) == 'linkage':
-        if text := text_in_plane(content, file.stem):
-            return _NamedLinkage(file.stem, file, text.encode(), None, is_planar_file=False)
-        read_closure(content, file.stem)
-        return _NamedLinkage(file.stem, file, data, None, is_planar_file=True)
+        data = _own_text(content, file.stem) or data
+        return _NamedLinkage(file.stem, file, data, None, is_planar_file(content))
     scene = load_scene(file)
-    for each in scene.linkages:
-        check_planar(scene.name, each.linkage)
     content = scene.linkages[0].linkage_content
     path = Path(content.file)
-    if text := text_in_plane(content, path.stem):
+    if text := _own_text(content, path.stem):
         # Its sensors read a linkage file.
-        return _NamedLinkage(path.stem, path, text.encode(), None, is_planar_file=False)
+        return _NamedLinkage(path.stem, path, text, None, is_planar_file=False)
     first = next(text for name, text in scene.files.items() if name != SCENE_FILE)
     texts = {name: text.decode() for name, text in scene.files.items()}
     folder = str(Path(scene.folder).absolute())
-    return _NamedLinkage(path.stem, path, first, (scene.name, texts, folder), is_planar_file=True)
+    shown = (scene.name, texts, folder)
+    return _NamedLinkage(path.stem, path, first, shown, is_planar_file(content))
+
+
+def _own_text(content: Section, name: str) -> bytes:
+    """Return the text of a robot, or of a linkage that is planar but not written so; or b''."""
+    closure = read_any_closure(content, name)
+    if is_planar_file(content) or (isinstance(closure, SpaceClosure) and 'urdf' not in content):
+        return b''
+    return linkage_text(closure.linkage, [f'From {Path(content.file).name}.']).encode()
 
 
 def _show_linkage(arguments: argparse.Namespace, stop: Event) -> int:

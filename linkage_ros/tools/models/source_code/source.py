@@ -34,6 +34,8 @@ from linkage_ros.kinematics import (
     ROUNDING,
     SHRINK,
     SMALLEST,
+    SpaceClosure,
+    SpaceDrawing,
     SpaceLinkage,
     StartTable,
     Status,
@@ -112,7 +114,7 @@ class Subject(NamedTuple):
 
     """
 
-    closure: PlanarClosure
+    closure: Any
     name: str
     file: str
     derivatives: int
@@ -289,8 +291,15 @@ def compile_subject(subject: Subject) -> Program:
     return compile_program(closure, subject.derivatives, wanted_numbers)
 
 
-def frame_values(closure: PlanarClosure, motion: TracedMotion) -> list[list[Any]]:
-    """Return x, y and angle of the frame of each link that moves, and their rates if known."""
+def frame_values(closure: Any, motion: TracedMotion) -> list[list[Any]]:
+    """
+    Return x, y and angle of the frame of each link that moves, and their rates if known.
+
+    In space they are x, y and z of the places of its drawing, without rates.
+    """
+    if isinstance(closure, SpaceClosure):
+        places = SpaceDrawing(closure).tracker().places(motion.position)
+        return [[number for place in places for number in place], []]
     of = closure.link_frames
     groups = [of.frames_at(motion.position)]
     if motion.velocity is not None:

@@ -38,7 +38,7 @@ SERVED_POLICY = _POLICY.replace(
 """Content policy of a page that asks the server which has sent it."""
 
 _HERE = 'linkage_ros.tools.view.pages'
-_DRAWING = ('angles.js', 'curves.js', 'looks.js', 'picture.js')
+_DRAWING = ('angles.js', 'curves.js', 'looks.js', 'picture.js', 'space.js')
 """Scripts of all pages that draw a linkage and plots."""
 
 _LONG = 28

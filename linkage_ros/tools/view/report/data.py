@@ -38,9 +38,10 @@ from linkage_ros.kinematics import (
     prepare_view,
     separate_blocks,
     SpaceClosure,
+    SpaceDrawing,
     usual_inputs,
 )
-from linkage_ros.tools.drawing import drawn_in_frames, SpaceDrawing
+from linkage_ros.tools.drawing import drawn_in_frames, space_page_data
 from linkage_ros.tools.models import grow_tree, prefix_names, Tree
 from linkage_ros.tools.view.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.tools.view.report.labels import (
@@ -353,7 +354,7 @@ def _spatial_poses(closure: SpaceClosure, inputs: Sequence[Numbers]) -> tuple[Po
     known = found[np.isfinite(found).all(axis=(1, 2))]
     if not len(known):
         known = drawing.places(closure.position(*usual_inputs(closure)))[None]
-    return Poses((), found, np.full(count, np.nan), ''), drawing.page_data(known)
+    return Poses((), found, np.full(count, np.nan), ''), space_page_data(drawing, known)
 
 
 def _linkage_json(linkage: LinkageRun, found: Poses) -> dict[str, Any]:

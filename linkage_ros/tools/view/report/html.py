@@ -51,7 +51,7 @@ _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
 """Upper bound of the HTML around each cell, in [bytes]."""
 
 _HERE = 'linkage_ros.tools.view.report'
-_FILES = ('report.css', 'over_time.js', 'over_others.js', 'plots.js', 'space.js', 'report.js')
+_FILES = ('report.css', 'over_time.js', 'over_others.js', 'plots.js', 'report.js')
 
 _LONGEST_FACT = 400
 """Maximum number of characters of a fact or a warning."""

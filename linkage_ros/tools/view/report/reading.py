@@ -28,10 +28,16 @@ from linkage_ros.bag import (
 )
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics import Closure, CODES, PlanarClosure, SpaceClosure, Status
+from linkage_ros.kinematics import (
+    Closure,
+    CODES,
+    PlanarClosure,
+    SpaceClosure,
+    SpaceDrawing,
+    Status,
+)
 from linkage_ros.messages import JOINT_STATE_TYPE, WRENCHES
 from linkage_ros.replay import own_joint_states, recorded_scene
-from linkage_ros.tools.drawing import SpaceDrawing
 from linkage_ros.tools.view.report.blocks import (
     Blocks,
     Entry,

@@ -1,5 +1,5 @@
 /* Copyright 2026 The linkage_ros authors. Licensed under the Apache License, Version 2.0. */
-/* A spatial linkage on a canvas: parts between recorded places, before a camera that turns. */
+/* A spatial linkage on a canvas: parts between places, before a camera that turns. */
 
 const Space = (() => {
   const PER_PIXEL = 0.01; // rad that the camera turns for a pixel of a drag
@@ -25,12 +25,8 @@ const Space = (() => {
     return found;
   }
 
-  class Linkage extends Picture.Linkage {
-    constructor(said, frames) {
-      super(said, frames);
-      this.look(...said.drawn.camera);
-    }
-
+  /** Return a class of linkages whose places, by their `spot`, are seen from a camera. */
+  const seen = (Base) => class extends Base {
     /** Let the camera stand at an azimuth and an elevation. */
     look(azimuth, elevation) {
       this.camera = [azimuth, Math.max(-Math.PI / 2, Math.min(Math.PI / 2, elevation))];
@@ -40,9 +36,10 @@ const Space = (() => {
 
     /** Return where a place is: to the right, upward, and to the camera; null where it is unknown. */
     place(row, number) {
-      const at = 3 * (number * this.drawn.count + row);
-      if (number < 0 || !Number.isFinite(this.poses[at])) return null;
-      const [x, y, z] = this.drawn.middle.map((middle, i) => this.poses[at + i] - middle);
+      const spot = this.spot(row, number);
+      if (!spot) return null;
+      if (!this.axes) this.look(...this.drawn.camera);
+      const [x, y, z] = this.drawn.middle.map((middle, i) => spot[i] - middle);
       return this.axes.map((axis) => axis[0] * x + axis[1] * y + axis[2] * z);
     }
 
@@ -50,29 +47,31 @@ const Space = (() => {
       const [across, up] = this.drawn.reach;
       return [-across, -up, across, up];
     }
+  };
 
-    hasPose(number, time) {
-      return !this.isSilent(time) && this.place(0, number) !== null;
-    }
-  }
-
-  class Canvas extends Picture.Canvas {
-    constructor(canvas, linkage, show) {
-      super(canvas, linkage);
-      this.show = show;
+  /** Return a class of canvases of such linkages; `turned` is called where the camera has moved. */
+  const drawn = (Base) => class extends Base {
+    /** Let a drag turn the camera; `isFree` says of a press whether it takes nothing else. */
+    listen(turned, isFree = () => true) {
+      const { canvas } = this;
+      this.turned = turned;
       let held = null;
       canvas.addEventListener('pointerdown', (event) => {
+        if (!isFree(event)) return;
         canvas.setPointerCapture(event.pointerId);
         held = event;
       });
       canvas.addEventListener('pointermove', (event) => {
-        if (!canvas.hasPointerCapture(event.pointerId)) return;
+        if (!held || event.pointerId !== held.pointerId) return;
         const [right, down] = [event.clientX - held.clientX, event.clientY - held.clientY];
         this.turn(-right * PER_PIXEL, down * PER_PIXEL);
         held = event;
       });
+      for (const end of ['pointerup', 'pointercancel']) {
+        canvas.addEventListener(end, () => { held = null; });
+      }
       canvas.addEventListener('dblclick', () => {
-        linkage.look(...linkage.drawn.camera);
+        this.linkage.look(...this.linkage.drawn.camera);
         this.turn(0, 0);
       });
       canvas.addEventListener('keydown', (event) => {
@@ -88,7 +87,7 @@ const Space = (() => {
       const [azimuth, elevation] = this.linkage.camera;
       this.linkage.look(azimuth + right, elevation + up);
       this.curves = null;
-      this.show();
+      this.turned();
     }
 
     draw(number, time, view) {
@@ -155,7 +154,26 @@ const Space = (() => {
       }
       pen.textAlign = 'start';
     }
+  };
+
+  class Linkage extends seen(Picture.Linkage) {
+    spot(row, number) {
+      const at = 3 * (number * this.drawn.count + row);
+      if (number < 0 || !Number.isFinite(this.poses[at])) return null;
+      return this.poses.subarray(at, at + 3);
+    }
+
+    hasPose(number, time) {
+      return !this.isSilent(time) && this.spot(0, number) !== null;
+    }
   }
 
-  return { Linkage, Canvas };
+  class Canvas extends drawn(Picture.Canvas) {
+    constructor(canvas, linkage, show) {
+      super(canvas, linkage);
+      this.listen(show);
+    }
+  }
+
+  return { Linkage, Canvas, seen, drawn };
 })();
