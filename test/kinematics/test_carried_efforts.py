@@ -215,8 +215,8 @@ def test_a_five_bar_with_a_stretched_arm_bears_any_force_along_it():
 @pytest.mark.parametrize(
     ('efforts', 'to', 'message'),
     [
-        ({'rockr_joint': 1.0}, (), 'rockr_joint: is no joint of the linkage; did you mean'),
-        ({'rocker_joint': 1.0}, ('A.x',), 'A.x: is no joint of the linkage; it has '),
+        ({'rockr_joint': 1.0}, (), 'rockr_joint: is not a joint of the linkage; did you mean'),
+        ({'rocker_joint': 1.0}, ('A.x',), 'A.x: is not a joint of the linkage; it has '),
         (
             {'crank_joint': 1.0},
             ('rocker_joint', 'coupler_joint'),

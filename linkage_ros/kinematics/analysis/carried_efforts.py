@@ -67,7 +67,7 @@ class CarriedEfforts:
         for name in (*given, *wanted):
             if name not in units:
                 remedy = did_you_mean(name, units, f'it has {list_names(units)}')
-                raise DefinitionError(name, 'is no joint of the linkage', remedy)
+                raise DefinitionError(name, 'is not a joint of the linkage', remedy)
         if len({*wanted}) != len(inputs) or len(wanted) != len(inputs):
             count = f'{len(inputs)} input{"s" * (len(inputs) != 1)}'
             names = list_names(wanted) or 'no joint'
