@@ -58,6 +58,7 @@ from linkage_ros.dynamics.reactions import (
 from linkage_ros.dynamics.several_freedoms import (
     InputVector as InputVector,
     SeveralDofMechanism as SeveralDofMechanism,
+    SeveralMotion as SeveralMotion,
 )
 from linkage_ros.dynamics.several_motors import (
     behind_play as behind_play,

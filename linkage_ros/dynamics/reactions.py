@@ -376,21 +376,9 @@ class Reactions:
     def _press_coefficients(
         self, position: Position, rates: Sequence[float], given: Sequence[float]
     ) -> Sequence[Sequence[float]]:
-        closure, mechanics = self._mechanics.closure, self._mechanics
-        places, count = self._follower.places(position), len(rates)
-        velocity = closure.velocity(position, *rates)
-        of_accelerations: list[list[float]] = []
-        for number in range(-1, count):
-            changes = [float(n == number) for n in range(count)]
-            acceleration = closure.acceleration(position, velocity, *changes)
-            sides, _ = self._right_sides(
-                position, velocity, acceleration, places, given, dry=False
-            )
-            of_accelerations.append(sides)
-        still, *others = of_accelerations
-        columns = [*still]
-        for sides in others:
-            columns += [one - other for one, other in zip(sides, still, strict=True)]
+        mechanics, places = self._mechanics, self._follower.places(position)
+        velocity = mechanics.closure.velocity(position, *rates)
+        columns, _ = self._sides_by_accelerations(position, velocity, places, given, dry=False)
         actions = [self._motion(rubbing) for rubbing in mechanics.dry_joints]
         actions += [self._forms.efforts[name] for name in mechanics.stopped_joints]
         for action in actions:
@@ -401,7 +389,7 @@ class Reactions:
         forces = call(self._frictions.forces_in, *numbers, *columns)
         if not has_result(forces):
             return []
-        total = 2 * len(self._load_dependent) * (1 + count + len(actions))
+        total = 2 * len(self._load_dependent) * (1 + len(rates) + len(actions))
         return [[forces[i] for i in range(total)]]
 
     def joint_deflections(
@@ -502,15 +490,10 @@ class Reactions:
         self, position: Position, velocity: Velocity, given: Sequence[float]
     ) -> Sequence[Sequence[float]]:
         """Return the coefficients of the forces that cause friction, and the levers of joints."""
-        closure, size = self._mechanics.closure, self._matrix.size
-        places = self._follower.places(position)
-        still, pulled = (closure.acceleration(position, velocity, pull) for pull in (0.0, 1.0))
-        sides, _ = self._right_sides(position, velocity, still, places, given)
-        more, _ = self._right_sides(position, velocity, pulled, places, given)
-        by_pull = [one - other for one, other in zip(more[:size], sides[:size], strict=True)]
-        columns = [*sides[:size], *by_pull, *sides[size:]]
+        closure, places = self._mechanics.closure, self._follower.places(position)
+        columns, units = self._sides_by_accelerations(position, velocity, places, given)
         numbers = self._matrix.varying_at(position, places)
-        forces = call(self._frictions.forces_in, *numbers, *columns)
+        forces = call(self._frictions.forces_in, *numbers, *columns, *units)
         if not has_result(forces):
             return []
         v = velocity.state.coordinates
@@ -518,6 +501,37 @@ class Reactions:
         levers = [abs(rubbing.slip_rate(v) / (unit * v[1])) for rubbing in self._load_dependent]
         count = 2 * len(self._load_dependent) * (len(self._load_dependent) + 2)
         return [[forces[i] for i in range(count)], levers]
+
+    def _sides_by_accelerations(
+        self,
+        position: Position,
+        velocity: Velocity,
+        places: list[Any],
+        given: Sequence[float],
+        dry: bool = True,
+    ) -> tuple[list[float], list[float]]:
+        """
+        Return right sides at accelerations of 0, and what 1 of each input changes.
+
+        The second list has what `_right_sides` returns of friction after them.
+        """
+        closure, size = self._mechanics.closure, self._matrix.size
+        count = len(closure.input_names)
+        still, *moved = [
+            self._right_sides(
+                position,
+                velocity,
+                closure.acceleration(position, velocity, *[float(n == k) for n in range(count)]),
+                places,
+                given,
+                dry,
+            )[0]
+            for k in range(-1, count)
+        ]
+        columns = still[:size]
+        for sides in moved:
+            columns += [one - other for one, other in zip(sides[:size], still[:size], strict=True)]
+        return columns, still[size:]
 
     def _solve_balance(
         self,

@@ -19,7 +19,7 @@ effort follows from it and the rate. A command that is delayed waits until its t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, pi
 from typing import Any, TYPE_CHECKING
@@ -33,7 +33,13 @@ from linkage_ros.stages.drives.drive import Context, Drive, Reader
 from linkage_ros.stages.drives.torque_crank import TorqueCrank
 
 if TYPE_CHECKING:
-    from linkage_ros.dynamics import Mechanics, Motor, Winding
+    from linkage_ros.dynamics import (
+        Mechanics,
+        Motor,
+        SeveralDofMechanism,
+        SeveralMotion,
+        Winding,
+    )
     from linkage_ros.stages.drives.several_torques import SeveralTorqueCrank
 
 _SAMPLES = 90
@@ -388,7 +394,6 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         behind_play,  # local import: only with several
         MotorPlay,  # local import: only with several
         motors_of,  # local import: only with several
-        SeveralDofMechanism,  # local import: only with several
     )
     from linkage_ros.stages.drives.several_torques import (
         SeveralTorqueCrank,  # local import: only with several
@@ -407,32 +412,7 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
         else min(given.limits.effort, LARGEST)
         for use, given in zip(uses, inputs, strict=True)
     )
-    limits = context.hard_limited.linkage.inputs
-    terms, pressing = mechanics.input_equation, None
-    if mechanics.friction.load_dependent_joint:
-        pressing = context.reactions.pressing
-        terms = pressing.mount_on(terms)
-    mechanism = SeveralDofMechanism(
-        terms,
-        METHODS[parameters.method].step,
-        tuple((given.limits.low, given.limits.high) for given in limits),
-        parameters.restitution,
-        mechanics.applied.laws if mechanics.applied else (),
-        frictions=mechanics.dry_frictions,
-        joint_stops=mechanics.joint_stops,
-        pressing=pressing,
-    )
-    start = mechanism.state_at([use.start for use in uses], [use.rate for use in uses])
-    if start is None:
-        values = ', '.join(f'{use.start:g} {i.unit}' for use, i in zip(uses, inputs, strict=True))
-        raise DefinitionError(
-            parameters.key_for(inputs[0].joint, 'start'),
-            f'at {values} nothing can be moved: beyond a stop, a toggle, or no inertia',
-            f'start elsewhere, as inputs: {{{inputs[0].joint}: {{start: 0.1}}}}',
-        )
-    inertia = start.terms.total_inertia
-    of_motors = sum(use.play.inertia for use in uses if use.play)
-    mechanism = replace(mechanism, most_inertia=inertia / parameters.stop_margin + of_motors)
+    mechanism, start = _build_mechanism(parameters, uses, context)
     plays = {
         index: MotorPlay(use.play.width, use.play.inertia, use.play.restitution)
         for index, use in enumerate(uses)
@@ -458,3 +438,39 @@ def _build_several(parameters: TorqueDrive, context: Context) -> SeveralTorqueCr
     moved = motors.mount_on(behind_play(mechanism, plays) if plays else mechanism)
     begin = moved.state_at(*([*of, *[of[n] for n in plays]] for of in (start.value, start.rate)))
     return SeveralTorqueCrank(moved, begin, uses, period, most, motors, wrenches, exerts)
+
+
+def _build_mechanism(
+    parameters: TorqueDrive, uses: Sequence[TorqueDrive], context: Context
+) -> tuple[SeveralDofMechanism, SeveralMotion]:
+    """Return what several inputs move, without their motors, and its start."""
+    from linkage_ros.dynamics import SeveralDofMechanism  # local import: only with several
+
+    mechanics, inputs = context.mechanics, context.closure.linkage.inputs
+    limits = context.hard_limited.linkage.inputs
+    terms, pressing = mechanics.input_equation, None
+    if mechanics.friction.load_dependent_joint:
+        pressing = context.reactions.pressing
+        terms = pressing.mount_on(terms)
+    mechanism = SeveralDofMechanism(
+        terms,
+        METHODS[parameters.method].step,
+        tuple((given.limits.low, given.limits.high) for given in limits),
+        parameters.restitution,
+        mechanics.applied.laws if mechanics.applied else (),
+        frictions=mechanics.dry_frictions,
+        joint_stops=mechanics.joint_stops,
+        pressing=pressing,
+    )
+    start = mechanism.state_at([use.start for use in uses], [use.rate for use in uses])
+    if start is None:
+        values = ', '.join(f'{use.start:g} {i.unit}' for use, i in zip(uses, inputs, strict=True))
+        raise DefinitionError(
+            parameters.key_for(inputs[0].joint, 'start'),
+            f'at {values} nothing can be moved: beyond a stop, a toggle, or no inertia',
+            f'start elsewhere, as inputs: {{{inputs[0].joint}: {{start: 0.1}}}}',
+        )
+    inertia = start.terms.total_inertia
+    of_motors = sum(use.play.inertia for use in uses if use.play)
+    most = inertia / parameters.stop_margin + of_motors
+    return replace(mechanism, most_inertia=most), start
