@@ -133,8 +133,8 @@ class FrictionSolver:
         joint. ``pull`` is q̈ without this friction, in [rad/s²] or [m/s²]. ``mobility`` says how
         much q̈ falls with a unit of this friction at the input: sign(q̇)/I; 0 if q̈ is given.
         """
-        (numbers,) = self._begin(*forces, *levers, pull, mobility)
-        return self._iterate(numbers[: self._count], numbers[self._count :])
+        (numbers,), count = self._begin(*forces, *levers, pull, mobility), self._count
+        return self._iterate(numbers[:count], numbers[count:])
 
     @property
     def factors(self) -> list[float]:

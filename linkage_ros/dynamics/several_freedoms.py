@@ -18,10 +18,10 @@ integrator finds the instant and cuts the step there, as with one freedom
 (`linkage_ros.dynamics.motion`).
 
 A stop of an input is hard: at the instant of the impact the impulse L on this input changes all
-rates, by M·Δq̇ = L·e, so that its own rate becomes −ε·q̇. What touches its stop already bears a part
-of the blow, by impulses that only push. An input that is pushed against its stop
-stays there: it leaves the equations, and the force that the stop needs comes from its own. Where
-that force would pull, the step is cut and the input is free. Of several inputs at their stops
+rates, by M·Δq̇ = L·e, so that its own rate becomes −ε·q̇. What touches its stop already bears a
+part of the blow, by impulses that only push. An input that is pushed against its stop stays
+there: it leaves the equations, and the force that the stop needs comes from its own. Where that
+force would pull, the step is cut and the input is free. Of several inputs at their stops
 those stay that are pushed (F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts,
 1996, ch. 6, without friction).
 
@@ -379,7 +379,7 @@ class SeveralDofMechanism:
                 [sum(map(mul, rows[j], change)) + slips[j].bias for j in resting],
                 [self._bounds_of(j, piece, bound) for j in resting],
             )
-            if self.pressing is None:
+            if terms.presses is None:
                 break
             for j, part in zip(resting, borne, strict=True):
                 pushed += part * rows[j]
@@ -387,7 +387,7 @@ class SeveralDofMechanism:
                 zip(resting, borne, strict=True)
             )
             change = self._move(terms, pushed, piece)
-            before, bound = bound, self._press_frictions(terms, now, change, resisted)
+            before, bound = bound, self._press_frictions(terms.presses(now), change, resisted)
             if all(
                 abs(new - before.get(j, 0.0)) <= _FIXED * min(new, LARGEST)
                 for j, new in bound.items()
@@ -420,12 +420,10 @@ class SeveralDofMechanism:
         return [one, *change[: self.pressing.inputs], *[resisted.get(j, 0.0) for j in numbers]]
 
     def _press_frictions(
-        self, terms: InputTerms, time: float, change: InputVector, resisted: Mapping[int, float]
+        self, presses: Sequence[float], change: InputVector, resisted: Mapping[int, float]
     ) -> dict[int, float]:
         """Return the friction by the forces in joints, from accelerations and all friction."""
         assert self.pressing
-        assert terms.presses
-        presses = terms.presses(time)
         if not presses:
             return {}
         forces = self.pressing.forces_by(presses, [self._weights(1.0, change, resisted)])
@@ -491,9 +489,11 @@ class SeveralDofMechanism:
         for j, unit in units.items():
             force += frictions[j] * unit.force
             parts = {k: part + frictions[j] * unit.parts[k] for k, part in parts.items()}
+        if parts.keys().isdisjoint(joints):
+            return _Resolved(force, parts)
         resisted = self._sliding_frictions(slips, piece, frictions) | parts
-        pressed = self._press_frictions(terms, time, self._move(terms, force, piece), resisted)
-        return _Resolved(force, parts, pressed)
+        change = self._move(terms, force, piece)
+        return _Resolved(force, parts, self._press_frictions(presses, change, resisted))
 
     def _break_margin(self, motion: SeveralMotion, piece: _Piece) -> float:
         """Return how much more the joints hold that stick; negative where one breaks away."""

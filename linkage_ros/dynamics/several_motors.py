@@ -171,7 +171,8 @@ class InputMotors:
 
     def _laws_of(self, mechanism: SeveralDofMechanism) -> list[tuple[int, Any]]:
         driven = [at for at, _ in self._driving]
-        return [*zip(driven, mechanism.laws[len(self._loads_of(mechanism)) :], strict=True)]
+        first = len(self._loads_of(mechanism))
+        return [*zip(driven, mechanism.laws[first:], strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
