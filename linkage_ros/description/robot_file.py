@@ -217,6 +217,12 @@ class _Robot:
         mounts = {tree.body(urdf.joints[name].parent) for name in self._moving} - children
         tree.mount = mounts.pop() if len(mounts) == 1 else urdf.root
         self._pose = RobotPose(tree, self._loops, self._told, self._moving)
+        self._apart = [
+            RobotPose(tree, loops, self._told, [name for name in self._moving if name in names])
+            for names, loops in chosen
+            if loops
+        ]
+        """The same of loops that move together."""
 
     def _find_groups(self) -> list[tuple[set[str], list[UrdfLoop]]]:
         """Return the joints that loops and ratios tie together, with the loops."""
@@ -446,7 +452,7 @@ class _Robot:
             (open_by, 'm', _MET * pose.size), (turned_by, 'rad', _MET),
         ):  # fmt: skip
             if apart > most or (self._near and not pose.is_within_limits(values)):
-                near = pose.find_near(values, driven, ratios)
+                near = self._find_near(values, driven, ratios)
                 if near is None or not self._near:
                     reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
                     raise DefinitionError('at', reason, self._remedy_of(near, ratios))
@@ -495,6 +501,15 @@ class _Robot:
         )
         links = linkage.link_names[1:]
         return linkage.with_masses(self._masses(on, frames, links), massless=links)
+
+    def _find_near(
+        self, values: dict[str, float], driven: Sequence[str], ratios: Mapping[str, Ratio]
+    ) -> dict[str, float] | None:
+        """Return a pose near values in which all loops close, sought leg by leg; or None."""
+        near: dict[str, float] | None = values
+        for pose in self._apart:
+            near = near and pose.find_near(near, driven, ratios)
+        return near
 
     def _remedy_of(self, found: Mapping[str, float] | None, ratios: Mapping[str, Ratio]) -> str:
         """Return the remedy for loops that are open, with a pose near it in which they close."""

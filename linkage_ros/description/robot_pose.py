@@ -92,10 +92,16 @@ class RobotTree:
         moving = (joint.child for joint in self.above[link] if joint.kind != 'fixed')
         return next(moving, self._root)
 
-    def place_links(self, values: Mapping[str, float]) -> dict[str, SpaceFrame]:
-        """Return the frame of each link on the mount at values of the joints, in its frame."""
+    def place_links(
+        self, values: Mapping[str, float], joints: Sequence[UrdfJoint] = ()
+    ) -> dict[str, SpaceFrame]:
+        """
+        Return the frame of each link on the mount at values of the joints, in its frame.
+
+        Links that some ``joints`` suffice to reach are enough, if these are given.
+        """
         frames = {self.mount: GROUND_FRAME}
-        for joint in self.joints.values():
+        for joint in joints or self.joints.values():
             if joint.parent not in frames:
                 continue
             base = compose_frames(frames[joint.parent], self.bases[joint.name])
@@ -123,7 +129,12 @@ class RobotPose:
         self._tree, self._told, self._moving = tree, told, moving
         self.closed = [loop for loop in loops if loop.kind != 'rod']
         self.directed = [loop for loop in loops if _is_directed(loop)]
-        frames = tree.place_links({})
+        above = {
+            joint.name for loop in loops for end in loop.ends for joint in tree.above[end.link]
+        }
+        above |= {joint.name for name in moving for joint in tree.above[tree.joints[name].child]}
+        self._joints = [joint for joint in tree.joints.values() if joint.name in above]
+        frames = tree.place_links({}, self._joints)
         places = [frames[tree.joints[name].child].origin for name in moving]
         places += [end_frame(end, frames).origin for loop in loops for end in loop.ends]
         size = extent_of(places)
@@ -238,7 +249,7 @@ class RobotPose:
         within_limits: bool = False,
     ) -> tuple[dict[str, float], float]:
         """Return values at which the loops close, as far as free joints do it, and the gap."""
-        frames = self._tree.place_links(values)
+        frames = self._tree.place_links(values, self._joints)
         left = self._remaining_errors(frames)
         damping = _SEARCH_DAMPING if is_far else _LEAST_DAMPING
         for _ in range(_MOST_SEARCH_STEPS if is_far else _MOST_STEPS):
@@ -257,7 +268,7 @@ class RobotPose:
                     for name, move in moves.items()
                 }
             moved = self.move(values, moves, ratios)
-            frames_there = self._tree.place_links(moved)
+            frames_there = self._tree.place_links(moved, self._joints)
             left_there = self._remaining_errors(frames_there)
             if hypot(*left_there) < hypot(*left):
                 values, frames, left = moved, frames_there, left_there

@@ -634,3 +634,39 @@ def test_ends_of_a_planar_pin_that_lie_beside_each_other_are_told(tmp_path, apar
     assert other.linkage.corrections.beside_by == pytest.approx(told, abs=1e-12)
     inputs = one.linkage.pose.inputs
     assert other.position(*inputs).joints == pytest.approx(one.position(*inputs).joints, abs=1e-7)
+
+
+def open_leg(number, rod, turns):
+    """Return a four-bar in a plane of its own, open at 0: crank 0.1, rocker 0.2, ground 0.25."""
+    a, b, c = turns
+    joints = ''.join(
+        f'<joint name="{name}{number}" type="continuous"><parent link="{parent}"/>'
+        f'<child link="{child}{number}"/><origin xyz="{x} 0 {z}" rpy="0 0 {turn}"/>'
+        f'<axis xyz="0 0 1"/></joint><link name="{child}{number}"/>'
+        for name, parent, child, x, z, turn in (
+            ('a', 'base', 'crank', 0.0, number, a),
+            ('b', f'crank{number}', 'rod', 0.1, 0.0, b),
+            ('c', 'base', 'rocker', 0.25, number, c),
+        )
+    )
+    return (
+        f'{joints}<loop_joint name="loop{number}" type="spherical">'
+        f'<link1 link="rod{number}" xyz="{rod} 0 0"/><link2 link="rocker{number}" xyz="0.2 0 0"/>'
+        '</loop_joint>'
+    )
+
+
+def test_a_robot_may_have_more_loops_than_move_together(tmp_path):
+    # Every other leg is stretched out at 0, and found from joints that are nudged.
+    legs = {n: (0.22 + 0.004 * n, ((0.3, 0.2, 1.1), (0.0, 0.0, 0.0))[n % 2]) for n in range(21)}
+    text = ''.join(open_leg(number, *leg) for number, leg in legs.items())
+    robot = f'<robot name="legs"><link name="base"/>{text}</robot>'
+    closure = read(tmp_path, robot, input=[f'a{number}' for number in legs], near=True)
+    inputs = closure.linkage.pose.inputs
+    pose = closure.position(*inputs)
+    values = dict(zip(closure.joint_names, pose.joints, strict=True))
+    values |= dict(zip(closure.input_names, inputs, strict=True))
+    for number, (rod, rest) in legs.items():
+        a, b, c = (values[f'{name}{number}'] + at for name, at in zip('abc', rest, strict=True))
+        end = 0.1 * np.exp(1j * a) + rod * np.exp(1j * (a + b))
+        assert end == pytest.approx(0.25 + 0.2 * np.exp(1j * c), abs=1e-12)
