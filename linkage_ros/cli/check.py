@@ -358,8 +358,15 @@ def _assembly_text(dyad: Dyad, side: str) -> str:
 def _space_json(closure: SpaceClosure) -> dict[str, Any]:
     """Return what a spatial linkage consists of."""
     linkage, freedom = closure.linkage, closure.freedom
+    moving = len(linkage.link_names) - 1
+    # Two balls between two links are one hinge.
+    joined = {frozenset((joint.parent, joint.child)) for joint in linkage.pair_joints.values()}
+    for point in linkage.points:
+        first, *others = [link for link, points in linkage.links.items() if point in points]
+        joined |= {frozenset((first, other)) for other in others}
     return {
-        'moving_links': len(linkage.link_names) - 1,
+        'moving_links': moving,
+        'loops': len(joined) + len(linkage.struts) - moving,
         'hinges': len(linkage.hinges),
         'slides': len(linkage.slides),
         'balls': closure.ball_count,
@@ -415,7 +422,7 @@ def _linkage_tables(
     yield facts_table(account['file'], linkage_facts(account, units))
     yield tables[0]
     input_units = [given['unit'] for given in account['inputs']]
-    for group in account['other_assemblies'] if 'loops' in account else ():
+    for group in account['other_assemblies'] if 'pins' in account else ():
         yield _assemblies_table(group, input_units, units)
     yield from (table for table in tables[1:] if table.rows or table.key == 'branches')
 

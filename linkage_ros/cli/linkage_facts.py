@@ -30,7 +30,7 @@ _SAME = 1e-9
 
 def linkage_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[tuple[str, str]]:
     """Yield what each line is about, and what it says."""
-    facts = _planar_facts if 'loops' in account else _spatial_facts
+    facts = _planar_facts if 'pins' in account else _spatial_facts
     yield from facts(account, units)
 
 
@@ -60,6 +60,8 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
     kinds = ('hinges', 'slides', 'balls', 'struts')
     counts = [(account[kind], kind) for kind in kinds if account[kind]]
     yield 'joints', ', '.join(f'{n} {kind[:-1] if n == 1 else kind}' for n, kind in counts)
+    planar = sum(group['kind'] == 'planar loop' for group in account['groups'])
+    yield 'loops', f'{account["loops"]}{f", {planar} solved in a plane" if planar else ""}'
     yield 'degrees of freedom', f'{account["degrees_of_freedom"]}, as many as there are inputs'
     if account['spinning_rods']:
         yield 'rods that may spin', ', '.join(account['spinning_rods'])
