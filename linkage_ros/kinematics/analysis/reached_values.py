@@ -103,7 +103,9 @@ def _search_box(
         while step > _LEAST_STEP:
             moved = False
             for k, way in product(range(len(box)), (-step, step)):
-                there = (*at[:k], min(max(at[k] + way, 0.0), 1.0), *at[k + 1 :])
+                there = tuple(
+                    min(max(part + way * (i == k), 0.0), 1.0) for i, part in enumerate(at)
+                )
                 values = values_at(there)
                 if values and sign * values[row] > best:
                     at, best, moved = there, sign * values[row], True
