@@ -40,7 +40,7 @@ from linkage_ros.cli.result import add_result, Result, show_result
 from linkage_ros.cli.table import Column, Table
 from linkage_ros.cli.terminal import show_progress
 from linkage_ros.description import linkage_content, read_any_closure
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import did_you_mean, LinkageError, list_names
 from linkage_ros.kinematics import (
     Closure,
     InputSweep,
@@ -49,6 +49,7 @@ from linkage_ros.kinematics import (
     search_inputs,
     Status,
     turn_to_pose,
+    usual_inputs,
 )
 from linkage_ros.resources import named_file
 
@@ -82,6 +83,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--sweep', action='store_true', help='solve over the range; the default without --at'
+    )
+    parser.add_argument(
+        '--over',
+        metavar='INPUT',
+        help='input of a sweep, of several; the others are held as in the last --at, else as they '
+        'are drawn',
     )
     parser.add_argument(
         '--from',
@@ -166,9 +173,29 @@ def _forward_table(
     return list(_output_columns(closure, question)), rows
 
 
+def _is_swept(arguments: argparse.Namespace) -> bool:
+    ends = arguments.over, arguments.first, arguments.last
+    return arguments.sweep or any(given is not None for given in ends)
+
+
+def _swept_input(closure: Closure, named: str | None) -> int:
+    """Return the number of the input of a sweep."""
+    names = closure.input_names
+    if named is None:
+        if len(names) > 1:
+            reason = f'there are {len(names)} inputs'
+            remedy = f'name one, as --over {names[0]}, or each state with --at'
+            raise LinkageError('--sweep', reason, remedy)
+        return 0
+    if named not in names:
+        remedy = did_you_mean(named, names, f'name {list_names(names)}')
+        raise LinkageError(f'--over {named}', 'is not an input', remedy)
+    return names.index(named)
+
+
 def _check_alone(arguments: argparse.Namespace) -> None:
     """Refuse other options that say which states to solve, besides ``--joint``."""
-    swept = arguments.sweep or arguments.first is not None or arguments.last is not None
+    swept = _is_swept(arguments)
     for option, given in (('--at', arguments.at), ('--sweep', swept)):
         if given:
             where = f'--joint {arguments.joint[0][0]}'
@@ -321,14 +348,10 @@ def _read_question(
         *asked,
         *(read_inputs(linkage, at, '--at', arguments.angles) for at in arguments.at),
     ]
-    swept = arguments.sweep or arguments.first is not None or arguments.last is not None
-    if swept or not asked:
-        if len(linkage.inputs) > 1:
-            raise LinkageError(
-                '--sweep', f'there are {len(linkage.inputs)} inputs', 'name each state with --at'
-            )
+    if _is_swept(arguments) or not asked:
+        held = asked[-1] if asked else usual_inputs(closure)
         asked += _sweep_inputs(
-            InputSweep(closure),
+            InputSweep(closure, held, _swept_input(closure, arguments.over)),
             arguments.first,
             arguments.last,
             arguments.steps,
@@ -362,8 +385,10 @@ def _sweep_inputs(
     ranges = list(input_sweep.ranges)
     if first is not None or last is not None:
         reached = input_sweep.widest_range
-        assert reached is not None, 'reading the file has proved that it closes somewhere'
-        ranges = [reached]
+        ranges = [reached] if reached else []
+    if not ranges:
+        reason = 'closes nowhere while the other inputs are held'
+        raise LinkageError(input_sweep.input.joint, reason, 'hold them elsewhere, by --at')
     unit = 'rad' if input_sweep.turning else 'm'
     for interval in ranges:
         low = units.convert(interval.lowest, unit) if first is None else first
@@ -374,7 +399,7 @@ def _sweep_inputs(
                 value = interval.lowest
             elif i == steps and last is None:
                 value = interval.highest
-            yield (value,)
+            yield input_sweep.inputs_at(value)
 
 
 def _output_columns(closure: Closure, question: Question) -> Iterator[Column]:

@@ -7,9 +7,10 @@
 # language governing permissions and limitations under the License.
 """Spatial linkages in MuJoCo: the model loads, starts closed, and moves as the closure says."""
 
-from linkage_ros.description import load, parse_yaml, read_any_closure
+from linkage_ros.description import load
 from linkage_ros.dynamics import Loads, Mechanics
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics import Closure, SpatialMass
 from linkage_ros.resources import spatial_linkage_names
 from linkage_ros.tools.models import model_of, ModelPart, mujoco_model
 import numpy as np
@@ -86,15 +87,7 @@ def test_masses_and_gravity_are_those_of_the_scene():
 
 
 def test_a_massless_link_with_points_is_refused():
-    masses = '{mass: 0}'
-    text = (
-        'points: {A: [0.04, 0, 0], B: [0.1, 0.02, 0.12]}\n'
-        'links: {crank: [A], rod: [A, B], rocker: [B]}\n'
-        'hinges:\n'
-        '  c: {parent: ground, child: crank, at: [0, 0, 0], axis: [0, 0, 1]}\n'
-        '  r: {parent: ground, child: rocker, at: [0.15, 0.05, 0.03], axis: [0, 1, 0.3]}\n'
-        f'input: c\nmasses: {{crank: {masses}, rod: {masses}, rocker: {{mass: 1, '
-        'center: [0.1, 0, 0], inertia: [1, 0, 0, 1, 0, 1]}}}}\n'
-    )
+    rocker = SpatialMass(1.0, (0.1, 0.0, 0.1), (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+    linkage = load('rssr').linkage.with_masses({'rocker': rocker}, ('crank', 'rod'))
     with pytest.raises(LinkageError, match=r'masses.*MuJoCo moves no massless body'):
-        mujoco_model('x', [ModelPart(read_any_closure(parse_yaml(text.encode(), 'x')))])
+        mujoco_model('x', [ModelPart(Closure(linkage))])

@@ -127,20 +127,21 @@ class SweptCurve(NamedTuple):
 
 class InputSweep:
     """
-    A linkage as a function of its first input; the others are held.
+    A linkage as a function of one input, the first one by default; the others are held.
 
     ``held`` has values of all inputs, in [rad] or [m], and is not needed for a single input.
     """
 
-    def __init__(self, closure: Closure, held: Sequence[float] = (0.0,)) -> None:
+    def __init__(self, closure: Closure, held: Sequence[float] = (0.0,), number: int = 0) -> None:
         self.closure = closure
-        self._others = tuple(held[1:])
-        self.input = closure.linkage.inputs[0]
+        after = number + 1
+        self._before, self._after = tuple(held[:number]), tuple(held[after:])
+        self.input = closure.linkage.inputs[number]
         self.turning = not self.input.slider
 
     def inputs_at(self, value: float) -> tuple[float, ...]:
         """Return the values of all inputs."""
-        return value, *self._others
+        return *self._before, value, *self._after
 
     def position_at(self, value: float) -> Position:
         """Return the position at a value of the input."""

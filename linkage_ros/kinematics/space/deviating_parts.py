@@ -123,13 +123,12 @@ class _DeviatingParts:
     def equations(self) -> tuple[Vectors, Vectors]:
         """Return the errors of all equations, and their slopes by the motions of all links."""
         rows = [*self._coincidences(), *self._joints(), *self._struts(), *self._ratios()]
-        columns = {link: 6 * number for number, link in enumerate(self._links)}
+        columns = {link: slice(6 * n, 6 * n + 6) for n, link in enumerate(self._links)}
         slopes = np.zeros((len(rows), 6 * len(columns)))
         for number, (_, of_links) in enumerate(rows):
             for link, slope in of_links.items():
                 if link != GROUND:
-                    first = columns[link]
-                    slopes[number, first : first + 6] += slope
+                    slopes[number, columns[link]] += slope
         return np.array([error for error, _ in rows]), slopes
 
     def move(self, step: Vectors) -> None:
