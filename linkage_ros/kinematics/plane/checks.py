@@ -40,10 +40,7 @@ _LEAST_RATIO = 1e-30
 """Least distance of two pins relative to the linkage; in a shorter one no digit would be left."""
 
 
-PLANAR_ONLY = (
-    'name a planar one; check, solve, draw, compile, urdf, run, simulate, accuracy, plot, report '
-    'and replay take others'
-)
+PLANAR_ONLY = 'name a planar one; view and its pages without --node show others'
 """Remedy where a spatial linkage is of no use."""
 
 
