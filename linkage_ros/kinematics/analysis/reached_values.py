@@ -33,8 +33,8 @@ _COUNTS = {2: 13, 3: 7}
 _MOST_JOINTS = 8
 """Most joints that are searched for."""
 
-_LEAST_STEP = 1e-7
-"""The last steps, in parts of a range of limits."""
+_LEAST_STEP, _MOST_ROUNDS = 1e-7, 200
+"""The last steps, in parts of a range of limits, and most rounds of them along each input."""
 
 
 class ReachedValues(NamedTuple):
@@ -100,7 +100,9 @@ def _search_box(
         """Return the greatest value of a joint times a sign."""
         at = max(closed, key=lambda parts: sign * closed[parts][row])
         best, step = sign * closed[at][row], 1.0 / (count - 1)
-        while step > _LEAST_STEP:
+        for _ in range(_MOST_ROUNDS):
+            if step <= _LEAST_STEP:
+                break
             moved = False
             for k, way in product(range(len(box)), (-step, step)):
                 there = tuple(
