@@ -120,7 +120,7 @@ def check(linkage, scene, looked=1):
 @pytest.mark.parametrize('drive', DRIVES)
 @pytest.mark.parametrize('effects', EFFECTS)
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
-def test_both_publish_the_same_bytes(file, effects, drive):
+def test_compiled_tick_publishes_the_bytes_of_plain_steps(file, effects, drive):
     text = file.read_bytes()
     if b'limits:' in text:  # else a motor that turns on would be refused
         text = re.sub(rb', limits: [^}]*', b'', text)
@@ -133,14 +133,14 @@ def test_both_publish_the_same_bytes(file, effects, drive):
     [file for file in GALLERY if file.stem != 'gripper'],  # forces are not known with ratios
     ids=lambda file: file.stem,
 )
-def test_both_publish_the_same_forces(file):
+def test_compiled_tick_publishes_equal_pin_forces(file):
     linkage, text = with_masses(file)
     for scene in with_forces(linkage):
         check(text, f'{DRIVES["carried"]}\n{scene}', looked=20)
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'five_bar'])
-def test_both_carry_an_estimated_acceleration(name):
+def test_compiled_tick_carries_an_estimated_acceleration(name):
     file = ROOT / 'config' / 'linkages' / f'{name}.yaml'
     drive = 'rate: 100\ndrive: {topic: {acceleration: differenced, cutoff: 20}}'
     check(file.read_bytes(), f'{drive}\neffects: {{velocity: {{}}, acceleration: {{}}}}')
@@ -167,7 +167,7 @@ def test_both_carry_the_same_measured_efforts(name, effects, loads):
 
 
 @pytest.mark.parametrize('effects', FORCES)
-def test_both_bear_the_same_loads_on_joints_and_points(effects):
+def test_compiled_tick_bears_equal_loads_on_joints_and_points(effects):
     linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
     friction = '{B: {coulomb: 0.1, breakaway: 0.2, stribeck: 1}}, holds: true'
     effects = f'{effects[:-1]}, friction: {{joints: {friction}}}}}'
@@ -191,7 +191,7 @@ CHANGING = {
 
 @pytest.mark.parametrize('loads', CHANGING)
 @pytest.mark.parametrize('effects', FORCES)
-def test_both_bear_the_same_loads_that_change(effects, loads):
+def test_compiled_tick_bears_equal_changing_loads(effects, loads):
     linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
     scene = f'{DRIVES["carried"]}\npublish_input: true\nloads: {{{CHANGING[loads]}}}\n'
     check(linkage, f'{scene}effects: {effects}')
@@ -202,7 +202,7 @@ def test_both_bear_the_same_loads_that_change(effects, loads):
 
 
 @pytest.mark.parametrize('drive', ['carried', 'torque'])
-def test_both_have_the_same_friction_by_the_forces_in_joints(drive):
+def test_compiled_tick_has_equal_friction_in_joints(drive):
     linkage = (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes()
     driven = {**DRIVES, 'torque': 'drive: {torque: {start: 1.0, rate: 30}}'}[drive]
     friction = (
@@ -213,7 +213,7 @@ def test_both_have_the_same_friction_by_the_forces_in_joints(drive):
     check(linkage, f'{driven}\npublish_input: true\n{loads}\neffects: {effects}', looked=20)
 
 
-def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():
+def test_spring_of_zero_length_uses_the_plain_steps():
     linkage, _ = with_masses(ROOT / 'config' / 'linkages' / 'four_bar.yaml')
     # Where the crank is along the ground, as it is at the first tick.
     ground = {**linkage.links[GROUND], 'S': linkage.links['crank']['A']}
@@ -225,7 +225,7 @@ def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():
 
 
 @pytest.mark.parametrize('effects', [*EFFECTS.values(), *FORCES])
-def test_the_usual_tick_is_straight(effects):
+def test_usual_ticks_are_compiled(effects):
     work = pipeline(
         (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes(),
         f'{DRIVES["turning"]}\neffects: {effects}',
@@ -237,7 +237,7 @@ def test_the_usual_tick_is_straight(effects):
 
 
 @pytest.mark.parametrize('effects', ['{}', '{effort: {}, clearance: {pins: {B: 1.0e-4}}}'])
-def test_a_reset_compiles_nothing(effects, monkeypatch):
+def test_pipeline_reset_compiles_nothing(effects, monkeypatch):
     files = {
         'scene.yaml': f'linkage: l\n{DRIVES["turning"]}\neffects: {effects}'.encode(),
         'linkage.yaml': (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes(),
@@ -251,7 +251,7 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
     assert Pipeline(scene, first.closures).tick(BEGIN).message == message
 
 
-def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch):
+def test_pose_is_computed_only_for_a_due_marker_message(monkeypatch):
     file = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
     solve, worked_out = LinkagePipeline.solve_mechanism, []
 

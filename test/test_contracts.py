@@ -136,7 +136,7 @@ READ = [
 
 
 @pytest.mark.parametrize(('effect', 'linkage', 'text', 'parameters'), READ)
-def test_an_effect_gets_what_the_scene_says_and_the_defaults(effect, linkage, text, parameters):
+def test_effect_parameters_equal_the_scene_and_the_defaults(effect, linkage, text, parameters):
     scene = scene_of(
         f'effects: {{effort: {{}}, {effect}: {text}}}',
         (LINKAGES / f'{linkage}.yaml').read_bytes(),
@@ -152,7 +152,7 @@ WITHOUT_KEYS = [
 
 
 @pytest.mark.parametrize('effect', WITHOUT_KEYS)
-def test_an_effect_of_defaults_needs_no_key(effect):
+def test_effect_with_defaults_needs_no_key(effect):
     scene = scene_of(f'effects: {{{effect}: {{}}}}', (LINKAGES / 'four_bar.yaml').read_bytes())
     assert effect in scene.linkages[0].effects
 
@@ -182,11 +182,11 @@ def test_each_fault_has_its_type_and_one_place():
 
 
 @pytest.mark.parametrize('effect', ['velocity', 'acceleration'])
-def test_rates_and_accelerations_have_no_parameters(effect):
+def test_velocity_and_acceleration_effects_have_no_parameters(effect):
     assert declared_fields(effect_class(effect)) == []
 
 
-def test_in_the_order_of_the_effects_each_stands_behind_what_it_needs():
+def test_effects_are_ordered_after_those_they_need():
     order = list(EFFECTS)
     assert order[:2] == ['tolerance', 'backlash'], 'before the crank moves anything'
     assert order.index('clearance') > order.index('compliance')

@@ -38,7 +38,7 @@ def errors_of_the_package() -> list[type[BaseException]]:
     return list(found)
 
 
-def test_every_error_comes_back_from_another_process():
+def test_every_error_survives_pickling():
     kinds = errors_of_the_package()
     assert {LinkageError, FileError, PartError} <= set(kinds)
     for kind in kinds:
@@ -48,7 +48,7 @@ def test_every_error_comes_back_from_another_process():
         assert (str(copy), copy.args, vars(copy)) == (str(error), error.args, vars(error))
 
 
-def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
+def test_list_of_names_is_shortened_with_a_count():
     assert list_names(['a', 'b\n', 'c']) == 'a, b\\n, c'
     assert list_names([]) == ''
     names = [f'joint_{index:03}' for index in range(1000)]
@@ -60,7 +60,7 @@ def test_a_list_of_names_is_short_and_says_how_many_more_there_are():
     assert len(list_names(['x' * 100_000] * 3)) < 1000
 
 
-def test_an_error_that_lists_the_names_of_a_file_can_be_read():
+def test_error_listing_names_of_a_file_is_short():
     names = [f'{index:04}_{"x" * 60}' for index in range(300)]
     links = '\n'.join(f'  {name}: {{A: [0, 0], P{name}: [1, 0]}}' for name in names)
     text = f"""

@@ -49,7 +49,7 @@ def crank(now, **angles):
     return JointStateWriter(names).write(now, list(angles.values()), [1.0] * len(names))
 
 
-def test_each_is_as_it_would_be_alone(load):
+def test_each_of_two_linkages_equals_its_own_scene(load):
     both = Pipeline(load(TWO))
     left, right = (
         pipeline_of('effects: {velocity: {}}', FOUR_BAR),
@@ -69,7 +69,7 @@ def test_each_is_as_it_would_be_alone(load):
 
 
 @pytest.mark.parametrize('effects', ['{velocity: {}}', '{}'])
-def test_one_function_of_all_makes_the_same_bytes(load, effects, monkeypatch):
+def test_one_compiled_function_of_all_gives_equal_bytes(load, effects, monkeypatch):
     turning = 'drive: {constant_rate: {rate: 40.0}}'
     scene = load(f"""
 linkages:
@@ -90,7 +90,7 @@ linkages:
     assert 0 < usual < 400
 
 
-def test_a_message_is_parsed_only_if_its_joint_names_are_new(monkeypatch):
+def test_message_is_parsed_only_for_new_joint_names(monkeypatch):
     parsed = []
     head_of = sample_router.head_of
     monkeypatch.setattr(
@@ -106,7 +106,7 @@ def test_a_message_is_parsed_only_if_its_joint_names_are_new(monkeypatch):
     assert len(parsed) == len(wanted)
 
 
-def test_who_has_no_crank_is_left_out(load):
+def test_linkage_without_a_crank_is_left_out(load):
     both = Pipeline(load(TWO))
     assert both.tick(BEGIN).message == b''
     # Each crank may come in a message of its own.
@@ -120,7 +120,7 @@ def test_who_has_no_crank_is_left_out(load):
     assert read(both.tick(now).message).name == LEFT
 
 
-def test_who_does_not_close_is_left_out(load):
+def test_open_linkage_is_left_out(load):
     both = Pipeline(load(TWO))
     both.offer(crank(BEGIN, left_crank_joint=0.1, right_crank_joint=3.0), BEGIN)
     tick = both.tick(BEGIN)
@@ -128,7 +128,7 @@ def test_who_does_not_close_is_left_out(load):
     assert [look.reading is None for look in tick.states] == [False, True]
 
 
-def test_a_message_for_nobody_is_refused(load):
+def test_message_without_any_input_is_rejected(load):
     both = Pipeline(load(TWO))
     for _ in range(2):  # the second time from memory
         message = crank(BEGIN, middle_crank_joint=0.1)
@@ -136,7 +136,7 @@ def test_a_message_for_nobody_is_refused(load):
     assert both.offer(b'rubbish', BEGIN) is Rejection.MALFORMED
 
 
-def test_ever_new_names_do_not_fill_the_memory(load):
+def test_router_caches_at_most_1000_joint_layouts(load):
     both = Pipeline(load(TWO))
     for index in range(3000):
         both.offer(crank(BEGIN, **{f'joint_{index}': 0.1}), BEGIN)
@@ -144,7 +144,7 @@ def test_ever_new_names_do_not_fill_the_memory(load):
     assert both.offer(crank(BEGIN, left_crank_joint=0.1), BEGIN) is None
 
 
-def test_each_may_have_its_own_drive_and_effects(load):
+def test_each_linkage_may_have_its_drive_and_effects(load):
     text = """
 linkages:
   - name: left
@@ -168,7 +168,7 @@ drive: {constant_rate: {rate: 2.0}}
     assert tick.states[1].crank.angles == (pytest.approx(0.2, rel=1e-15),)
 
 
-def test_random_effects_differ_from_linkage_to_linkage(load):
+def test_noise_differs_from_linkage_to_linkage(load):
     text = """
 linkages:
   - {name: left, linkage: four_bar.yaml}
@@ -193,7 +193,7 @@ LR = ('left', 'right')
         ('freeze: {}', [True, True]),
     ],
 )
-def test_a_fault_concerns_whom_it_names(load, fault, held):
+def test_fault_affects_only_the_named_joint(load, fault, held):
     both = Pipeline(
         load(f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\nfaults: {{f: {{{fault}}}}}')
     )
@@ -205,21 +205,21 @@ def test_a_fault_concerns_whom_it_names(load, fault, held):
         assert (before.position[place] == after.position[place]) == is_held
 
 
-def test_a_broken_link_is_one_of_one_linkage(load):
+def test_broken_link_affects_one_linkage_only(load):
     text = f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\n'
     both = Pipeline(load(f'{text}faults: {{f: {{broken_link: {{link: right_coupler}}}}}}'))
     both.injection.switch_fault('f', True)
     assert read(both.tick(BEGIN).message).name == ['left_crank_joint', *LEFT]
 
 
-def test_a_bag_holds_enough_to_build_it_again(load):
+def test_scene_files_of_a_bag_rebuild_the_scene(load):
     scene = load(TWO)
     assert list(scene.files) == ['scene.yaml', 'linkage_1.yaml', 'linkage_2.yaml']
     again = parse_scene(scene.name, 'a bag', scene.files)
     assert again == scene
 
 
-def test_a_hundred_of_them(load):
+def test_scene_of_100_linkages_publishes_200_joints(load):
     entries = '\n'.join(f'  - {{name: bar_{i}, linkage: four_bar.yaml}}' for i in range(100))
     scene = Pipeline(load(f'linkages:\n{entries}'))
     cranks = {f'bar_{i}_crank_joint': 0.01 * i for i in range(100)}
@@ -256,7 +256,7 @@ def test_a_hundred_of_them(load):
         ),
     ],
 )
-def test_what_is_wrong_is_said_in_a_line(load, text, expected):
+def test_wrong_list_of_linkages_is_refused_in_one_line(load, text, expected):
     with pytest.raises(FileError) as caught:
         load(text)
     assert expected in str(caught.value)
@@ -276,7 +276,7 @@ MEASURED = 'delay: {seconds: 0.004, stamp: measured}'
         ('delay: {seconds: 0.004}', '', True),
     ],
 )
-def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, right, fits):
+def test_measured_stamp_must_be_set_for_all_linkages(load, left, right, fits):
     scene = load(
         'linkages:\n'
         f'  - {{name: left, linkage: four_bar.yaml, effects: {{{left}}}}}\n'
@@ -291,7 +291,7 @@ def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, ri
         Pipeline(scene)
 
 
-def test_the_stamp_of_all_is_that_of_the_newest_measurement(load):
+def test_common_stamp_is_that_of_the_newest_measurement(load):
     """Each crank turns at 1 rad/s from 0 on: its angle is the time at which it was measured."""
     turning = 'drive: {constant_rate: {rate: 1.0}}, publish_input: true'
     pipeline = Pipeline(
@@ -329,7 +329,7 @@ effects: {velocity: {}, pin_forces: {}, markers: {}}
 
 
 @pytest.mark.parametrize('where', ['entry', 'scene'])
-def test_without_a_prefix_names_are_those_of_the_files(load, tmp_path, where):
+def test_names_without_a_prefix_equal_those_of_the_files(load, tmp_path, where):
     # As a URDF has them; the crank is one motor for both.
     for side in ('left', 'right'):
         masses = ((0.2, 0.02, 1e-4), (0.3, 0.06, 1e-3), (0.2, 0.04, 1e-3))
@@ -359,7 +359,7 @@ PREFIXES = {
 
 
 @pytest.mark.parametrize('kind', PREFIXES)
-def test_a_prefix_is_as_it_is_written(load, kind):
+def test_prefix_precedes_the_joint_names_as_written(load, kind):
     text, joint = PREFIXES[kind]
     scene = load(f'linkage: four_bar.yaml\n{text}\n')
     assert scene.joint_names[0] == joint
@@ -377,7 +377,7 @@ def test_a_prefix_is_as_it_is_written(load, kind):
         (TWO + "prefix: 'a b'\n", "prefix: 'a b' cannot begin a joint name; use letters"),
     ],
 )
-def test_a_prefix_that_does_not_tell_joints_apart_is_refused(load, text, said):
+def test_prefix_with_colliding_joint_names_is_refused(load, text, said):
     with pytest.raises(FileError) as caught:
         load(text)
     assert said in str(caught.value)

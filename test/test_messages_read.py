@@ -81,7 +81,7 @@ def agrees(found, message, inputs=(CRANK,)):
 
 
 @given(st.lists(joint_states(), min_size=1, max_size=4))
-def test_reads_what_rosbags_has_written(messages):
+def test_reader_reads_joint_states_written_by_rosbags(messages):
     # One reader for all: what it remembers of the layout of one must not colour the next.
     reader = JointStateReader([CRANK])
     for message in (*messages, *messages):
@@ -91,7 +91,7 @@ def test_reads_what_rosbags_has_written(messages):
 
 
 @given(st.lists(joint_states(required='efforts'), min_size=1, max_size=4))
-def test_the_effort_of_the_joint_is_read(messages):
+def test_reader_reads_the_effort_of_its_joint(messages):
     reader = JointEffortReader(CRANK)  # one for all: layouts change from message to message
     for message in messages:
         stamp, effort = reader.read(serialized(**message))
@@ -100,7 +100,7 @@ def test_the_effort_of_the_joint_is_read(messages):
 
 
 @given(st.data(), st.lists(names_, min_size=2, max_size=5, unique=True))
-def test_reads_several_joints_in_their_own_order_whatever_the_messages(data, inputs):
+def test_reader_orders_several_joints_by_its_inputs(data, inputs):
     reader = JointStateReader(inputs)
     for _ in range(3):
         message = data.draw(joint_states(inputs))
@@ -109,7 +109,7 @@ def test_reads_several_joints_in_their_own_order_whatever_the_messages(data, inp
 
 
 @given(st.data(), st.lists(names_, min_size=2, max_size=5, unique=True))
-def test_of_several_joints_each_has_to_be_there_once(data, inputs):
+def test_reader_needs_each_joint_exactly_once(data, inputs):
     message = data.draw(joint_states(inputs))
     changed = data.draw(st.sampled_from(inputs))
     place = message['names'].index(changed)
@@ -124,7 +124,7 @@ def test_of_several_joints_each_has_to_be_there_once(data, inputs):
 
 
 @given(joint_states())
-def test_reads_what_rclpy_has_written(message):
+def test_reader_reads_joint_states_written_by_rclpy(message):
     rclpy_serialization = pytest.importorskip('rclpy.serialization')
     joint_state = pytest.importorskip('sensor_msgs.msg').JointState()
     joint_state.header.stamp.sec, joint_state.header.stamp.nanosec = message['stamp']
@@ -162,7 +162,7 @@ every_reader = pytest.mark.parametrize('name', READERS)
 
 @every_reader
 @pytest.mark.parametrize('warm', [False, True])
-def test_a_message_cut_short_is_malformed(name, warm):
+def test_truncated_message_is_malformed(name, warm):
     build, good, read = READERS[name]
     for length in range(len(good)):
         reader = build()
@@ -173,7 +173,7 @@ def test_a_message_cut_short_is_malformed(name, warm):
 
 
 @given(joint_states(), st.lists(st.tuples(st.integers(0), st.integers(0, 255)), max_size=8))
-def test_whatever_the_bytes_there_is_an_answer(message, changes):
+def test_damaged_message_gives_a_sample_or_a_rejection(message, changes):
     data = serialized(**message)
     damaged = bytearray(data)
     for place, value in changes:
@@ -191,7 +191,7 @@ def test_whatever_the_bytes_there_is_an_answer(message, changes):
 
 @every_reader
 @given(st.lists(st.tuples(st.integers(0, 2**16), st.integers(0, 255)), max_size=8), st.booleans())
-def test_any_damage_is_answered(name, damage, after_a_good_one):
+def test_reader_survives_any_damaged_message(name, damage, after_a_good_one):
     build, good, read = READERS[name]
     reader = build()
     if after_a_good_one:
@@ -207,7 +207,7 @@ def test_any_damage_is_answered(name, damage, after_a_good_one):
 @given(st.binary(max_size=200))
 @example(b'\0\1\0\0' + b'\xff' * 100)
 @example(b'\0\1\0\0' + bytes(12) + b'\xff\xff\xff\x7f' * 20)
-def test_bytes_that_never_were_a_message(name, data):
+def test_reader_survives_random_bytes(name, data):
     build, _, read = READERS[name]
     assert isinstance(build().read(data), type(read) | Rejection)
 
@@ -251,7 +251,7 @@ REFUSED = {
     [(name, *refused) for name, rows in REFUSED.items() for refused in rows],
 )
 @pytest.mark.parametrize('little', [False, True])
-def test_says_why_a_message_is_refused(name, message, reason, little):
+def test_reader_names_the_reason_of_a_rejection(name, message, reason, little):
     build, good, read = READERS[name]
     reader = build()
     assert reader.read(serialized(**message, little=little)) is reason
@@ -281,14 +281,14 @@ DEPENDENT = ('coupler_joint', 'rocker_joint')
     ],
 )
 @pytest.mark.parametrize('little', [True, False])
-def test_joints_that_follow_from_others_need_no_effort(names, efforts, expected, little):
+def test_dependent_joints_need_no_effort(names, efforts, expected, little):
     reader = JointEffortReader(CRANK, DEPENDENT)
     for _ in range(2):  # also with a layout known
         read = reader.read(serialized(names, efforts=efforts, little=little))
         assert read == (EffortCommand(NS + 2, 4.0) if expected == 4.0 else expected)
 
 
-def test_a_command_with_a_stamp_of_zero_is_as_good_as_any():
+def test_command_with_stamp_zero_is_accepted():
     data = serialized([CRANK], efforts=[4.0], stamp=(0, 0))
     assert JointEffortReader(CRANK).read(data) == EffortCommand(0, 4.0)
 
@@ -306,7 +306,7 @@ def test_other_encodings_are_refused(name, encapsulation):
 @pytest.mark.parametrize(
     'wrong', [{'velocities': [1.0]}, {'efforts': [1.0]}, {'positions': [1.0]}]
 )
-def test_a_layout_seen_before_is_not_taken_for_granted(wrong):
+def test_known_layout_is_checked_in_each_message(wrong):
     right = {'names': [CRANK, 'x'], 'positions': [1.0, 2.0]}
     reader = JointStateReader([CRANK])
     assert reader.read(serialized(**right))[:3] == (NS + 2, (1.0,), None)
@@ -315,7 +315,7 @@ def test_a_layout_seen_before_is_not_taken_for_granted(wrong):
 
 
 @given(st.lists(st.lists(names_, min_size=1, max_size=3), min_size=1, max_size=4), st.data())
-def test_own_messages_are_told_whatever_linkages_are_in_them(linkages, data):
+def test_own_joint_states_are_recognised(linkages, data):
     joints = [joint for linkage in linkages for joint in linkage]
     assume(len(set(joints)) == len(joints) and CRANK not in joints)
     own = OwnJointStates(linkages)
@@ -326,7 +326,7 @@ def test_own_messages_are_told_whatever_linkages_are_in_them(linkages, data):
 
 
 @given(st.lists(st.lists(names_, min_size=2, max_size=3), min_size=2, max_size=3), st.data())
-def test_a_message_of_other_joints_is_none_of_ones_own(linkages, data):
+def test_messages_of_other_joints_are_not_own(linkages, data):
     joints = [joint for linkage in linkages for joint in linkage]
     assume(len(set(joints)) == len(joints) and CRANK not in joints)
     own = OwnJointStates(linkages)

@@ -198,12 +198,12 @@ def check_bytes(kind, case):
 
 @every_message
 @given(data=st.data())
-def test_writes_as_rosbags_does_to_the_last_byte(kind, data):
+def test_writers_give_the_bytes_of_rosbags(kind, data):
     check_bytes(kind, data.draw(MESSAGES[kind].cases))
 
 
 @every_message
-def test_writes_the_worst_as_rosbags_does_to_the_last_byte(kind):
+def test_extreme_messages_have_the_bytes_of_rosbags(kind):
     for case in MESSAGES[kind].worst:
         check_bytes(kind, case)
 
@@ -239,17 +239,17 @@ def check_rclpy(kind, case):
 
 @every_message
 @given(data=st.data())
-def test_rclpy_reads_every_field_and_writes_the_same_bytes_but_for_padding(kind, data):
+def test_rclpy_reads_and_rewrites_written_messages(kind, data):
     check_rclpy(kind, data.draw(MESSAGES[kind].cases))
 
 
 @every_message
-def test_rclpy_reads_and_writes_the_worst(kind):
+def test_rclpy_reads_and_rewrites_extreme_messages(kind):
     for case in MESSAGES[kind].worst:
         check_rclpy(kind, case)
 
 
-def test_one_writer_writes_each_message_for_itself():
+def test_writer_keeps_no_values_of_earlier_messages():
     # What a toggle leaves out is not what the message before it had.
     full, toggle = ([1.0, 2.0], [3.0, 4.0], [5.0, 6.0]), ([1.0, 2.0], [], [])
     writer = JointTrajectoryWriter(['a', 'b'])
@@ -265,7 +265,7 @@ def test_one_writer_writes_each_message_for_itself():
     st.lists(places, min_size=2, max_size=2),
     st.booleans(),
 )
-def test_what_moves_is_written_into_its_places_and_nothing_else(at, angle, drawn, shown):
+def test_marker_writer_changes_only_the_moved_fields(at, angle, drawn, shown):
     other = FULL._replace(number=8)
     writer = MarkerArrayWriter('ground', [other, FULL, other])
     writer.place_marker(1, at, angle)
@@ -344,12 +344,12 @@ def check(declaration, kind):
 
 
 @pytest.mark.parametrize('kind', DECLARATIONS)
-def test_fields_stand_as_ros_defines_them(kind):
+def test_declared_fields_equal_those_of_ros(kind):
     check(DECLARATIONS[kind], kind)
 
 
 @pytest.mark.parametrize('kind', DECLARATIONS)
-def test_an_empty_message_is_that_of_ros_and_malformed_if_cut(kind):
+def test_empty_message_equals_ros_and_truncated_is_malformed(kind):
     message = pack_message(DECLARATIONS[kind], {})
     assert STORE.serialize_cdr(STORE.deserialize_cdr(message, kind), kind) == message
     assert parse_message(message + b'more', DECLARATIONS[kind]) == parse_message(

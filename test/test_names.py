@@ -175,7 +175,7 @@ CODINGS = [
 
 @pytest.mark.parametrize('coding', CODINGS)
 @pytest.mark.parametrize('form', ['coding={} ', '-*- coding: {} -*-', 'vim: fileencoding={} :'])
-def test_the_name_of_a_file_is_no_encoding_of_a_python_module(
+def test_file_name_is_no_encoding_of_a_python_module(
     form: str, coding: str, tmp_path: Path
 ) -> None:
     name = form.format(coding)
@@ -224,9 +224,7 @@ def check_shown(names: Sequence[str], file: Path) -> None:
 
 
 @pytest.mark.filterwarnings('error')
-def test_names_in_pictures_are_drawn_as_they_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pictures_draw_names_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(painting._SETTINGS, 'svg.fonttype', 'none')
     file = tmp_path / 'a.svg'
     for closure in linkages(12):
@@ -248,7 +246,7 @@ def test_names_in_pictures_are_drawn_as_they_are_written(
 
 
 @pytest.mark.parametrize('write', [urdf_model, mujoco_model])
-def test_names_in_robot_models_are_names(write) -> None:
+def test_robot_models_hold_names_without_new_tags(write) -> None:
     for closure in linkages(4):
         root = ET.fromstring(write(closure.name, [ModelPart(closure)]))
         found = {each.get('name') for each in root.iter()}
@@ -261,7 +259,7 @@ def test_names_in_robot_models_are_names(write) -> None:
         }  # fmt: skip
 
 
-def test_a_csv_holds_no_formula_and_the_names(tmp_path: Path) -> None:
+def test_csv_holds_names_but_no_formula(tmp_path: Path) -> None:
     file = tmp_path / 'a.csv'
     heads = [f'{name} [rad]' for name in HOSTILE]
     with table_file(file, heads, ()) as write:
@@ -278,7 +276,7 @@ def test_a_csv_holds_no_formula_and_the_names(tmp_path: Path) -> None:
         assert not any(cell[0] in '=+-@\uff1d' for cell in found)
 
 
-def test_a_dxf_holds_no_codes(tmp_path: Path) -> None:
+def test_dxf_holds_names_but_no_control_codes(tmp_path: Path) -> None:
     ezdxf = pytest.importorskip('ezdxf')
     file = tmp_path / 'a.dxf'
     for closure in linkages(3):
@@ -308,7 +306,7 @@ class _Page(HTMLParser):
             self._within = False
 
 
-def test_names_in_a_page_are_text() -> None:
+def test_view_page_holds_names_as_text() -> None:
     tags = None
     for closure in linkages(12):
         page = _Page()
@@ -319,7 +317,7 @@ def test_names_in_a_page_are_text() -> None:
         assert all(json.dumps(name) in json.dumps(told) for name in names)
 
 
-def test_a_linkage_file_holds_any_name() -> None:
+def test_linkage_file_holds_any_name() -> None:
     for closure in linkages(4):
         assert read(linkage_text(closure.linkage)).linkage == closure.linkage
 
@@ -330,7 +328,7 @@ FILES = ['a\nb', 'a\x1b[31mb', 'a\x7fb', 'a\u202eb', 'a\udcffb', '$x^$', '=1+1',
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', FILES)
-def test_the_name_of_a_file_is_data_too(name: str, tmp_path: Path) -> None:
+def test_commands_accept_any_file_name(name: str, tmp_path: Path) -> None:
     given = f'{name}.yaml'
     (tmp_path / given).write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
     for suffix in ('.c', '.h', '.py', '.js'):

@@ -172,13 +172,13 @@ def bare(tmp_path_factory):
     return Look(tmp_path_factory.mktemp('bare'), BARE)
 
 
-def test_everything_has_its_scene():
+def test_every_effect_drive_and_fault_has_its_scene():
     assert set(SCENES) == set(EFFECTS)
     assert set(FAULT_SCENES) == set(FAULTS)
     assert {*DRIVE_SCENES, 'bag'} == set(DRIVES)
 
 
-def test_an_empty_scene_has_nothing(bare):
+def test_empty_scene_imports_no_effect_fault_or_numpy(bare):
     for found in (bare.modules, bare.passed):
         assert not of_registry(EFFECT_MODULES, found)
         assert FAULTS_MODULE not in found
@@ -192,7 +192,7 @@ def test_an_empty_scene_has_nothing(bare):
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('effect', SCENES)
-def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
+def test_scene_with_one_effect_imports_no_other(tmp_path, bare, effect):
     expected = SCENES[effect]
     # Friction acts where forces are.
     beside = ', effort: {}' if effect == 'friction' else ''
@@ -212,7 +212,7 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
 
 
 @pytest.mark.parametrize('drive', DRIVE_SCENES)
-def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
+def test_scene_with_one_drive_imports_no_other(tmp_path, bare, drive):
     look = Look(tmp_path, f'drive: {{{DRIVE_SCENES[drive]}}}')
     drives = sharing({drive}, DRIVE_MODULES)
     assert of_registry(DRIVE_MODULES, look.modules) == drives
@@ -229,7 +229,7 @@ def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
 _DYNAMICS = 'linkage_ros.dynamics.'
 
 
-def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
+def test_motor_modules_are_imported_on_request_only(tmp_path):
     wound = 'motor: {torque_constant: 1, resistance: 1, inductance: 1, command: voltage}'
     for motor, parts in (
         ('', set()),
@@ -240,7 +240,7 @@ def test_a_motor_is_made_where_it_is_asked_for_alone(tmp_path):
         assert {part for part in ('motor', 'winding') if _DYNAMICS + part in look.modules} == parts
 
 
-def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
+def test_wrench_modules_are_imported_on_request_only(tmp_path):
     theirs = {f'linkage_ros.{name}' for name in ('dynamics.wrenches', 'tick.wrench_topics')}
     theirs.add('linkage_ros.messages.wrench')
     other = 'efforts: {rocker_joint: {constant: 1}}'
@@ -251,13 +251,13 @@ def test_wrenches_are_made_where_they_are_asked_for_alone(tmp_path):
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('fault', FAULT_SCENES)
-def test_a_scene_with_one_fault_imports_the_faults(tmp_path, fault):
+def test_scene_with_a_fault_imports_the_faults(tmp_path, fault):
     drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE
     look = Look(tmp_path, f'{drive}faults: {{mine: {{{FAULT_SCENES[fault]}}}}}')
     assert FAULTS_MODULE in look.modules
 
 
-def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
+def test_robot_model_modules_are_imported_on_request_only(tmp_path):
     """Neither building a scene nor the node's own modules bring it: configuring the node does."""
     for scene in ('', 'robot_description: true\n'):
         look = Look(tmp_path, BARE + scene)
@@ -268,7 +268,7 @@ def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
     assert 'tools' not in packages(loaded)
 
 
-def test_a_motor_without_play_imports_no_second_mass(tmp_path):
+def test_motor_without_play_imports_no_second_mass(tmp_path):
     for drive, is_there in (
         ('torque: {motor: {torque_constant: 0.02, resistance: 1}}', False),
         ('torque: {play: {width: 0.01, inertia: 1.0e-4}}', True),

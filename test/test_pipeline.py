@@ -54,7 +54,7 @@ def swinging(t):
     return 9.0 * t - 0.5 * t * t
 
 
-def test_the_same_input_gives_the_same_bytes():
+def test_equal_crank_messages_give_equal_bytes():
     first, second = (turn(pipeline(), swinging) for _ in range(2))
     assert len(set(first)) == len(first)
     assert first == second
@@ -67,7 +67,7 @@ def test_the_same_input_gives_the_same_bytes():
     [FOUR_BAR, DRAG_LINK, SLIDER_CRANK],
     ids=['crank-rocker', 'drag link', 'slider-crank'],
 )
-def test_over_several_turns_angles_run_on_or_stay_wrapped(wrap_input, direction, linkage):
+def test_joint_angles_are_continuous_or_wrapped_over_turns(wrap_input, direction, linkage):
     def angle_at(t):
         return direction * 11.0 * t
 
@@ -91,7 +91,7 @@ def test_over_several_turns_angles_run_on_or_stay_wrapped(wrap_input, direction,
     assert abs(last[0] - first[0]) > 5 * tau or abs(last[1] - first[1]) > 5 * tau
 
 
-def test_without_velocity_the_array_is_empty():
+def test_velocity_array_without_the_effect_is_empty():
     bare, full = pipeline(b''), pipeline()
     for message, with_rates in zip(turn(bare, swinging), turn(full, swinging), strict=True):
         assert len(read(message).velocity) == len(read(message).effort) == 0
@@ -110,7 +110,7 @@ def test_without_velocity_the_array_is_empty():
         ),
     ],
 )
-def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
+def test_unused_effects_are_not_imported(tmp_path, effects, imported):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\neffects: {effects}')
     program = (
@@ -133,7 +133,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
     assert not modules & {'rclpy', 'trajectory_msgs'}
 
 
-def test_before_the_first_sample_and_after_the_last_there_is_silence():
+def test_pipeline_publishes_nothing_before_or_after_the_samples():
     silent = pipeline()
     assert_silent(silent.tick(BEGIN))
     silent.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
@@ -154,7 +154,7 @@ def assert_silent(tick):
         (b'inverted_slider_crank: {a: 0.25, swivel: [0.25, 0]}', 0.0, Status.INDETERMINATE, 0.0),
     ],
 )
-def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap):
+def test_open_or_indeterminate_linkage_publishes_nothing(linkage, angle, status, gap):
     stuck = pipeline(linkage=linkage)
     stuck.offer(CRANK.write(BEGIN, [angle], [1.0]), BEGIN)
     tick = stuck.tick(BEGIN)
@@ -166,7 +166,7 @@ def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap
     assert (tick.message, tick.extras) == (b'', ())
 
 
-def test_at_a_toggle_positions_are_published_and_rates_are_not():
+def test_joint_state_at_a_toggle_has_no_rates():
     toggle = pipeline(linkage=b'four_bar: {a: 1, b: 1, c: 1, d: 3}')
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
     tick = toggle.tick(BEGIN)
@@ -179,7 +179,7 @@ def read_motion(message):
     return STORE.deserialize_cdr(message, 'trajectory_msgs/msg/JointTrajectory')
 
 
-def test_without_acceleration_there_is_no_trajectory():
+def test_scene_without_acceleration_publishes_no_trajectory():
     for scene in (b'', b'effects: {velocity: {}}'):
         plain = pipeline(scene)
         plain.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
@@ -192,7 +192,7 @@ def test_without_acceleration_there_is_no_trajectory():
     [b'{acceleration: {}}', b'{acceleration: {}, velocity: {}}'],
     ids=['alone', 'beside velocity'],
 )
-def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
+def test_trajectory_holds_the_joint_state_and_accelerations(effects):
     # To name acceleration is to name velocity; turns are added to both messages.
     both, velocity = pipeline(b'effects: ' + effects), pipeline(b'effects: {velocity: {}}')
     assert [extra.topic for extra in both.extras] == ['~/motion']
@@ -213,7 +213,7 @@ def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
         assert len(point.accelerations) == 2
 
 
-def test_at_a_toggle_a_trajectory_has_positions_only():
+def test_trajectory_at_a_toggle_has_positions_only():
     scene, linkage = b'effects: {acceleration: {}}', b'four_bar: {a: 1, b: 1, c: 1, d: 3}'
     toggle = pipeline(scene, linkage)
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
@@ -227,7 +227,7 @@ def test_at_a_toggle_a_trajectory_has_positions_only():
 TWO_CRANKS = FIVE_BAR.encode()
 
 
-def test_two_inputs_come_out_of_one_message_in_any_order():
+def test_one_message_drives_two_inputs_in_any_order():
     def closes(positions, left, right):
         upper, lower = positions
         return 0.04 * exp(1j * left) + 0.12 * exp(1j * upper) == pytest.approx(
@@ -261,7 +261,7 @@ def test_two_inputs_come_out_of_one_message_in_any_order():
         assert list(motion.acceleration.joints) == pytest.approx(list(slopes), rel=1e-5)
 
 
-def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
+def test_rejected_message_does_not_change_later_ticks():
     bad = [
         (b'', Rejection.MALFORMED),
         (CRANK.write(BEGIN, [float('nan')], [0.0]), Rejection.NOT_FINITE),
@@ -284,7 +284,7 @@ GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
-def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file):
+def test_gallery_joint_rates_equal_differences_of_angles(file):
     scene = pipeline(b'effects: {velocity: {}, acceleration: {}}', file.read_bytes())
     (closure,) = scene.closures
     inputs = closure.linkage.inputs
@@ -317,7 +317,7 @@ def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file)
         assert point.accelerations == pytest.approx(slope, rel=1e-4, abs=1e-4)
 
 
-def test_a_delay_delays_the_silence_of_slow_and_lossy_sensors_too():
+def test_delay_delays_the_silence_of_slow_sensors():
     # Samples at 0, 10 and 20 ms; each arrives with the first tick that is 2.5 ms later.
     slow = pipeline(
         b'drive: {constant_rate: {rate: 1.0}}\n'
@@ -328,7 +328,7 @@ def test_a_delay_delays_the_silence_of_slow_and_lossy_sensors_too():
     assert heard == [3, 13, 23]
 
 
-def test_what_the_linkage_lacks_is_told_of_the_linkage_file():
+def test_missing_mass_is_reported_with_the_linkage_file():
     with pytest.raises(FileError) as caught:
         pipeline(b'drive: {constant_rate: {rate: 1.0}}\neffects: {effort: {}}')
     assert str(caught.value).startswith("here: linkage.yaml: masses: link 'crank' has no mass")

@@ -37,11 +37,11 @@ def held(domain):
         return locked
 
 
-def test_a_process_keeps_its_domain():
+def test_process_keeps_its_ros_domain():
     assert private_domain() == private_domain()
 
 
-def test_no_two_processes_have_the_same_domain_and_one_that_is_killed_gives_it_back():
+def test_killed_process_releases_its_ros_domain():
     with ExitStack() as stack:
         taken = {stack.enter_context(held_domain()) for _ in range(20)}
         assert len(taken) == 20
@@ -56,7 +56,7 @@ def test_no_two_processes_have_the_same_domain_and_one_that_is_killed_gives_it_b
         assert held(domain)
 
 
-def test_a_link_of_the_name_of_a_lock_is_not_followed(tmp_path, monkeypatch):
+def test_symbolic_link_named_as_a_lock_is_not_followed(tmp_path, monkeypatch):
     """Any user may make one in the folder of temporary files."""
     monkeypatch.setattr(processes, 'gettempdir', lambda: str(tmp_path))
     precious = tmp_path / 'precious'
@@ -68,7 +68,7 @@ def test_a_link_of_the_name_of_a_lock_is_not_followed(tmp_path, monkeypatch):
     assert precious.read_text() == (tmp_path / 'linkage_ros_domain_8').read_text() == 'content'
 
 
-def test_where_all_are_held_the_error_is_one_line(monkeypatch):
+def test_exhausted_ros_domains_are_reported_in_one_line(monkeypatch):
     # Domains that no graph uses: the real ones are needed by tests beside this one.
     monkeypatch.setattr(processes, '_DOMAINS', range(1001, 1003))
     with (

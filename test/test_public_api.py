@@ -33,7 +33,7 @@ SCENE = shipped_path('scenes/demo.yaml')
 VELOCITY = FOUR_BAR.velocity(POSITION, 3.0)
 
 
-def test_the_tour_of_the_docstring_runs_as_it_is_written():
+def test_docstring_examples_of_the_package_run():
     failed, tried = doctest.testmod(lr)
     assert failed == 0
     assert tried > 15
@@ -48,7 +48,7 @@ def test_the_tour_of_the_docstring_runs_as_it_is_written():
     ],
     ids=['import', 'position', 'picture'],
 )
-def test_nothing_is_imported_that_is_not_used(program, absent):
+def test_import_loads_no_unused_modules(program, absent):
     absent = (*absent, 'numpy', 'rclpy')
     program += f'; import sys; assert not {{*{absent!r}}} & {{*sys.modules}}'
     subprocess.run([sys.executable, '-c', program], check=True)
@@ -69,7 +69,7 @@ NAMES = {
 }
 
 
-def test_type_checkers_see_the_names_that_are_there():
+def test_type_stub_names_equal_the_public_names():
     stub = ast.parse((PACKAGE / '__init__.pyi').read_text('utf-8'))
     homes = {
         name.asname: (node.module, name.name)
@@ -83,14 +83,14 @@ def test_type_checkers_see_the_names_that_are_there():
     assert (PACKAGE / 'py.typed').exists()
 
 
-def test_dir_and_help_show_every_name():
+def test_dir_and_help_list_every_public_name():
     assert {*NAMES, '__version__'} <= {*dir(lr)}
     text = pydoc.plain(pydoc.render_doc(lr))
     assert [name for name in sorted(NAMES) if not re.search(rf'\b{name}\b', text)] == []
     assert 'Close the loops.' in text
 
 
-def test_a_position_is_a_mapping_of_joint_names_to_values():
+def test_position_maps_joint_names_to_values():
     acceleration = FOUR_BAR.acceleration(POSITION, VELOCITY, 0.5)
     for found in (POSITION, VELOCITY, acceleration):
         assert dict(found) == dict(zip(FOUR_BAR.linkage.joints, found.joints, strict=True))
@@ -100,7 +100,7 @@ def test_a_position_is_a_mapping_of_joint_names_to_values():
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'elliptic_trammel', 'five_bar', 'class_3'])
-def test_a_position_knows_its_inputs_and_points(name):
+def test_position_knows_its_inputs_and_points(name):
     closure = lr.load(name)
     inputs = tuple(0.5 * (r.lowest + r.highest) for r in closure.input_ranges[:1]) or (2.0, 1.0)
     position = closure.position(*inputs)
@@ -109,7 +109,7 @@ def test_a_position_knows_its_inputs_and_points(name):
         assert position.points[point] == pytest.approx(place, abs=1e-12)
 
 
-def test_positions_are_equal_whoever_has_found_them():
+def test_positions_of_two_equal_closures_are_equal():
     again = lr.load('four_bar')
     assert again.position(0.7) == POSITION != again.position(0.8)
     assert again.velocity(again.position(0.7), 3.0) == VELOCITY
@@ -127,12 +127,12 @@ def test_positions_are_equal_whoever_has_found_them():
         (VELOCITY, '<Velocity: coupler_joint -3.49184, rocker_joint 0.843928>'),
     ],
 )
-def test_what_a_prompt_shows_is_short(shown, text):
+def test_repr_of_public_objects_is_short(shown, text):
     assert repr(shown) == text
 
 
 @pytest.mark.parametrize('name', [*lr.linkage_names(), 'wishbone', 'rssr'])
-def test_every_linkage_is_a_picture_in_a_notebook(name):
+def test_notebook_shows_a_picture_of_every_linkage(name):
     closure = lr.load(name)
     root = ET.fromstring(closure._repr_svg_())
     box = [float(number) for number in root.attrib['viewBox'].split()]
@@ -148,7 +148,7 @@ def test_every_linkage_is_a_picture_in_a_notebook(name):
     assert all(0.0 <= x <= box[2] and 0.0 <= y <= box[3] for x, y in pixels)
 
 
-def test_a_picture_puts_the_pins_where_they_are():
+def test_picture_places_the_pins_to_scale():
     root = ET.fromstring(POSITION._repr_svg_())
     circles = [shape for shape in root if shape.tag.endswith('circle')]
     pins = [complex(float(pin.attrib['cx']), -float(pin.attrib['cy'])) for pin in circles]
@@ -158,7 +158,7 @@ def test_a_picture_puts_the_pins_where_they_are():
         assert pin - pins[0] == pytest.approx(scale * (point - points[0]), abs=0.2)
 
 
-def test_what_has_no_pose_has_no_picture():
+def test_open_position_has_no_picture():
     assert OPEN._repr_svg_() is None
     with pytest.raises(lr.LinkageError, match='open, the links miss each other'):
         lr.svg(OPEN)
@@ -205,14 +205,14 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
 
 
 @pytest.mark.parametrize(('call', 'kind', 'text'), ERRORS)
-def test_what_is_wrong_is_told_with_a_remedy(call, kind, text):
+def test_public_errors_name_a_remedy(call, kind, text):
     with pytest.raises(kind) as caught:
         call()
     assert text in str(caught.value).replace('\\', '')
     assert '\n' not in str(caught.value)
 
 
-def test_a_name_is_that_of_a_shipped_linkage_and_a_path_that_of_a_file(tmp_path, monkeypatch):
+def test_load_reads_a_shipped_name_or_a_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path('hoeken').write_text(json.dumps({'four_bar': {'a': 1, 'b': 3, 'c': 2, 'd': 2.5}}))
     shipped = lr.load('hoeken').linkage
@@ -222,7 +222,7 @@ def test_a_name_is_that_of_a_shipped_linkage_and_a_path_that_of_a_file(tmp_path,
     assert lr.load('hoeken').linkage == shipped
 
 
-def test_more_than_three_points_of_a_function_are_met_as_near_as_can_be():
+def test_function_of_seven_points_is_fitted():
     pytest.importorskip('scipy')
     design = lr.generate_function('log10(x)', *RANGES, points=7)
     assert len(design.wanted) == 7

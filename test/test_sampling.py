@@ -16,7 +16,7 @@ from .support.sampling import choose_covering
 
 
 @pytest.mark.parametrize('sizes', [(21,), (7, 3), (4, 5, 6), (20, 5, 3)])
-def test_every_value_is_taken_as_soon_as_it_can_and_none_twice(sizes):
+def test_covering_sample_takes_every_value_and_no_case_twice(sizes):
     cases = [dict(enumerate(values)) for values in product(*map(range, sizes))]
     assert len(choose_covering(cases, len(cases) + 1)) == len(cases)
     chosen = [cases[index] for index in choose_covering(cases, max(sizes))]
@@ -26,10 +26,10 @@ def test_every_value_is_taken_as_soon_as_it_can_and_none_twice(sizes):
     assert len(pairs) == len(chosen)
 
 
-def test_a_few_of_one_kind_lie_spread():
+def test_small_covering_sample_is_spread():
     chosen = sorted(choose_covering([{'name': index} for index in range(100)], 5))
     assert max(b - a for a, b in zip([0, *chosen], [*chosen, 99], strict=True)) < 40
 
 
-def test_none_are_taken_where_none_are_wanted():
+def test_covering_sample_of_size_0_is_empty():
     assert choose_covering([{}], 0) == set()

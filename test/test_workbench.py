@@ -15,13 +15,13 @@ from linkage_ros.workbench import find_tool, TOOLS
 import pytest
 
 
-def test_a_tool_is_a_command_or_what_the_core_asks_for():
+def test_tools_are_commands_or_names_for_the_core():
     assert set(TOOLS) - set(COMMANDS) == {'arrays', 'robot_description', 'spread'}
     assert find_tool('robot_description').scene_urdf
 
 
 @pytest.mark.parametrize('module', ['linkage_ros.nowhere', 'linkage_ros.nowhere.tool'])
-def test_a_tool_that_is_not_installed_is_told(module, monkeypatch):
+def test_missing_tool_is_reported_in_one_line(module, monkeypatch):
     monkeypatch.setitem(TOOLS, 'plot', module)
     with pytest.raises(LinkageError) as caught:
         find_tool('plot')
@@ -30,7 +30,7 @@ def test_a_tool_that_is_not_installed_is_told(module, monkeypatch):
     )
 
 
-def test_a_package_that_a_tool_lacks_is_not_the_tool(monkeypatch):
+def test_missing_dependency_of_a_tool_is_not_hidden(monkeypatch):
     def lacking(_name):
         raise ModuleNotFoundError("No module named 'scipy'", name='scipy')
 

@@ -38,7 +38,7 @@ def folder(tmp_path, topics, messages):
     return tmp_path / 'run'
 
 
-def test_each_topic_has_its_own_count_bytes_and_times(folder, topics, messages):
+def test_contents_count_messages_bytes_and_times_per_topic(folder, topics, messages):
     found = contents_of(read_bag(folder))
     for index, topic in enumerate(topics):
         own = [message for message in messages if message.topic == index]
@@ -55,7 +55,7 @@ def test_each_topic_has_its_own_count_bytes_and_times(folder, topics, messages):
 
 
 @pytest.mark.parametrize(('count', 'span'), [(0, 0), (1, 0), (2, 0)])
-def test_without_a_span_there_is_no_rate(tmp_path, topics, count, span):
+def test_topic_without_a_time_span_has_no_rate(tmp_path, topics, count, span):
     writer = BagWriter(tmp_path / 'run', topics)
     for _ in range(count):
         writer.write(0, 5 + span, 5, b'\0\1\0\0')
@@ -65,7 +65,7 @@ def test_without_a_span_there_is_no_rate(tmp_path, topics, count, span):
     assert (second.first, second.last) == (0, 0)
 
 
-def test_log_times_stand_in_any_order(tmp_path, topics):
+def test_bag_times_are_the_least_and_greatest_log_times(tmp_path, topics):
     writer = BagWriter(tmp_path / 'run', topics)
     for log_time in (7_000, 5_000, 9_000, 8_000):
         writer.write(1, log_time, 5, b'\0\1\0\0')
@@ -75,7 +75,7 @@ def test_log_times_stand_in_any_order(tmp_path, topics):
     assert found.topics[1].mean_rate == 3 / 4e-6
 
 
-def test_what_lies_before_a_damage_is_counted(folder, messages):
+def test_contents_count_messages_before_the_damage(folder, messages):
     file = folder / 'run_0.mcap'
     content = bytearray(file.read_bytes())
     content[content.index(messages[6000].data) + 30] ^= 1
@@ -86,7 +86,7 @@ def test_what_lies_before_a_damage_is_counted(folder, messages):
     assert 5000 < sum(topic.messages for topic in found.topics) <= 6000
 
 
-def test_progress_is_told_and_a_wish_to_stop_is_heard(folder, messages):
+def test_contents_report_progress_and_can_be_stopped(folder, messages):
     told: list[int] = []
     found = contents_of(read_bag(folder), told.append, lambda: len(told) == 2)
     assert found.stopped
@@ -122,7 +122,7 @@ def write(file: Path, compression: CompressionType, *, chunked: bool = True) -> 
         (CompressionType.ZSTD, 'zstd'),
     ],
 )
-def test_compression_is_as_mcaps_own_index_has_it(tmp_path, compression, name):
+def test_compression_sizes_equal_the_index_of_mcap(tmp_path, compression, name):
     file = tmp_path / 'a.mcap'
     write(file, compression)
     with file.open('rb') as stream:
@@ -141,14 +141,14 @@ def test_compression_is_as_mcaps_own_index_has_it(tmp_path, compression, name):
     assert found.rosbag2 is None
 
 
-def test_without_chunks_nothing_is_compressed(tmp_path):
+def test_file_without_chunks_has_no_compression(tmp_path):
     write(tmp_path / 'a.mcap', CompressionType.ZSTD, chunked=False)
     found = layout_of(tmp_path / 'a.mcap')
     assert found.compressions == {}
     assert found.content > 200 * len(PAYLOAD)
 
 
-def test_what_rosbag2_says_is_found(tmp_path):
+def test_layout_holds_the_metadata_record_of_rosbag2(tmp_path):
     BagWriter(tmp_path / 'bag', []).close({'seed': '7'})
     record = layout_of(tmp_path / 'bag' / 'bag_0.mcap').rosbag2
     assert record is not None
@@ -156,7 +156,7 @@ def test_what_rosbag2_says_is_found(tmp_path):
     assert (found['version'], found['custom_data']) == (9, {'seed': '7'})
 
 
-def test_cut_anywhere_it_tells_what_is_whole(tmp_path):
+def test_layout_of_a_truncated_file_lists_whole_chunks(tmp_path):
     write(tmp_path / 'a.mcap', CompressionType.ZSTD)
     content = (tmp_path / 'a.mcap').read_bytes()
     with (tmp_path / 'a.mcap').open('rb') as stream:
@@ -188,7 +188,7 @@ def test_cut_anywhere_it_tells_what_is_whole(tmp_path):
         (200, b'nobody knows'),
     ],
 )
-def test_no_record_is_too_odd(tmp_path, record):
+def test_layout_reads_any_malformed_record(tmp_path, record):
     opcode, content = record
     file = tmp_path / 'odd.mcap'
     head = bytes([opcode]) + len(content).to_bytes(8, 'little')
@@ -199,7 +199,7 @@ def test_no_record_is_too_odd(tmp_path, record):
     assert all(len(name) < 200 for name in found.compressions)
 
 
-def test_what_cannot_be_read_says_so(tmp_path):
+def test_unreadable_path_raises_a_bag_error(tmp_path):
     with pytest.raises(BagError, match='cannot be read: Is a directory'):
         layout_of(tmp_path)
 
@@ -220,7 +220,7 @@ def lease_is_refused(file):
     return False
 
 
-def test_it_is_while_another_process_holds_it_open(tmp_path):
+def test_file_held_open_by_a_writer_is_in_use(tmp_path):
     file = tmp_path / 'run.mcap'
     file.write_bytes(b'some')
     with subprocess.Popen(
@@ -235,13 +235,13 @@ def test_it_is_while_another_process_holds_it_open(tmp_path):
     assert file.read_bytes() == b'some'
 
 
-def test_who_reads_is_no_writer(tmp_path):
+def test_file_open_for_reading_is_not_in_use(tmp_path):
     file = tmp_path / 'run.mcap'
     file.write_bytes(b'some')
     with file.open('rb'):
         assert not is_in_use(file)
 
 
-def test_what_cannot_be_known_is_no_writer(tmp_path):
+def test_missing_file_or_folder_is_not_in_use(tmp_path):
     assert not is_in_use(tmp_path / 'missing')
     assert not is_in_use(tmp_path)

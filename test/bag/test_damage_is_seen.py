@@ -34,33 +34,33 @@ def run(tmp_path, topics, messages):
     return write_run(tmp_path / 'run', topics, messages)
 
 
-def test_a_chunk_that_calls_itself_something_else_is_seen(run):
+def test_chunk_with_a_changed_record_type_is_damage(run):
     # mcap skips what it does not know.
     damaged(run, in_chunk(2, 0))
     with pytest.raises(BagError, match='with another record type'):
         list(read_bag(run).messages())
 
 
-def test_the_index_is_read_only_if_its_checksum_fits(run):
+def test_index_with_a_wrong_checksum_is_damage(run):
     damaged(run, lambda c: flip(c.rindex(b'/arm/joint_states') + 3)(c))
     with pytest.raises(BagError, match='the checksum of its index does not match'):
         read_bag(run)
 
 
-def test_an_attachment_is_read_only_if_its_checksum_fits(run):
+def test_attachment_with_a_wrong_checksum_is_damage(run):
     damaged(run, lambda c: flip(c.index(b'four_bar: {}'))(c))
     with pytest.raises(BagError, match='its checksum does not match'):
         read_bag(run)
 
 
-def test_an_index_of_messages_is_never_a_message(run):
+def test_message_index_read_as_a_message_is_damage(run):
     # 0x07, an index of messages, to 0x05, a message.
     damaged(run, lambda c: flip(chunks_of(c)[2][1], 1)(c))
     with pytest.raises(BagError, match='a message outside of the chunks'):
         list(read_bag(run).messages())
 
 
-def test_a_last_file_that_was_only_begun_is_no_hindrance(run, messages):
+def test_empty_last_file_is_read_as_truncated(run, messages):
     (run / 'metadata.yaml').unlink()
     (run / 'run_1.mcap').touch()
     with pytest.raises(BagError, match=r'run_1\.mcap: is empty'):
@@ -74,7 +74,7 @@ def test_a_last_file_that_was_only_begun_is_no_hindrance(run, messages):
         list(read_bag(run, allow_truncated=True).messages())
 
 
-def test_each_bit_of_the_lengths_of_an_empty_attachment(tmp_path, topics):
+def test_flipped_length_bit_of_an_empty_attachment_is_damage(tmp_path, topics):
     BagWriter(tmp_path / 'run', topics, {'empty': ('text/plain', b'')}).close()
     content = (tmp_path / 'run' / 'run_0.mcap').read_bytes()
     # Behind it no checksum of nothing, but the head of the next record, which ends in zeros.
@@ -89,7 +89,7 @@ def test_each_bit_of_the_lengths_of_an_empty_attachment(tmp_path, topics):
 
 @pytest.mark.parametrize('bit', range(8))
 @pytest.mark.parametrize('what', ['chunk', 'attachment'])
-def test_each_bit_of_a_kind_in_a_file_without_counts(tmp_path, messages, what, bit):
+def test_flipped_opcode_bit_without_statistics_is_damage(tmp_path, messages, what, bit):
     file = tmp_path / 'a.mcap'
     with file.open('wb') as stream:
         options = {'index_types': IndexType.NONE, 'use_statistics': False}
@@ -124,32 +124,32 @@ class TestOutside:
     @pytest.mark.parametrize(
         'name', ['../secret.mcap', 'a/../../secret.mcap', '..', '', '/', 'a\0b', '\ud800', 'a\nb']
     )
-    def test_a_name_that_leads_out(self, run, tmp_path, name):
+    def test_metadata_path_out_of_the_folder_is_refused(self, run, tmp_path, name):
         (run / 'run_0.mcap').rename(tmp_path / 'secret.mcap')
         text = yaml.safe_dump({'rosbag2_bagfile_information': {'relative_file_paths': [name]}})
         (run / 'metadata.yaml').write_text(text)
         self._refused(run, 'as a file')
 
     @pytest.mark.parametrize('named', [True, False])
-    def test_a_link_that_leads_out(self, run, tmp_path, named):
+    def test_symbolic_link_out_of_the_folder_is_refused(self, run, tmp_path, named):
         (run / 'run_0.mcap').rename(tmp_path / 'secret.mcap')
         (run / 'run_0.mcap').symlink_to('../secret.mcap')
         if not named:
             (run / 'metadata.yaml').unlink()
         self._refused(run, "leads out of the bag's folder")
 
-    def test_a_link_within_the_folder_is_followed(self, run, messages):
+    def test_symbolic_link_within_the_folder_is_followed(self, run, messages):
         (run / 'run_0.mcap').rename(run / 'moved')
         (run / 'run_0.mcap').symlink_to('moved')
         assert data_of(run) == without(messages, range(0))
 
-    def test_a_file_named_twice(self, run):
+    def test_file_named_twice_in_metadata_is_refused(self, run):
         named = {'relative_file_paths': ['run_0.mcap', 'run_0.mcap']}
         text = yaml.safe_dump({'rosbag2_bagfile_information': named})
         (run / 'metadata.yaml').write_text(text)
         self._refused(run, 'twice')
 
-    def test_a_pipe(self, run):
+    def test_named_pipe_in_a_bag_folder_is_refused(self, run):
         (run / 'run_0.mcap').unlink()
         os.mkfifo(run / 'run_0.mcap')
         self._refused(run, 'is not a file')
@@ -257,7 +257,7 @@ BAGS: dict[Callable[[Path, object], Path], tuple[bool, int]] = {
 
 
 @pytest.mark.parametrize('made', BAGS, ids=lambda made: made.__name__)
-def test_a_bag_says_whether_an_end_is_missing(made, tmp_path, topics):
+def test_reader_reports_whether_a_bag_is_truncated(made, tmp_path, topics):
     truncated, count = BAGS[made]
     path = made(tmp_path, topics)
     bag: Bag = read_bag(path, allow_truncated=True)
@@ -270,7 +270,7 @@ def test_a_bag_says_whether_an_end_is_missing(made, tmp_path, topics):
         assert len(list(read_bag(path).messages())) == count
 
 
-def test_of_a_ring_the_older_files_that_a_kill_has_left_come_first(tmp_path, topics):
+def test_recovery_reads_older_files_of_a_killed_ring_first(tmp_path, topics):
     # Killed between the renewal of metadata.yaml and the removal of the file that is not in it.
     recording = Recording(tmp_path, topics, keep_files=2)
     recording.write(19)
@@ -289,7 +289,7 @@ def test_of_a_ring_the_older_files_that_a_kill_has_left_come_first(tmp_path, top
     assert times == [index * SECOND // 10 for index in range(1, 30)]
 
 
-def test_what_a_file_says_holds_where_the_metadata_are_lost(tmp_path, topics):
+def test_custom_data_are_read_from_the_file_without_metadata(tmp_path, topics):
     recording = Recording(tmp_path, topics, keep_files=2)
     recording.write(45)
     recording.writer.close({'seed': '7'})
@@ -300,7 +300,7 @@ def test_what_a_file_says_holds_where_the_metadata_are_lost(tmp_path, topics):
 
 
 @pytest.mark.parametrize('cut', [5, 400])
-def test_the_hook_hears_of_what_is_searched_for_channels(tmp_path, topics, cut):
+def test_progress_hook_follows_the_search_for_channels(tmp_path, topics, cut):
     # Of a file with an index nothing is searched.
     recording = Recording(tmp_path, topics)
     recording.write(9)

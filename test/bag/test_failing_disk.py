@@ -73,7 +73,7 @@ def ages(monkeypatch):
         ('linkage_ros.bag.metadata.sync_folder', errno.EIO),
     ],
 )
-def test_metadata_that_cannot_be_renewed_do_not_end_a_recording(
+def test_failed_metadata_renewal_does_not_end_a_recording(
     tmp_path, topics, messages, readers, monkeypatch, ages, call, error
 ):
     writer = BagWriter(tmp_path / 'run', topics)
@@ -89,7 +89,9 @@ def test_metadata_that_cannot_be_renewed_do_not_end_a_recording(
     readers.agree(tmp_path / 'run', topics, messages[:200])
 
 
-def test_the_last_metadata_are_tried_twice(tmp_path, topics, messages, readers, monkeypatch):
+def test_final_metadata_are_written_at_a_second_attempt(
+    tmp_path, topics, messages, readers, monkeypatch
+):
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:100])
     monkeypatch.setattr('pathlib.Path.replace', failing(Path.replace, [0]))
@@ -98,7 +100,7 @@ def test_the_last_metadata_are_tried_twice(tmp_path, topics, messages, readers, 
     readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
-def test_a_rename_that_never_succeeds_is_said_and_leaves_the_first_metadata(
+def test_failing_rename_raises_and_keeps_the_first_metadata(
     tmp_path, topics, messages, readers, monkeypatch
 ):
     writer = BagWriter(tmp_path / 'run', topics)
@@ -111,9 +113,7 @@ def test_a_rename_that_never_succeeds_is_said_and_leaves_the_first_metadata(
     readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
-def test_a_ring_whose_names_cannot_be_renewed_removes_no_file(
-    tmp_path, topics, messages, monkeypatch
-):
+def test_ring_with_failing_metadata_removes_no_file(tmp_path, topics, messages, monkeypatch):
     storage = Storage(split_seconds=0.1, keep_files=2)
     writer = BagWriter(tmp_path / 'run', topics, storage=storage)
     with monkeypatch.context() as patch:
@@ -130,9 +130,7 @@ def test_a_ring_whose_names_cannot_be_renewed_removes_no_file(
     assert data_of(tmp_path / 'run') == data(messages[:2000][-kept:])
 
 
-def test_a_file_of_a_ring_that_cannot_be_removed_is_tried_again(
-    tmp_path, topics, messages, monkeypatch
-):
+def test_ring_retries_the_removal_of_a_file(tmp_path, topics, messages, monkeypatch):
     storage = Storage(split_seconds=0.1, keep_files=2)
     writer = BagWriter(tmp_path / 'run', topics, storage=storage)
     with monkeypatch.context() as patch:
@@ -164,7 +162,7 @@ def losing(file, numbers):
 
 
 @pytest.mark.parametrize('when', ['flush', 'close'])
-def test_what_a_failed_fsync_lost_is_written_again(
+def test_messages_lost_by_a_failed_fsync_are_written_again(
     tmp_path, topics, messages, readers, monkeypatch, when
 ):
     monkeypatch.setattr('os.fsync', losing(tmp_path / 'run' / 'run_0.mcap', [2]))
@@ -184,9 +182,7 @@ def test_what_a_failed_fsync_lost_is_written_again(
 
 
 @pytest.mark.parametrize('when', ['flush', 'close'])
-def test_what_no_fsync_brings_to_the_disk_is_not_counted(
-    tmp_path, topics, messages, monkeypatch, when
-):
+def test_messages_never_synced_are_not_counted(tmp_path, topics, messages, monkeypatch, when):
     monkeypatch.setattr('os.fsync', losing(tmp_path / 'run' / 'run_0.mcap', range(2, 100)))
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:1000])
@@ -200,7 +196,9 @@ def test_what_no_fsync_brings_to_the_disk_is_not_counted(
 
 
 @pytest.mark.parametrize('failed', ['os.pwrite', 'os.fsync', 'os.posix_fallocate'])
-def test_the_account_closes_whatever_fails(tmp_path, topics, messages, monkeypatch, failed):
+def test_counts_add_up_under_any_failing_disk_call(
+    tmp_path, topics, messages, monkeypatch, failed
+):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.0)
     name = failed.partition('.')[2]
     monkeypatch.setattr(failed, failing(getattr(os, name), None))
@@ -228,7 +226,7 @@ def test_short_writes_are_completed(tmp_path, topics, messages, readers, monkeyp
     readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
-def test_a_disk_that_takes_nothing_ends_a_recording(tmp_path, topics, messages, monkeypatch):
+def test_disk_that_accepts_no_data_ends_a_recording(tmp_path, topics, messages, monkeypatch):
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:100])
     writer.flush()
@@ -255,9 +253,7 @@ class _Deaf:
         return 0
 
 
-def test_metadata_that_the_disk_does_not_take_are_given_up(
-    tmp_path, topics, messages, monkeypatch
-):
+def test_disk_that_accepts_no_metadata_raises_at_close(tmp_path, topics, messages, monkeypatch):
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:100])
     whole = Path.open
@@ -268,7 +264,7 @@ def test_metadata_that_the_disk_does_not_take_are_given_up(
     assert 'linkage_ros.unfinished' in custom_data(tmp_path / 'run')
 
 
-def test_a_file_that_fails_at_its_close_is_told_of_in_the_metadata(
+def test_failing_close_is_recorded_in_the_metadata(
     tmp_path, topics, messages, readers, monkeypatch
 ):
     writer = BagWriter(tmp_path / 'run', topics)
@@ -281,7 +277,9 @@ def test_a_file_that_fails_at_its_close_is_told_of_in_the_metadata(
     readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
-def test_room_that_was_set_aside_needs_no_end(tmp_path, topics, messages, readers, monkeypatch):
+def test_failing_close_of_the_reserve_loses_no_message(
+    tmp_path, topics, messages, readers, monkeypatch
+):
     writer = BagWriter(tmp_path / 'run', topics)
     write(writer, messages[:100])
     reserve = writer._file._reserve
@@ -296,7 +294,7 @@ def test_room_that_was_set_aside_needs_no_end(tmp_path, topics, messages, reader
 
 
 @pytest.mark.parametrize('flush_every', [0, 10])
-def test_the_floor_holds_between_two_flushes_too(
+def test_min_free_bytes_holds_between_two_flushes(
     tmp_path, topics, messages, monkeypatch, flush_every
 ):
     floor, room = 1_000_000, 2_000_000

@@ -47,9 +47,7 @@ def _write_until_it_fails(writer, messages, *, flush_every=10**9):
 
 
 @pytest.mark.parametrize('flush_every', [10**9, 100])
-def test_a_full_disk_costs_no_message_that_was_taken(
-    small_disk, topics, messages, readers, flush_every
-):
+def test_full_disk_loses_no_accepted_message(small_disk, topics, messages, readers, flush_every):
     writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS)
     taken, error = _write_until_it_fails(writer, messages, flush_every=flush_every)
     assert 2000 < taken < len(messages), 'the disk was to fill in the middle'
@@ -68,7 +66,7 @@ def test_a_full_disk_costs_no_message_that_was_taken(
     assert read_bag(small_disk / 'run').attachments == {'scene.yaml': b'linkage: four_bar\n'}
 
 
-def test_when_another_process_takes_the_reserve_whole_chunks_remain(
+def test_lost_reserve_on_a_full_disk_leaves_whole_chunks(
     small_disk, topics, messages, readers, monkeypatch
 ):
     monkeypatch.setattr(Reserve, 'release', lambda reserve: None)
@@ -82,7 +80,7 @@ def test_when_another_process_takes_the_reserve_whole_chunks_remain(
     readers.agree(small_disk / 'run', topics, messages[:kept])
 
 
-def test_a_disk_that_is_full_at_the_end_still_gets_an_index(small_disk, topics, messages, readers):
+def test_full_disk_at_the_end_still_gets_an_index(small_disk, topics, messages, readers):
     writer = BagWriter(small_disk / 'run', topics)
     for message in messages[:1000]:
         writer.write(*message)
@@ -121,7 +119,7 @@ except RecordingError as error:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('limit', [1_000_000, 1_000_001, 1_003_000, 1_060_000])
 @pytest.mark.parametrize('flush_every', [7, 100, 10**9])
-def test_a_limit_on_the_files_size_leaves_a_bag_of_whole_chunks(
+def test_file_size_limit_leaves_a_bag_of_whole_chunks(
     tmp_path, topics, messages, readers, limit, flush_every
 ):
     plain = [tuple(message) for message in messages]
@@ -143,7 +141,7 @@ def _pickle(topics, messages):
     return pickle.dumps((topics, messages))
 
 
-def test_a_disk_that_fills_among_files_keeps_them_all(small_disk, topics, messages, readers):
+def test_full_disk_keeps_every_file_of_a_split_bag(small_disk, topics, messages, readers):
     storage = Storage(split_bytes=300_000)
     writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
     taken, error = _write_until_it_fails(writer, messages, flush_every=100)
@@ -160,7 +158,7 @@ def test_a_disk_that_fills_among_files_keeps_them_all(small_disk, topics, messag
         }
 
 
-def test_a_ring_goes_on_where_all_of_it_would_fill_the_disk(small_disk, topics, messages, readers):
+def test_ring_records_more_than_the_disk_holds(small_disk, topics, messages, readers):
     storage = Storage(split_bytes=200_000, keep_files=3)
     writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
     for _ in range(2):  # 4 MB on a disk of 2 MiB
@@ -174,9 +172,7 @@ def test_a_ring_goes_on_where_all_of_it_would_fill_the_disk(small_disk, topics, 
     assert sorted(data for *_, data in readers.rosbags(small_disk / 'run')) == sorted(there)
 
 
-def test_a_recording_ends_where_less_stays_free_than_it_should(
-    small_disk, topics, messages, readers
-):
+def test_recording_ends_when_free_space_falls_below_minimum(small_disk, topics, messages, readers):
     storage = Storage(min_free_bytes=600_000)
     recorder = Recorder(
         BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage), flush_period=0.01
@@ -203,7 +199,7 @@ def test_a_recording_ends_where_less_stays_free_than_it_should(
     assert custom['linkage_ros.failure'] == summary.failure
 
 
-def test_no_file_is_begun_where_another_process_has_taken_the_room(small_disk, topics, messages):
+def test_split_begins_no_file_below_min_free_bytes(small_disk, topics, messages):
     storage = Storage(min_free_bytes=600_000, split_seconds=0.5)
     writer = BagWriter(small_disk / 'run', topics, storage=storage)
     half_a_second = [m for m in messages if m.log_time - messages[0].log_time < 400_000_000]
@@ -218,7 +214,7 @@ def test_no_file_is_begun_where_another_process_has_taken_the_room(small_disk, t
     assert [file.name for file in small_disk.glob('run/*.mcap')] == ['run_0.mcap']
 
 
-def test_a_disk_with_too_little_room_from_the_start_gets_no_bag(small_disk, topics):
+def test_disk_below_min_free_bytes_gets_no_bag(small_disk, topics):
     with pytest.raises(
         RecordingError, match=r'cannot be recorded to: .* min_free_bytes: 5,000,000'
     ):
@@ -227,7 +223,7 @@ def test_a_disk_with_too_little_room_from_the_start_gets_no_bag(small_disk, topi
 
 
 @pytest.mark.parametrize('healthy_writes', [6, 20, 21])
-def test_a_disk_that_dies_leaves_the_part_that_it_took(
+def test_failing_disk_leaves_the_written_part_readable(
     tmp_path, topics, messages, monkeypatch, healthy_writes
 ):
     writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
@@ -277,7 +273,9 @@ time.sleep(60)
 
 
 @pytest.mark.parametrize(('kind', 'least'), [('writer', 500), ('recorder', 200)])
-def test_a_kill_leaves_what_was_flushed(tmp_path, topics, messages, kind, least):
+def test_killed_recording_leaves_flushed_messages_readable(
+    tmp_path, topics, messages, kind, least
+):
     pickled = tmp_path / 'messages'
     pickled.write_bytes(_pickle(topics, [tuple(message) for message in messages]))
     script = [sys.executable, '-c', KILLED, kind, tmp_path / 'run', pickled]
@@ -388,7 +386,7 @@ def readable(folder, beside):
 @pytest.mark.parametrize('storage', STORAGES)
 @pytest.mark.parametrize('then', ['silence', 'more messages', 'the end'])
 @pytest.mark.parametrize('do', WHAT_IS_DONE)
-def test_what_another_process_does_is_said_at_once_and_counted(
+def test_interference_of_another_process_is_reported_and_counted(
     tmp_path, topics, messages, do, then, storage
 ):
     folder = tmp_path / 'run'
@@ -421,7 +419,7 @@ def test_what_another_process_does_is_said_at_once_and_counted(
 
 
 @pytest.mark.parametrize('how', ['removed', 'cut'])
-def test_a_file_that_was_ended_long_ago_is_looked_for_at_the_end(tmp_path, topics, messages, how):
+def test_removed_split_file_is_noticed_at_the_end(tmp_path, topics, messages, how):
     folder = tmp_path / 'run'
     writer = BagWriter(folder, topics, storage=Storage(split_bytes=200_000))
     recorder = Recorder(writer, flush_period=0.02)
@@ -446,7 +444,7 @@ def test_a_file_that_was_ended_long_ago_is_looked_for_at_the_end(tmp_path, topic
     assert left == there
 
 
-def test_what_was_cut_does_not_come_back_as_zeros(tmp_path, topics, messages):
+def test_emptied_file_is_not_filled_with_zeros(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=3600.0)
     file = tmp_path / 'run' / 'run_0.mcap'
     for message in messages[:4000]:

@@ -47,7 +47,7 @@ def summary(tmp_path, topics):
     )  # fmt: skip
 
 
-def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
+def test_metadata_text_equals_that_of_rosbag2(summary, topics, monkeypatch):
     monkeypatch.delenv('ROS_DISTRO', raising=False)
     expected = {
         'rosbag2_bagfile_information': {
@@ -107,7 +107,7 @@ def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
 @pytest.mark.parametrize('custom', [{}, {'seed': '7', 'note': 'zwei\n\nZeilen: ja\u2028 é'}])
 @pytest.mark.parametrize('files', [0, 3])
 @pytest.mark.parametrize('with_topics', [True, False])
-def test_its_text_is_that_of_a_yaml_library(summary, root, custom, files, with_topics):
+def test_metadata_text_equals_that_of_a_yaml_library(summary, root, custom, files, with_topics):
     if not with_topics:
         summary = replace(summary, topics=(), counts=())
     parts = [replace(summary, file=f'run: {index}.mcap') for index in range(files)]
@@ -122,7 +122,7 @@ def test_its_text_is_that_of_a_yaml_library(summary, root, custom, files, with_t
     assert inner['custom_data'] == (custom or None)
 
 
-def test_files_together_are_a_bag(summary):
+def test_summaries_of_files_merge_into_one_bag(summary):
     empty = replace(summary, file='run_1.mcap', counts=(0, 0), start=NO_START, duration=0, size=5)
     early = replace(
         summary, file='run_2.mcap', counts=(1, 0), start=summary.start - 10, duration=11, size=6
@@ -137,18 +137,18 @@ def test_files_together_are_a_bag(summary):
     assert merge_summaries([empty], (0, 0)) == replace(empty, discarded=(0, 0))
 
 
-def test_the_record_in_the_file_has_no_root_key(summary):
+def test_metadata_record_in_the_file_has_no_root_key(summary):
     whole = yaml.safe_load(metadata_text(summary, {'a': 'b'}))
     record = yaml.safe_load(metadata_text(summary, {'a': 'b'}, root=False))
     assert record == whole['rosbag2_bagfile_information']
 
 
-def test_without_custom_data_it_is_null(summary):
+def test_missing_custom_data_are_written_as_null(summary):
     record = yaml.safe_load(metadata_text(summary, {}, root=False))
     assert record['custom_data'] is None
 
 
-def test_the_distribution_is_the_environments(summary, monkeypatch):
+def test_metadata_hold_ros_distro_of_the_environment(summary, monkeypatch):
     monkeypatch.setenv('ROS_DISTRO', 'kilted')
     assert yaml.safe_load(metadata_text(summary, {}, root=False))['ros_distro'] == 'kilted'
 
@@ -163,19 +163,19 @@ def test_the_distribution_is_the_environments(summary, monkeypatch):
         {'liveliness': 'manual_by_topic', 'avoid_ros_namespace_conventions': True},
     ],
 )
-def test_a_qos_survives_the_way_there_and_back(change):
+def test_qos_profile_survives_writing_and_reading(change):
     profile = replace(QosProfile(), **change)
     assert QosProfile.from_mapping(yaml.safe_load(qos_text(profile))[0]) == profile
 
 
-def test_a_qos_in_the_numbers_of_older_bags_is_understood():
+def test_numeric_qos_of_older_bags_is_read():
     numbers = {'history': 1, 'reliability': 2, 'durability': 1, 'liveliness': 1}
     assert QosProfile.from_mapping({**QOS, **numbers}) == QosProfile(
         reliability='best_effort', durability='transient_local'
     )
 
 
-def test_an_old_file_stays_whole_when_the_new_one_cannot_be_written(summary, monkeypatch):
+def test_old_metadata_stay_whole_on_a_full_disk(summary, monkeypatch):
     write_metadata(summary, {})
     before = (summary.folder / 'metadata.yaml').read_bytes()
 
@@ -190,7 +190,7 @@ def test_an_old_file_stays_whole_when_the_new_one_cannot_be_written(summary, mon
     assert Path(summary.folder, 'metadata.yaml').stat().st_size == len(before)
 
 
-def test_keys_stand_in_the_order_of_rosbag2(summary):
+def test_metadata_keys_stand_in_the_order_of_rosbag2(summary):
     # rosbag2_storage's yaml.hpp: of a file first when it begins, of the whole bag first how long.
     information = yaml.safe_load(metadata_text(summary, {}))['rosbag2_bagfile_information']
     assert list(information)[:5] == [

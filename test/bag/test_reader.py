@@ -38,7 +38,7 @@ def folder(tmp_path, topics, messages):
 
 
 @pytest.mark.parametrize('name', ['.', 'run_0.mcap'])
-def test_what_was_written_comes_back_in_the_order_of_writing(folder, topics, messages, name):
+def test_messages_are_read_in_the_order_of_writing(folder, topics, messages, name):
     bag = read_bag(folder / name)
     assert bag.topics == topics
     assert bag.attachments == {'scene.yaml': b'a: 1\n'}
@@ -49,18 +49,18 @@ def test_what_was_written_comes_back_in_the_order_of_writing(folder, topics, mes
     assert list(bag.messages()) == expected, 'a second time'
 
 
-def test_custom_data_comes_from_the_folders_metadata(folder):
+def test_custom_data_are_read_from_the_metadata_file(folder):
     assert read_bag(folder).custom == {'seed': '7'}
     assert read_bag(folder / 'run_0.mcap').custom == {}
 
 
-def test_without_metadata_a_folder_is_read_all_the_same(folder, topics, messages):
+def test_folder_without_metadata_is_read(folder, topics, messages):
     (folder / 'metadata.yaml').unlink()
     assert sum(1 for _ in read_bag(folder).messages()) == len(messages)
 
 
 @pytest.mark.parametrize('mode', [CompressionMode.NONE, CompressionMode.STORAGE])
-def test_a_bag_by_rosbags_is_read(tmp_path, topics, messages, mode):
+def test_bag_written_by_rosbags_is_read(tmp_path, topics, messages, mode):
     no_limit = QosTime(9223372036, 854775807)
     qos = Qos(
         QosHistory.KEEP_LAST, 5, QosReliability.BEST_EFFORT, QosDurability.VOLATILE, no_limit,
@@ -88,7 +88,7 @@ def test_a_bag_by_rosbags_is_read(tmp_path, topics, messages, mode):
     ]
 
 
-def test_a_file_without_an_index_is_read(tmp_path):
+def test_file_without_an_index_is_read(tmp_path):
     file = tmp_path / 'plain.mcap'
     with file.open('wb') as stream:
         writer = Writer(stream, use_chunking=False, repeat_channels=False, repeat_schemas=False)
@@ -116,7 +116,7 @@ def test_a_file_without_an_index_is_read(tmp_path):
         (MCAP0_MAGIC + bytes(100) + MCAP0_MAGIC, 'is damaged: '),
     ],
 )
-def test_a_file_that_is_no_bag_says_so_on_one_line(tmp_path, content, reason):
+def test_text_or_foreign_file_is_refused_with_its_kind(tmp_path, content, reason):
     file = tmp_path / 'run.mcap'
     file.write_bytes(content)
     with pytest.raises(BagError) as caught:
@@ -137,7 +137,7 @@ def test_a_file_that_is_no_bag_says_so_on_one_line(tmp_path, content, reason):
         ('folder.mcap', r'holds no \.mcap file'),
     ],
 )
-def test_a_place_that_is_no_bag_says_so(tmp_path, name, reason):
+def test_folder_that_is_no_bag_is_refused(tmp_path, name, reason):
     for folder in ['no bag', 'no metadata', 'list', 'file gone', 'folder.mcap']:
         (tmp_path / folder).mkdir()
     (tmp_path / 'no metadata' / 'metadata.yaml').write_text('a: [')
@@ -149,7 +149,7 @@ def test_a_place_that_is_no_bag_says_so(tmp_path, name, reason):
         read_bag(tmp_path / name)
 
 
-def test_cut_anywhere_it_is_truncated_and_its_whole_chunks_are_read(folder, messages):
+def test_truncated_file_is_read_up_to_its_whole_chunks(folder, messages):
     file = folder / 'run_0.mcap'
     whole = file.read_bytes()
     expected = [message.data for message in messages]
@@ -168,7 +168,7 @@ def test_cut_anywhere_it_is_truncated_and_its_whole_chunks_are_read(folder, mess
     assert counts[-1] == len(messages)
 
 
-def test_a_flipped_bit_is_found_where_it_is(folder, messages):
+def test_flipped_bit_is_reported_after_the_messages_before(folder, messages):
     file = folder / 'run_0.mcap'
     content = bytearray(file.read_bytes())
     place = content.index(messages[6000].data)
@@ -181,7 +181,7 @@ def test_a_flipped_bit_is_found_where_it_is(folder, messages):
     assert 5000 < len(found) <= 6000
 
 
-def test_an_error_in_the_loop_over_messages_is_the_callers_own(folder):
+def test_exception_in_the_message_loop_is_not_wrapped(folder):
     def stumble():
         for _ in read_bag(folder).messages():
             raise ZeroDivisionError

@@ -42,7 +42,7 @@ def _counts(summary):
     return [(counts.received, counts.recorded, counts.dropped) for counts in summary.topics]
 
 
-def test_all_that_was_offered_is_in_the_bag(tmp_path, topics, messages, readers):
+def test_recorder_writes_every_offered_message(tmp_path, topics, messages, readers):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics))
     for message in messages:
         recorder.offer(*message)
@@ -54,7 +54,7 @@ def test_all_that_was_offered_is_in_the_bag(tmp_path, topics, messages, readers)
     readers.agree(tmp_path / 'run', topics, messages)
 
 
-def test_the_bag_says_what_is_missing_from_it(tmp_path, topics, messages):
+def test_bag_metadata_hold_received_and_dropped_counts(tmp_path, topics, messages):
     writer = StalledWriter(tmp_path / 'run', topics)
     recorder = Recorder(writer, capacity=0)
     for message in messages[:5]:
@@ -68,9 +68,7 @@ def test_the_bag_says_what_is_missing_from_it(tmp_path, topics, messages):
     assert json.loads(custom['linkage_ros.dropped']) == {'/crank': 3, '/arm/joint_states': 2}
 
 
-def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
-    tmp_path, topics, messages, readers
-):
+def test_stalled_disk_blocks_no_offer_and_overflow_is_counted(tmp_path, topics, messages, readers):
     writer = StalledWriter(tmp_path / 'run', topics)
     recorder = Recorder(writer, capacity=100)
     recorder.offer(*messages[0])
@@ -89,7 +87,7 @@ def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
     readers.agree(tmp_path / 'run', topics, messages[:101])
 
 
-def test_a_message_in_hand_waits_and_is_not_lost(tmp_path, topics, messages):
+def test_message_held_by_the_writer_counts_as_waiting(tmp_path, topics, messages):
     writer = StalledWriter(tmp_path / 'run', topics)
     recorder = Recorder(writer)
     for message in messages[:4]:
@@ -101,7 +99,7 @@ def test_a_message_in_hand_waits_and_is_not_lost(tmp_path, topics, messages):
     assert _counts(recorder.stop()) == [(2, 2, 0), (2, 2, 0)]
 
 
-def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, messages):
+def test_recorder_counts_add_up_at_any_time(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics))
     looks = []
     for message in messages:
@@ -120,7 +118,7 @@ def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, me
     ('size', 'wait'),
     [(400, 100), (PLACE - 1, 100), (PLACE, 50), (10 * PLACE, 10), (99 * PLACE, 1), (10**7, 1)],
 )
-def test_the_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
+def test_recorder_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
     writer = StalledWriter(tmp_path / 'run', topics)
     recorder = Recorder(writer, capacity=100)
     recorder.offer(*messages[0])
@@ -136,7 +134,7 @@ def test_the_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
     assert _counts(recorder.stop())[0] == (201, wait + 1, 200 - wait)
 
 
-def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, messages):
+def test_hanging_disk_does_not_delay_stop_beyond_its_timeout(tmp_path, topics, messages):
     writer = StalledWriter(tmp_path / 'run', topics, answered=4)
     recorder = Recorder(writer, flush_period=1000.0)
     for message in messages[:10]:
@@ -157,7 +155,7 @@ def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, m
         (errno.EIO, 'ended early: Input/output error', True),
     ],
 )
-def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
+def test_failing_disk_leaves_every_offered_message_counted(
     tmp_path, topics, messages, readers, monkeypatch, number, said, for_good
 ):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
@@ -209,7 +207,9 @@ def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
     ]
 
 
-def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages, monkeypatch):
+def test_unexpected_exception_ends_the_recording_with_a_failure(
+    tmp_path, topics, messages, monkeypatch
+):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics))
 
     def broken(*message):
@@ -224,7 +224,7 @@ def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages,
     assert list(read_bag(tmp_path / 'run').messages()) == []
 
 
-def test_a_message_with_an_impossible_time_is_dropped_alone(tmp_path, topics, messages, readers):
+def test_message_with_an_impossible_time_is_dropped_alone(tmp_path, topics, messages, readers):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics))
     for message in [messages[0], messages[1]._replace(log_time=-1), *messages[2:10]]:
         recorder.offer(*message)
@@ -232,7 +232,7 @@ def test_a_message_with_an_impossible_time_is_dropped_alone(tmp_path, topics, me
     readers.agree(tmp_path / 'run', topics, [messages[0], *messages[2:10]])
 
 
-def test_after_the_end_an_offer_is_counted_and_forgotten(tmp_path, topics, messages):
+def test_message_offered_after_stop_is_counted_as_dropped(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics))
     recorder.offer(*messages[0])
     summary = recorder.stop()
@@ -242,7 +242,7 @@ def test_after_the_end_an_offer_is_counted_and_forgotten(tmp_path, topics, messa
 
 
 @pytest.mark.parametrize('capacity', [50, 10**6])
-def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, readers, capacity):
+def test_concurrent_offers_lose_no_count(tmp_path, topics, messages, readers, capacity):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), capacity=capacity)
     start = threading.Barrier(4)
 
@@ -267,7 +267,7 @@ def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, re
         assert len(found) == 20_000
 
 
-def test_while_a_bag_is_recorded_its_metadata_says_so_and_counts_what_is_safe(
+def test_metadata_of_a_running_recording_count_flushed_messages(
     tmp_path, topics, messages, monkeypatch
 ):
     monkeypatch.setattr('linkage_ros.bag.writer._RENEWAL', 0.0)
@@ -298,9 +298,7 @@ def test_while_a_bag_is_recorded_its_metadata_says_so_and_counts_what_is_safe(
     assert UNFINISHED not in information()['custom_data']
 
 
-def test_metadata_that_were_renewed_too_early_are_renewed_without_another_message(
-    tmp_path, topics, messages, monkeypatch
-):
+def test_metadata_skipped_by_one_flush_are_renewed_later(tmp_path, topics, messages, monkeypatch):
     def count():
         text = (tmp_path / 'run' / 'metadata.yaml').read_text()
         return yaml.safe_load(text)['rosbag2_bagfile_information']['message_count']
@@ -319,7 +317,7 @@ def test_metadata_that_were_renewed_too_early_are_renewed_without_another_messag
     assert counts == [0, 0, 3, 3, 3, 4]
 
 
-def test_what_waits_for_long_is_flushed_in_between(tmp_path, topics, messages):
+def test_waiting_message_is_flushed_within_a_period(tmp_path, topics, messages):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.02)
     recorder.offer(*messages[0])
     for _ in range(500):
@@ -403,9 +401,7 @@ def clock(monkeypatch):
         (0.25, 0.25),
     ],
 )
-def test_a_flush_begins_nearly_a_period_after_the_last_or_where_that_takes_longer_at_once(
-    tmp_path, clock, flush, between
-):
+def test_flushes_begin_a_period_apart_or_at_once(tmp_path, clock, flush, between):
     writer = Writer(tmp_path / 'run', clock, flush)
     recorder = Recorder(writer, flush_period=PERIOD)
     while len(writer.flushes) < 20 and recorder.failure is None:
@@ -415,7 +411,7 @@ def test_a_flush_begins_nearly_a_period_after_the_last_or_where_that_takes_longe
     assert begun == pytest.approx([BETWEEN + index * between for index in range(20)])
 
 
-def test_a_backlog_is_written_before_a_slow_disk_is_waited_for_again(tmp_path, clock):
+def test_recorder_writes_its_backlog_before_the_next_flush(tmp_path, clock):
     # A flush takes ten periods, a batch of messages half a millisecond.
     writer = Writer(tmp_path / 'run', clock, flush=10 * PERIOD, write=1e-5)
     flush, begun, go_on = writer.flush, threading.Event(), threading.Event()
@@ -437,7 +433,7 @@ def test_a_backlog_is_written_before_a_slow_disk_is_waited_for_again(tmp_path, c
     assert [written for _, written in writer.flushes[:2]] == [0, 5000]
 
 
-def test_what_comes_without_end_is_flushed_all_the_same(tmp_path, clock):
+def test_unending_messages_are_flushed_every_two_periods(tmp_path, clock):
     writer = Writer(tmp_path / 'run', clock, flush=0.0, write=1e-4)
     recorder = Recorder(writer, capacity=10**6, flush_period=PERIOD)
     write = writer.write

@@ -51,7 +51,7 @@ def run(tmp_path, topics, messages):
     return write_run(tmp_path / 'run', topics, messages)
 
 
-def test_a_whole_bag_is_copied_to_the_byte_of_each_message(run, topics, messages, readers):
+def test_recovery_copies_a_whole_bag_byte_for_byte(run, topics, messages, readers):
     before = {path: path.read_bytes() for path in run.iterdir()}
     recovery = recover_bag(run)
     assert recovery.is_whole
@@ -77,7 +77,7 @@ def test_a_whole_bag_is_copied_to_the_byte_of_each_message(run, topics, messages
     assert {path: path.read_bytes() for path in run.iterdir()} == before
 
 
-def test_channels_and_sequence_numbers_stay(run):
+def test_recovery_keeps_channels_and_sequence_numbers(run):
     def described(file):
         with file.open('rb') as stream:
             return [
@@ -110,7 +110,7 @@ NO_LOSS = {
 
 
 @pytest.mark.parametrize(('change', 'said'), NO_LOSS.values(), ids=NO_LOSS.keys())
-def test_what_only_describes_is_made_anew_without_a_loss(
+def test_recovery_rebuilds_damaged_descriptions_without_loss(
     run, topics, messages, readers, change, said
 ):
     recovery = recover_bag(damaged(run, change))
@@ -169,7 +169,7 @@ SOME_LOSS = {
 
 
 @pytest.mark.parametrize(('change', 'lost'), SOME_LOSS.values(), ids=SOME_LOSS.keys())
-def test_only_what_is_damaged_is_lost(run, topics, messages, readers, change, lost):
+def test_recovery_loses_damaged_messages_only(run, topics, messages, readers, change, lost):
     recovery = recover_bag(damaged(run, change))
     kept = [m for index, m in enumerate(messages[:COUNT]) if index not in lost]
     readers.agree(recovery.folder, topics, kept)
@@ -180,7 +180,7 @@ def test_only_what_is_damaged_is_lost(run, topics, messages, readers, change, lo
     assert recovery.attachments == ('scene.yaml', 'linkage.yaml')
 
 
-def test_what_was_promised_is_said(run):
+def test_recovery_counts_promised_messages_of_a_damaged_chunk(run):
     recovery = recover_bag(damaged(run, in_chunk(2, 500)))
     assert [(t.saved, t.expected) for t in recovery.topics] == [(250, 300), (250, 300)]
     ((file, loss),) = recovery.losses
@@ -189,7 +189,7 @@ def test_what_was_promised_is_said(run):
     assert recovery.missing_count == 100
 
 
-def test_without_an_index_the_metadata_tells_what_was_promised(run):
+def test_recovery_without_an_index_counts_by_the_metadata(run):
     recovery = recover_bag(damaged(run, cut_at_chunk(3, 0)))
     assert [(t.saved, t.expected) for t in recovery.topics] == [(200, 300), (200, 300)]
     recovery = recover_bag(run / 'run_0.mcap')
@@ -208,7 +208,7 @@ def test_without_an_index_the_metadata_tells_what_was_promised(run):
     ],
     ids=['fewer than there are', 'as many', 'more'],
 )
-def test_more_than_there_were_are_never_saved(
+def test_recovery_promises_at_least_the_saved_messages(
     run, finished, counted, told_if_finished, told_if_not
 ):
     damaged(run, cut_at_chunk(3, 0))
@@ -223,14 +223,14 @@ def test_more_than_there_were_are_never_saved(
     assert [(t.saved, t.expected) for t in recover_bag(run).topics] == 2 * [(200, told)]
 
 
-def test_a_damaged_copy_of_the_topics_is_no_loss(run, messages):
+def test_damaged_copy_of_the_channels_is_no_loss(run, messages):
     recovery = recover_bag(damaged(run, lambda c: flip(c.index(b'channels.mcap') + 500)(c)))
     assert recovery.is_whole
     assert 'descriptions or index' in '\n'.join(recovery.repaired)
     assert data_of(recovery.folder) == without(messages, range(0))
 
 
-def test_without_a_description_messages_are_lost_too(run):
+def test_messages_without_a_channel_description_are_lost(run):
     def change(content):
         flip(content.index(b'channels.mcap') + 500)(content)
         return cut_with(0, 500)(content)
@@ -242,7 +242,7 @@ def test_without_a_description_messages_are_lost_too(run):
     assert recovery.attachments == ('scene.yaml', 'linkage.yaml')
 
 
-def test_a_damaged_attachment_is_lost_alone(run, messages):
+def test_damaged_attachment_is_lost_alone(run, messages):
     recovery = recover_bag(damaged(run, lambda c: flip(c.index(b'four_bar: {}'))(c)))
     assert recovery.attachments == ('scene.yaml',)
     assert data_of(recovery.folder) == without(messages, range(0))
@@ -250,7 +250,7 @@ def test_a_damaged_attachment_is_lost_alone(run, messages):
 
 
 @pytest.mark.parametrize('text', [None, '', 'a: [', '[' * 9999, 'a: 2001-99-99', '\xff'])
-def test_metadata_that_are_none_are_made_anew(run, messages, text):
+def test_recovery_rebuilds_unreadable_metadata(run, messages, text):
     file = run / 'metadata.yaml'
     file.unlink()
     if text is not None:
@@ -262,7 +262,7 @@ def test_metadata_that_are_none_are_made_anew(run, messages, text):
     assert read_bag(recovery.folder).custom['seed'] == '7', 'from the record in the file'
 
 
-def test_what_was_killed_and_is_recovered_is_finished(run):
+def test_recovered_bag_is_marked_as_finished(run):
     custom = yaml.safe_load((run / 'metadata.yaml').read_text())
     custom['rosbag2_bagfile_information']['custom_data'] = {**UNFINISHED_DATA, 'seed': '7'}
     (run / 'metadata.yaml').write_text(yaml.safe_dump(custom))
@@ -287,7 +287,7 @@ def test_what_was_killed_and_is_recovered_is_finished(run):
     ),
     random=st.randoms(use_true_random=False),
 )
-def test_whatever_is_done_to_it_what_is_found_is_true(run, messages, damages, random):
+def test_salvage_of_random_damage_finds_true_messages_only(run, messages, damages, random):
     content = bytearray((run / 'run_0.mcap').read_bytes())
     for kind, place, length in damages:
         at = int(place * len(content))
@@ -328,7 +328,7 @@ class Worn(BytesIO):
 
 
 @pytest.mark.parametrize('cut', [0, 100])
-def test_around_a_bad_block_of_the_disk_all_is_saved(run, messages, cut):
+def test_salvage_skips_one_bad_disk_block(run, messages, cut):
     content = (run / 'run_0.mcap').read_bytes()
     start, _ = chunks_of(content)[2]
     worn = Worn(content[: len(content) - cut], range(start + 500, start + 1012))
@@ -338,7 +338,7 @@ def test_around_a_bad_block_of_the_disk_all_is_saved(run, messages, cut):
     assert 'Input/output error' in salvage.losses[0].reason
 
 
-def test_a_bag_that_is_being_written_is_saved_as_far_as_it_got(tmp_path, topics, messages):
+def test_bag_still_being_written_is_recovered_so_far(tmp_path, topics, messages):
     writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
     for message in messages[:300]:
         writer.write(*message)
@@ -356,7 +356,7 @@ def test_a_bag_that_is_being_written_is_saved_as_far_as_it_got(tmp_path, topics,
 
 
 @pytest.mark.parametrize('kind', ['folder', 'file', 'link'])
-def test_what_is_there_is_never_written_over(run, tmp_path, kind):
+def test_recovery_never_overwrites_an_existing_path(run, tmp_path, kind):
     target = tmp_path / 'new'
     if kind == 'folder':
         target.mkdir()
@@ -371,14 +371,14 @@ def test_what_is_there_is_never_written_over(run, tmp_path, kind):
         assert target.read_text() == 'mine'
 
 
-def test_a_full_disk_leaves_nothing_behind(run, small_disk):
+def test_recovery_on_a_full_disk_leaves_no_folder(run, small_disk):
     (small_disk / 'other').write_bytes(bytes(2_000_000))
     with pytest.raises(RecordingError, match='cannot be written: No space left'):
         recover_bag(run, small_disk / 'new')
     assert list(small_disk.iterdir()) == [small_disk / 'other']
 
 
-def test_stopped_it_leaves_nothing_behind(run, tmp_path):
+def test_stopped_recovery_leaves_no_folder(run, tmp_path):
     assert recover_bag(run, tmp_path / 'new', stopped=lambda: True) is None
     assert list(tmp_path.iterdir()) == [run]
 
@@ -395,7 +395,7 @@ NO_BAG = {
 
 
 @pytest.mark.parametrize(('content', 'reason'), NO_BAG.values(), ids=NO_BAG.keys())
-def test_where_nothing_can_be_saved_nothing_is_made(tmp_path, content, reason):
+def test_unrecoverable_file_leaves_no_folder(tmp_path, content, reason):
     (tmp_path / 'x.mcap').write_bytes(content)
     with pytest.raises(BagError) as caught:
         recover_bag(tmp_path / 'x.mcap')
@@ -406,7 +406,7 @@ def test_where_nothing_can_be_saved_nothing_is_made(tmp_path, content, reason):
 # A ring of files, killed between naming the files that are kept and removing the oldest.
 
 
-def test_a_file_that_made_way_is_recovered_before_those_that_are_kept(tmp_path, monkeypatch):
+def test_recovery_reads_removed_ring_files_before_kept_ones(tmp_path, monkeypatch):
     topics = [Topic('/a', 'std_msgs/msg/Empty', '', '')]
     storage = Storage(split_seconds=1e-8, keep_files=2)
     writer = BagWriter(tmp_path / 'run', topics, {}, storage)

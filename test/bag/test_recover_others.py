@@ -67,7 +67,7 @@ def with_channels(file: Path, count: int) -> Path:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('count', [MOST_CHANNELS + 1, 65_535, 65_536])
-def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
+def test_recovery_refuses_too_many_channels_in_one_line(tmp_path, count, capsys):
     file = with_channels(tmp_path / 'many' / 'many_0.mcap', count)
     assert main(['recover', str(file)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -75,7 +75,7 @@ def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
     assert [path.name for path in tmp_path.glob('*/*')] == ['many_0.mcap']
 
 
-def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypatch):
+def test_channel_limit_of_recovery_counts_over_all_files(tmp_path, monkeypatch):
     monkeypatch.setattr('linkage_ros.bag.recover.MOST_CHANNELS', 20)
     for index, count in enumerate((15, 20)):
         with_channels(tmp_path / 'bag' / f'bag_{index}.mcap', count)
@@ -87,7 +87,7 @@ def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypat
 
 
 @pytest.mark.parametrize('compression', [CompressionType.LZ4, CompressionType.ZSTD])
-def test_compressed_chunks_are_unpacked_checked_and_packed_again(tmp_path, messages, compression):
+def test_recovery_unpacks_checks_and_repacks_compressed_chunks(tmp_path, messages, compression):
     file = written(tmp_path / 'a.mcap', messages, compression=compression)
     content = bytearray(file.read_bytes())
     start, end = chunks_of(content)[1]
@@ -103,7 +103,7 @@ def test_compressed_chunks_are_unpacked_checked_and_packed_again(tmp_path, messa
     assert {chunk.compression for chunk in chunks} == {compression.name.lower()}
 
 
-def test_without_the_library_it_says_so(tmp_path, messages, monkeypatch):
+def test_recovery_without_zstandard_names_the_missing_package(tmp_path, messages, monkeypatch):
     file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.ZSTD)
     monkeypatch.setitem(sys.modules, 'zstandard', None)
     recovery = recover_bag(file)
@@ -137,7 +137,7 @@ def forged(file: Path, data: bytes, size: int, compression: str = 'zstd') -> Pat
     ],
 )
 @pytest.mark.parametrize('open_end', [False, True])
-def test_a_bomb_does_not_go_off(tmp_path, size, reason, open_end):
+def test_compression_bomb_takes_bounded_memory(tmp_path, size, reason, open_end):
     unpacked = zstandard.ZstdCompressor(write_content_size=not open_end)
     bomb = unpacked.compress(bytes(2**29))
     assert len(bomb) < 50_000
@@ -155,7 +155,7 @@ def test_a_bomb_does_not_go_off(tmp_path, size, reason, open_end):
     assert recovery.attachments == ('note',)
 
 
-def test_a_chunk_without_a_checksum_is_taken_if_it_parses_to_its_end(tmp_path, messages):
+def test_chunk_without_a_checksum_is_kept_if_it_parses(tmp_path, messages):
     options = {'compression': CompressionType.NONE}
     file = written(tmp_path / 'a.mcap', messages, **options)
     content = bytearray(file.read_bytes())
@@ -175,7 +175,7 @@ def test_a_chunk_without_a_checksum_is_taken_if_it_parses_to_its_end(tmp_path, m
     assert all(data in rest for data in saved)
 
 
-def test_one_chunk_without_a_checksum_among_others_is_not_believed(tmp_path, messages):
+def test_chunk_without_a_checksum_among_others_is_damage(tmp_path, messages):
     file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.NONE)
     content = bytearray(file.read_bytes())
     start, _ = chunks_of(content)[1]
@@ -186,9 +186,7 @@ def test_one_chunk_without_a_checksum_among_others_is_not_believed(tmp_path, mes
     assert any('checksum' in loss.reason for _, loss in recover_bag(file).losses)
 
 
-def test_messages_outside_of_chunks_are_taken_up_to_the_damage_and_called_unchecked(
-    tmp_path, messages
-):
+def test_messages_outside_of_chunks_are_recovered_as_unchecked(tmp_path, messages):
     options = {'use_chunking': False, 'compression': CompressionType.NONE}
     file = written(tmp_path / 'a.mcap', messages, **options)
     content = file.read_bytes()
@@ -204,7 +202,7 @@ def test_messages_outside_of_chunks_are_taken_up_to_the_damage_and_called_unchec
     assert 'without a checksum' in recovery.remarks[0]
 
 
-def test_one_checksum_over_all_data_is_held_against_them(tmp_path, messages):
+def test_checksum_of_all_data_is_verified(tmp_path, messages):
     options = {'use_chunking': False, 'enable_data_crcs': True}
     file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.NONE, **options)
     recovery = recover_bag(file, tmp_path / 'whole')
@@ -234,12 +232,12 @@ class TestSplit:
             )
         return folder
 
-    def test_files_become_one_in_their_order(self, split, messages):
+    def test_recovery_merges_split_files_in_order(self, split, messages):
         recovery = recover_bag(split)
         assert recovery.is_whole
         assert data_of(recovery.folder) == [m.data for m in messages[:90]]
 
-    def test_an_empty_file_and_one_that_is_cut(self, split, messages):
+    def test_recovery_reports_an_empty_and_a_truncated_file(self, split, messages):
         (split / 'split_2.mcap').write_bytes(b'')
         content = (split / 'split_1.mcap').read_bytes()
         start, _ = chunks_of(content)[-1]
@@ -250,7 +248,7 @@ class TestSplit:
         assert saved == [m.data for m in messages[: len(saved)]]
         assert {file for file, _ in recovery.losses} == {'split_1.mcap', 'split_2.mcap'}
 
-    def test_a_file_that_is_named_and_missing_is_a_loss(self, split, messages):
+    def test_missing_file_of_a_bag_is_a_loss(self, split, messages):
         named = {'relative_file_paths': ['split_0.mcap', 'split_1.mcap', 'split_7.mcap']}
         text = yaml.safe_dump({'rosbag2_bagfile_information': named})
         (split / 'metadata.yaml').write_text(text)
@@ -262,7 +260,7 @@ class TestSplit:
 
 
 @pytest.mark.parametrize('index', [True, False])
-def test_a_bag_within_a_damaged_attachment_stays_in_it(tmp_path, topics, messages, index):
+def test_bag_within_a_damaged_attachment_is_not_salvaged(tmp_path, topics, messages, index):
     inner = written(tmp_path / 'inner.mcap', messages, compression=CompressionType.NONE)
     attached = {'inner.mcap': ('application/octet-stream', inner.read_bytes())}
     writer = BagWriter(tmp_path / 'run', topics, attached)

@@ -126,7 +126,7 @@ def test_ticks_beyond_limits_replay_to_the_same_bytes(tmp_path, beyond, effects)
 
 
 @pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])
-def test_a_bag_in_several_files_replays_as_one(tmp_path, compression):
+def test_bag_in_several_files_replays_as_one(tmp_path, compression):
     storage = Storage(split_seconds=0.3, compression=compression)
     run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n', storage=storage)
     for k in range(2000):
@@ -160,7 +160,7 @@ def test_another_scene_replays_to_other_bytes(tmp_path):
     assert again.tick.message != again.recorded
 
 
-def test_motions_replay_beside_their_joint_states_also_where_time_jumps_back(tmp_path):
+def test_motions_replay_beside_joint_states_across_clock_jumps(tmp_path):
     run = Run(tmp_path / 'bag', 'effects: {acceleration: {}}\n', WITH_MOTION)
     for begin in (5 * SECOND, 2 * SECOND):
         for k in range(300):
@@ -180,7 +180,7 @@ DROPS = ['', 'motion', 'joint state', '', 'joint state', 'motion', 'motion', '']
 
 # Three samples of one stamp, and one for each tick; then a sample for every tenth tick only.
 @pytest.mark.parametrize(('ticks_at_first', 'per_sample'), [(3, 1), (1, 10)])
-def test_what_the_recorder_had_to_drop_shifts_nothing(tmp_path, ticks_at_first, per_sample):
+def test_dropped_messages_shift_no_replayed_ticks(tmp_path, ticks_at_first, per_sample):
     run = Run(tmp_path / 'bag', 'rate: 0\neffects: {acceleration: {}}\n', WITH_MOTION)
     drops = 4 * DROPS
     for k, drop in enumerate(drops):
@@ -198,7 +198,7 @@ def test_what_the_recorder_had_to_drop_shifts_nothing(tmp_path, ticks_at_first, 
         assert each.recorded_extras in ((b'',), each.tick.extras)
 
 
-def test_crank_and_joint_states_on_one_topic_are_told_apart(tmp_path):
+def test_crank_and_joint_states_share_one_replayed_topic(tmp_path):
     # As where joint_state_broadcaster feeds the node, and the node publishes beside it.
     run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n', SHARED)
     for k in range(200):
@@ -210,7 +210,7 @@ def test_crank_and_joint_states_on_one_topic_are_told_apart(tmp_path):
 
 
 @pytest.mark.parametrize('missing', ['scene.yaml', 'linkage.yaml', RUN_FILE])
-def test_a_bag_that_does_not_say_what_ran_is_refused(tmp_path, missing):
+def test_bag_without_scene_or_run_json_is_refused(tmp_path, missing):
     attached = {name: data for name, data in files('').items() if name != missing}
     BagWriter(tmp_path / 'bag', [], attached).close()
     with pytest.raises(BagError, match=missing):
@@ -218,7 +218,7 @@ def test_a_bag_that_does_not_say_what_ran_is_refused(tmp_path, missing):
 
 
 @pytest.mark.parametrize('damaged', [b'{"scene": 3', b'{"scene": 3}', b'[]', b'"scene"', b'\xff'])
-def test_a_damaged_account_of_the_run_is_refused(tmp_path, damaged):
+def test_damaged_run_json_is_refused(tmp_path, damaged):
     attached = {**files(''), RUN_FILE: ('application/json', damaged)}
     BagWriter(tmp_path / 'bag', [], attached).close()
     with pytest.raises(BagError, match='damaged'):
@@ -249,7 +249,7 @@ def functions_of_this_machine() -> str:
 
 @pytest.mark.skipif(functions_of_this_machine() != RECORDED_BY, reason='another C library')
 @pytest.mark.parametrize('name', sorted(path.stem for path in FOLDER.glob('*.mcap')))
-def test_an_old_bag_replays_to_the_same_bytes(name):
+def test_bag_of_an_earlier_version_replays_to_same_bytes(name):
     done = linkage(FOLDER, 'replay', f'{name}.mcap')
     assert done.returncode == 0, done.stdout + done.stderr
     (row,) = [

@@ -53,7 +53,7 @@ PLACES = [0, 1, MIB - 40, *range(MIB - 10, MIB + 3), 2 * MIB - 9, 2 * MIB, 3 * M
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', RECORDS)
 @pytest.mark.parametrize('start', [0, 7])
-def test_a_whole_record_is_found_wherever_it_lies(kind, start):
+def test_salvage_finds_a_whole_record_at_any_offset(kind, start):
     record = RECORDS[kind]()
     for place in PLACES:
         for after in (0, 100):
@@ -62,7 +62,7 @@ def test_a_whole_record_is_found_wherever_it_lies(kind, start):
 
 
 @pytest.mark.parametrize('kind', RECORDS)
-def test_a_record_with_a_changed_bit_is_not_taken(kind):
+def test_salvage_refuses_a_record_with_a_changed_bit(kind):
     record = bytearray(RECORDS[kind]())
     # No checksum covers the times of a chunk, the first 16 bytes behind its head.
     for at in set(range(len(record))) - set(range(9, 25) if kind == 'chunk' else ()):
@@ -90,7 +90,7 @@ class BadBlocks(io.BytesIO):
 @pytest.mark.parametrize('kind', RECORDS)
 @pytest.mark.parametrize('bad', [{1}, {2, 4}, {5, 6, 7}])
 @pytest.mark.parametrize('start', [0, 7])
-def test_around_bad_blocks_what_can_be_read_is_found(kind, bad, start):
+def test_salvage_finds_records_around_bad_disk_blocks(kind, bad, start):
     record = RECORDS[kind]()
     for block in range(10):
         for offset in (start, 100, BLOCK - len(record)):

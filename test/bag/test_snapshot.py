@@ -81,7 +81,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('case', TIMELINES)
-def test_what_is_too_old_goes(case):
+def test_memory_discards_messages_older_than_its_span(case):
     offers, gone = TIMELINES[case]
     assert kept_of(offers, 10.0) == offers[gone:]
 
@@ -92,7 +92,7 @@ def test_what_is_too_old_goes(case):
     ),
     strategies.integers(0, 1000),
 )
-def test_by_one_clock_the_last_seconds_are_kept_and_nothing_else(steps, hundredths):
+def test_memory_keeps_exactly_the_last_seconds(steps, hundredths):
     span = hundredths * 10_000_000
     times = accumulate(step * 10_000_000 for _, step in steps)
     offers = [(topic, 0) for topic in range(3)]
@@ -107,7 +107,7 @@ def test_by_one_clock_the_last_seconds_are_kept_and_nothing_else(steps, hundredt
     assert found == [(topic, time) for topic, time in offers if newest - time <= span]
 
 
-def test_where_room_is_scarce_the_oldest_ticks_go_as_a_whole():
+def test_memory_at_its_size_limit_discards_oldest_ticks():
     last = LastSeconds(2, 1000 * NS, 1_000_000)
     for tick in range(20_000):
         for topic in (0, 1):
@@ -126,7 +126,7 @@ def test_where_room_is_scarce_the_oldest_ticks_go_as_a_whole():
     assert messages[-1][1] == 19_999 * NS // 1000
 
 
-def test_what_was_taken_stays_as_it_was_while_the_memory_goes_on():
+def test_taken_content_stays_unchanged_while_the_memory_records():
     last = LastSeconds(1, NS, PLENTY)
     for index in range(1000):
         last.add(0, index * 1_000_000, index, b'before')
@@ -161,7 +161,7 @@ def closes(counts):
     )
 
 
-def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
+def test_snapshot_holds_every_message_offered_before(memory, messages):
     memory = memory()
     for message in messages[:5000]:
         memory.offer(*message)
@@ -171,7 +171,7 @@ def test_all_that_was_offered_before_is_in_a_snapshot(memory, messages):
     assert [(c.received, c.recorded) for c in memory.stop()] == [(2500, 2500), (2500, 2500)]
 
 
-def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
+def test_snapshot_after_discarding_is_marked_incomplete(memory, messages):
     memory = memory(1.0)
     for message in messages:
         memory.offer(*message)
@@ -187,7 +187,7 @@ def test_a_memory_that_has_let_go_is_not_whole(memory, messages):
     assert kept.seconds <= 1.0
 
 
-def test_threads_that_offer_at_once_lose_no_count(memory, messages):
+def test_concurrent_offers_to_the_memory_lose_no_count(memory, messages):
     memory = memory(0.5)
     start = threading.Barrier(4)
 
@@ -211,7 +211,7 @@ def test_threads_that_offer_at_once_lose_no_count(memory, messages):
     assert tuple(c.recorded for c in counts) == kept.counts
 
 
-def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
+def test_memory_drops_messages_of_impossible_times_alone(memory, messages):
     memory = memory()
     impossible = [messages[2]._replace(log_time=-1), messages[3]._replace(publish_time=2**63)]
     for message in [*messages[:2], *impossible, *messages[4:6]]:
@@ -222,7 +222,7 @@ def test_what_no_bag_can_hold_is_dropped_alone(memory, messages):
     assert [(c.received, c.recorded, c.dropped) for c in memory.stop()] == [(3, 2, 1), (3, 2, 1)]
 
 
-def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memory, messages):
+def test_overloaded_memory_drops_and_counts_messages(memory, messages):
     memory = memory(capacity=100)
     with memory._lock:  # as if the machine had no time for it
         for message in messages[:1000]:
@@ -234,9 +234,7 @@ def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memo
     assert 100 <= sum(c.recorded for c in counts) <= 150
 
 
-def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
-    memory, messages, monkeypatch
-):
+def test_unexpected_exception_ends_the_memory_with_a_failure(memory, messages, monkeypatch):
     def broken(*message):
         raise ZeroDivisionError('a slip')
 
@@ -256,7 +254,7 @@ def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
     ]
 
 
-def test_after_the_end_nothing_is_kept(memory, messages):
+def test_stopped_memory_keeps_no_further_message(memory, messages):
     memory = memory()
     memory.offer(*messages[0])
     assert [c.recorded for c in memory.stop()] == [1, 0]
@@ -284,7 +282,7 @@ def said_in(folder):
     return [json.loads(custom[f'linkage_ros.{word}']) for word in ('received', 'dropped')]
 
 
-def test_two_snapshots_are_two_bags_that_overlap(tmp_path, topics, messages, memory, readers):
+def test_two_snapshots_are_two_overlapping_bags(tmp_path, topics, messages, memory, readers):
     memory = memory(3.0)
     for index, (begin, end) in enumerate(((0, 8000), (8000, 12_000))):
         for message in messages[begin:end]:
@@ -306,7 +304,7 @@ def test_two_snapshots_are_two_bags_that_overlap(tmp_path, topics, messages, mem
         assert list(dropped.values()) == [0, 0]
 
 
-def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
+def test_full_disk_truncates_the_snapshot_and_keeps_the_memory(
     small_disk, topics, messages, memory, readers
 ):
     memory = memory()
@@ -336,7 +334,7 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     assert list(memory.take_content().messages()) == list(kept.messages())
 
 
-def test_a_folder_that_cannot_be_made(tmp_path, topics, messages, memory):
+def test_snapshot_into_an_impossible_folder_fails_alone(tmp_path, topics, messages, memory):
     memory = memory()
     memory.offer(*messages[0])
     (tmp_path / 'file').write_text('')
@@ -363,7 +361,7 @@ def stalled(folder, topics):
     return writer
 
 
-def test_a_disk_that_stalls_stalls_nobody(tmp_path, topics, messages, memory, readers):
+def test_stalled_disk_does_not_block_the_memory(tmp_path, topics, messages, memory, readers):
     memory = memory()
     for message in messages[:6000]:
         memory.offer(*message)
@@ -379,7 +377,7 @@ def test_a_disk_that_stalls_stalls_nobody(tmp_path, topics, messages, memory, re
     readers.agree(tmp_path / 'run', topics, messages[:6000])
 
 
-def test_a_disk_that_never_answers_is_given_up(tmp_path, topics, messages, memory, monkeypatch):
+def test_snapshot_gives_up_a_hanging_disk(tmp_path, topics, messages, memory, monkeypatch):
     monkeypatch.setattr('linkage_ros.bag.snapshot._PATIENCE', 0.1)
     memory = memory()
     for message in messages:  # more than a recorder is handed at once
@@ -392,9 +390,7 @@ def test_a_disk_that_never_answers_is_given_up(tmp_path, topics, messages, memor
     writer.answer.set()
 
 
-def test_a_disk_that_does_not_even_make_a_folder_is_given_up(
-    topics, messages, memory, monkeypatch
-):
+def test_snapshot_gives_up_a_hanging_folder_creation(topics, messages, memory, monkeypatch):
     monkeypatch.setattr('linkage_ros.bag.snapshot._PATIENCE', 0.05)
     memory = memory()
     memory.offer(*messages[0])
@@ -409,7 +405,7 @@ def test_a_disk_that_does_not_even_make_a_folder_is_given_up(
     answer.set()
 
 
-def test_an_error_nobody_thought_of_is_an_outcome_too(messages, memory):
+def test_unexpected_exception_is_reported_by_the_snapshot(messages, memory):
     memory = memory()
     memory.offer(*messages[0])
     outcome = written(memory.take_content(), lambda: 1 // 0)
@@ -417,7 +413,7 @@ def test_an_error_nobody_thought_of_is_an_outcome_too(messages, memory):
     assert str(outcome).endswith('please report this')
 
 
-def test_a_bag_of_times_that_go_back_is_read_in_its_order(tmp_path, topics, messages, memory):
+def test_snapshot_across_clock_jumps_is_read_in_order(tmp_path, topics, messages, memory):
     memory = memory(3.1)
     # The clock jumps back by 6 s, after 2 s and 1 s before the end.
     order = [*messages[8000:], *messages[:2000]]

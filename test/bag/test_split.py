@@ -66,7 +66,7 @@ def triples(topics, messages):
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('storage', SPLITS.values(), ids=SPLITS)
-def test_every_reader_finds_every_message_in_the_folder_and_in_the_files(
+def test_every_reader_finds_all_messages_of_split_bags(
     tmp_path, topics, messages, readers, storage
 ):
     summary = record(tmp_path / 'run', topics, messages, storage)
@@ -96,7 +96,7 @@ def test_every_reader_finds_every_message_in_the_folder_and_in_the_files(
 
 
 @pytest.mark.parametrize('storage', SPLITS.values(), ids=SPLITS)
-def test_the_metadata_says_what_is_in_which_file(tmp_path, topics, messages, readers, storage):
+def test_metadata_list_the_content_of_each_file(tmp_path, topics, messages, readers, storage):
     record(tmp_path / 'run', topics, messages, storage)
     said = information(tmp_path / 'run')
     assert said['relative_file_paths'] == [each['path'] for each in said['files']]
@@ -118,7 +118,7 @@ def test_the_metadata_says_what_is_in_which_file(tmp_path, topics, messages, rea
     assert yaml.safe_load(last.metadata['serialized_metadata']) == said
 
 
-def test_a_size_is_kept_to_a_chunk_and_the_index(tmp_path, topics, messages):
+def test_split_files_keep_the_size_limit_plus_a_chunk(tmp_path, topics, messages):
     summary = record(tmp_path / 'run', topics, messages, Storage(split_bytes=300_000))
     *full, last = summary.parts
     assert all(300_000 <= part.size < 300_000 + 70_000 + 40_000 for part in full)
@@ -128,7 +128,7 @@ def test_a_size_is_kept_to_a_chunk_and_the_index(tmp_path, topics, messages):
     assert summary.size == sum(part.size for part in summary.parts)
 
 
-def test_a_size_below_that_of_an_empty_file_makes_a_file_of_each_chunk(tmp_path, topics, messages):
+def test_size_limit_of_1_byte_splits_at_every_chunk(tmp_path, topics, messages):
     summary = record(tmp_path / 'run', topics, messages[:2000], Storage(split_bytes=1))
     assert len(summary.parts) > 3
     for part in summary.parts:
@@ -147,7 +147,7 @@ def test_a_size_below_that_of_an_empty_file_makes_a_file_of_each_chunk(tmp_path,
         ([100, 100.5, 3, 3.5, 4], [[100, 100.5], [3, 3.5], [4]]),
     ],
 )
-def test_a_file_is_as_long_as_its_log_times_say(tmp_path, topics, readers, times, files):
+def test_split_by_seconds_follows_the_log_times(tmp_path, topics, readers, times, files):
     messages = [
         Written(0, START + round(t * SECOND), START, b'\0\1\0\0' + b'%f' % t) for t in times
     ]
@@ -159,7 +159,7 @@ def test_a_file_is_as_long_as_its_log_times_say(tmp_path, topics, readers, times
     assert found == files
 
 
-def test_each_topic_numbers_its_messages_through_all_files(tmp_path, topics, messages):
+def test_message_numbers_of_a_topic_continue_across_files(tmp_path, topics, messages):
     summary = record(tmp_path / 'run', topics, messages, Storage(split_seconds=1.0))
     numbered = {topic.name: [] for topic in topics}
     for part in summary.parts:
@@ -170,7 +170,7 @@ def test_each_topic_numbers_its_messages_through_all_files(tmp_path, topics, mes
 
 
 @pytest.mark.parametrize('keep', [1, 2, 3, 100])
-def test_a_ring_keeps_the_last_files_and_counts_what_it_discarded(
+def test_ring_keeps_the_last_files_and_counts_discarded_messages(
     tmp_path, topics, messages, readers, keep
 ):
     storage = Storage(split_seconds=1.0, keep_files=keep)
@@ -206,7 +206,7 @@ def account_of(file):
     return {word: json.loads(text) for word, text in found.get(STATS_RECORD, {}).items()}
 
 
-def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):
+def test_last_file_holds_counts_that_add_up(tmp_path, topics, messages):
     storage = Storage(split_seconds=1.0, keep_files=2)
     recorder = Recorder(BagWriter(tmp_path / 'run', topics, ATTACHMENTS, storage), capacity=10**6)
     for index, message in enumerate(messages):
@@ -227,7 +227,7 @@ def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):
 
 
 @pytest.mark.parametrize('compression', ['lz4', 'zstd'])
-def test_a_missing_library_is_said_before_anything_is_made(
+def test_missing_compression_library_is_reported_before_recording(
     tmp_path, topics, monkeypatch, compression
 ):
     def missing(*_, **__):
@@ -241,7 +241,7 @@ def test_a_missing_library_is_said_before_anything_is_made(
 
 
 @pytest.mark.parametrize('compression', ['lz4', 'zstd'])
-def test_packed_chunks_are_smaller_and_checked(tmp_path, topics, messages, compression):
+def test_packed_chunks_are_smaller_and_have_checksums(tmp_path, topics, messages, compression):
     plain = record(tmp_path / 'plain', topics, messages, Storage())
     packed = record(tmp_path / 'packed', topics, messages, Storage(compression=compression))
     assert packed.size < 0.7 * plain.size
@@ -298,7 +298,7 @@ for deadline in range(1, 10**6):
 
 
 @pytest.mark.sample(0)
-def test_a_kill_at_any_step_leaves_all_that_was_flushed(tmp_path, topics, messages):
+def test_kill_at_any_step_keeps_flushed_messages(tmp_path, topics, messages):
     storage = Storage(split_seconds=0.08, keep_files=3)
     messages = [tuple(message) for message in messages[:1000]]
     (tmp_path / 'pickled').write_bytes(pickle.dumps((topics, messages, storage)))

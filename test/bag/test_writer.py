@@ -49,11 +49,11 @@ def bag(tmp_path, topics, messages):
     return writer.close({'seed': '7'})
 
 
-def test_both_readers_find_every_message(bag, topics, messages, readers):
+def test_mcap_and_rosbags_read_every_message(bag, topics, messages, readers):
     readers.agree(bag.folder, topics, messages)
 
 
-def test_the_joint_states_deserialize_by_the_type_in_the_bag(bag, readers):
+def test_recorded_joint_states_deserialize_by_the_recorded_type(bag, readers):
     found = dict.fromkeys(['/crank', '/arm/joint_states'], 0)
     for topic, message in readers.deserialized(bag.folder):
         number = int(message.header.frame_id.removeprefix('frame '))
@@ -65,18 +65,18 @@ def test_the_joint_states_deserialize_by_the_type_in_the_bag(bag, readers):
     assert found == {'/crank': 6000, '/arm/joint_states': 6000}
 
 
-def test_the_summary_says_what_is_in_the_file(bag, messages):
+def test_writer_summary_equals_the_file(bag, messages):
     times = [message.log_time for message in messages]
     assert bag.counts == (6000, 6000)
     assert (bag.start, bag.duration) == (min(times), max(times) - min(times))
     assert bag.size == (bag.folder / bag.file).stat().st_size
 
 
-def test_the_folder_holds_two_files_and_nothing_else(bag):
+def test_bag_folder_holds_metadata_and_one_mcap_file(bag):
     assert sorted(p.name for p in bag.folder.iterdir()) == ['metadata.yaml', 'run_0.mcap']
 
 
-def test_the_file_has_what_rosbag2_puts_there(bag, topics):
+def test_mcap_file_holds_the_records_of_rosbag2(bag, topics):
     with (bag.folder / bag.file).open('rb') as stream:
         reader = make_reader(stream)
         header, summary = reader.get_header(), reader.get_summary()
@@ -108,7 +108,7 @@ def test_the_file_has_what_rosbag2_puts_there(bag, topics):
     assert [r for r in records if isinstance(r, Channel)] == [*summary.channels.values()]
 
 
-def test_chunks_are_small_uncompressed_and_checked(bag):
+def test_chunks_are_small_uncompressed_and_have_checksums(bag):
     with (bag.folder / bag.file).open('rb') as stream:
         chunks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r) is Chunk]
     assert {chunk.compression for chunk in chunks} == {''}
@@ -117,13 +117,13 @@ def test_chunks_are_small_uncompressed_and_checked(bag):
 
 
 @pytest.mark.parametrize('custom', [{}, {'a': 'b'}])
-def test_a_bag_without_messages_is_a_bag(tmp_path, topics, readers, custom):
+def test_bag_without_messages_is_read(tmp_path, topics, readers, custom):
     summary = BagWriter(tmp_path / 'run', topics).close(custom)
     assert summary.counts == (0, 0)
     readers.agree(tmp_path / 'run', topics, [])
 
 
-def test_an_older_mcap_that_cannot_flush_loses_nothing(
+def test_writer_with_an_older_mcap_loses_no_message(
     tmp_path, topics, messages, readers, monkeypatch
 ):
     monkeypatch.delattr('mcap.writer.Writer.flush')
@@ -148,7 +148,7 @@ def test_an_older_mcap_that_cannot_flush_loses_nothing(
         (5, 2**64 + 5, False),
     ],
 )
-def test_a_time_that_does_not_fit_costs_that_message_only(
+def test_message_of_an_out_of_range_time_is_refused(
     tmp_path, topics, messages, readers, log_time, publish_time, taken
 ):
     writer = BagWriter(tmp_path / 'run', topics)
@@ -168,7 +168,7 @@ def _contents(folder):
     return {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()}
 
 
-def test_an_existing_bag_is_untouched(bag, topics):
+def test_writer_leaves_an_existing_bag_untouched(bag, topics):
     before = _contents(bag.folder)
     with pytest.raises(RecordingError, match='run: exists already; name a new folder'):
         BagWriter(bag.folder, topics)
@@ -176,7 +176,7 @@ def test_an_existing_bag_is_untouched(bag, topics):
 
 
 @pytest.mark.parametrize('kind', ['empty folder', 'file', 'link to nowhere'])
-def test_whatever_has_the_name_is_untouched(tmp_path, topics, kind):
+def test_writer_leaves_an_existing_path_untouched(tmp_path, topics, kind):
     path = tmp_path / 'run'
     if kind == 'empty folder':
         path.mkdir()
@@ -191,7 +191,7 @@ def test_whatever_has_the_name_is_untouched(tmp_path, topics, kind):
         assert not list(path.iterdir())
 
 
-def test_a_place_below_a_file_is_refused(tmp_path, topics):
+def test_writer_refuses_a_folder_below_a_file(tmp_path, topics):
     (tmp_path / 'file').write_text('mine')
     with pytest.raises(RecordingError, match='cannot be recorded to: Not a directory'):
         BagWriter(tmp_path / 'file' / 'run', topics)
@@ -199,7 +199,7 @@ def test_a_place_below_a_file_is_refused(tmp_path, topics):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
-def test_a_folder_without_permission_is_refused(tmp_path, topics):
+def test_writer_refuses_a_folder_without_permission(tmp_path, topics):
     tmp_path.chmod(0o500)
     try:
         with pytest.raises(RecordingError, match='Permission denied'):
@@ -208,13 +208,13 @@ def test_a_folder_without_permission_is_refused(tmp_path, topics):
         tmp_path.chmod(0o700)
 
 
-def test_a_read_only_disk_is_refused(small_disk, topics):
+def test_writer_refuses_a_read_only_disk(small_disk, topics):
     subprocess.run(['mount', '-o', 'remount,ro', str(small_disk)], check=True)
     with pytest.raises(RecordingError, match='Read-only file system'):
         BagWriter(small_disk / 'run', topics)
 
 
-def test_a_disk_that_is_full_from_the_start_gets_no_bag(small_disk, topics):
+def test_full_disk_at_the_start_gets_no_bag(small_disk, topics):
     (small_disk / 'other').write_bytes(bytes(1_700_000))
     with pytest.raises(RecordingError, match='No space left on device'):
         BagWriter(small_disk / 'run', topics)
@@ -249,7 +249,7 @@ def models_in(path):
     ],
     ids=['one file', 'split', 'a ring'],
 )
-def test_each_file_begins_with_it_and_the_counts_close(
+def test_each_bag_file_begins_with_the_opening_message(
     tmp_path, with_model, messages, storage, files
 ):
     writer = BagWriter(tmp_path / 'run', with_model, storage=storage, opening=[(2, MODEL)])
@@ -272,13 +272,13 @@ def test_each_file_begins_with_it_and_the_counts_close(
         assert first.log_time == first.publish_time == second.log_time
 
 
-def test_without_a_message_a_file_is_empty(tmp_path, with_model):
+def test_bag_without_messages_has_no_opening_message(tmp_path, with_model):
     recorder = Recorder(BagWriter(tmp_path / 'run', with_model, opening=[(2, MODEL)]))
     assert [(c.received, c.recorded) for c in recorder.stop().topics] == 3 * [(0, 0)]
     assert list(read_bag(tmp_path / 'run').messages()) == []
 
 
-def test_a_snapshot_begins_with_it(tmp_path, with_model, messages):
+def test_snapshot_begins_with_the_opening_message(tmp_path, with_model, messages):
     memory = SnapshotMemory(with_model, 100.0, 10**9)
     for message in messages[:1000]:
         memory.offer(*message)
@@ -295,7 +295,9 @@ def test_a_snapshot_begins_with_it(tmp_path, with_model, messages):
     assert models_in(tmp_path / 'run')[1] == 1
 
 
-def test_where_a_disk_fails_it_is_accounted_for_too(tmp_path, with_model, messages, monkeypatch):
+def test_failing_disk_counts_the_opening_message_as_dropped(
+    tmp_path, with_model, messages, monkeypatch
+):
     recorder = Recorder(
         BagWriter(tmp_path / 'run', with_model, opening=[(2, MODEL)]), flush_period=3600.0
     )

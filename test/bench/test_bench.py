@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LINKAGES = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 
 
-def test_percentiles_lie_between_neighbours():
+def test_percentiles_interpolate_between_neighbours():
     assert percentile([4.0, 1.0, 3.0, 2.0], 50.0) == 2.5
     assert percentile([1.0, 2.0], 100.0) == 2.0
     assert not isfinite(percentile([], 50.0))
@@ -33,11 +33,11 @@ def test_percentiles_lie_between_neighbours():
     assert spread([1.0, 2.0, 3.0], 0) == '2 (2–2)'
 
 
-def test_ratios_are_taken_turn_by_turn():
+def test_benchmark_ratios_are_taken_turn_by_turn():
     assert ratios([2.0, 30.0], [1.0, 10.0]) == [2.0, 3.0]
 
 
-def test_table_is_the_same_as_text_and_as_markdown():
+def test_benchmark_table_is_aligned_text_and_markdown():
     table = Table('t', ('', 'µs'), [('a', '1.0')])
     assert table_text(table.aligned()) == 't\n    µs\na  1.0'
     assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
@@ -79,7 +79,7 @@ def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
-def test_a_hundred_linkages_are_measured(tmp_path):
+def test_benchmark_measures_100_linkages_in_one_node(tmp_path):
     cells = _row(_bench(tmp_path, '--only', 'many'), '100 four-bars in one node, 1 kHz')
     assert _measured(cells[1:4])
 
@@ -88,7 +88,7 @@ def test_a_hundred_linkages_are_measured(tmp_path):
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
-def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tmp_path):
+def test_real_time_benchmark_measures_priority_and_cpu_affinity(tmp_path):
     kept = _bench(tmp_path, '--only', 'real_time')
     for more in ('', ' + thread_priority', ' + thread_priority + cpu_affinity'):
         cells = _row(kept, f'linkage_node{more}, 1 kHz')
@@ -99,7 +99,7 @@ def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tm
 @pytest.mark.ros
 @pytest.mark.alone
 @pytest.mark.timeout(90)
-def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_messages(tmp_path):
+def test_subscriber_benchmark_measures_each_transport(tmp_path):
     kept = _bench(tmp_path, '--only', 'comers')
     for way in (
         'shared memory',
@@ -116,7 +116,7 @@ def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_message
 
 
 @pytest.mark.timeout(90)
-def test_the_empty_scene_is_measured_against_the_same_by_hand(tmp_path):
+def test_empty_scene_is_measured_against_handwritten_code(tmp_path):
     kept = _bench(tmp_path, '--only', 'empty')
     for name, target in (
         ('empty scene / straight line and packing', '≤ 1.5'),
@@ -129,7 +129,7 @@ def test_the_empty_scene_is_measured_against_the_same_by_hand(tmp_path):
 
 @pytest.mark.sample(0)
 @pytest.mark.timeout(90)
-def test_compiled_linkages_are_measured_beside_plain_steps_and_c_and_by_their_dyads(tmp_path):
+def test_compiled_linkages_are_measured_against_plain_steps(tmp_path):
     kept = _bench(tmp_path, '--only', 'compiled')
     for linkage in LINKAGES:
         cells = _row(kept, linkage.stem)
@@ -145,7 +145,7 @@ def test_compiled_linkages_are_measured_beside_plain_steps_and_c_and_by_their_dy
 
 @pytest.mark.sample(0)
 @pytest.mark.timeout(90)
-def test_solving_is_measured_against_straight_line_and_pylinkage(tmp_path):
+def test_solving_is_measured_against_straight_line_code(tmp_path):
     kept = _bench(tmp_path, '--only', 'kinematics')
     names = ['µs a state: four-bar / straight line', 'µs a state: Jansen leg / four-bar']
     if AVAILABLE:

@@ -98,7 +98,7 @@ def test_cases_once_above_the_limit_are_within_it(family: str) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
-def test_no_status_is_wrong(tallies: dict[str, Tally], family: str) -> None:
+def test_campaign_finds_no_wrong_status(tallies: dict[str, Tally], family: str) -> None:
     tally = tallies[family]
     assert not {name: tally.counts[name] for name in FAULTS if tally.counts[name]}, tally.notes
 
@@ -106,13 +106,13 @@ def test_no_status_is_wrong(tallies: dict[str, Tally], family: str) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
-def test_every_case_is_accounted_for(tallies: dict[str, Tally], family: str) -> None:
+def test_every_campaign_case_is_counted(tallies: dict[str, Tally], family: str) -> None:
     counts = tallies[family].counts
     assert counts['closed'] > 0.2 * counts['cases']
     assert sum(counts[name] for name in ('closed', 'open', 'at limit', *FAULTS)) == counts['cases']
 
 
-def test_the_result_does_not_depend_on_the_number_of_processes() -> None:
+def test_campaign_result_is_independent_of_the_process_count() -> None:
     work = [part for part in parts(1500, 800, SEED) if part.family in {'RRR', 'wound crank'}]
     alone, shared = run(work, jobs=1), run(work[::-1], jobs=2)
     assert alone.keys() == shared.keys()

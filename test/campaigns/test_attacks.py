@@ -40,7 +40,7 @@ def test_changed_files_cause_no_findings() -> None:
     assert any(end.endswith(': 2') for end in tried)
 
 
-def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
+def test_every_linkage_command_is_attacked_with_changed_files() -> None:
     without = {
         'demo',
         'echo',
@@ -64,7 +64,7 @@ def test_signals_end_commands() -> None:
     assert sum(tried.values()) == 6
 
 
-def test_files_are_changed_in_many_ways() -> None:
+def test_mutated_files_differ_in_many_ways() -> None:
     original = b'links: {ground: {A: [0, 0], B: [0.1, 0]}}\ninput: {joint: j}\n'
     files_ = {mutated(original, random.Random(index))[1] for index in range(300)}
     assert len(files_) > 200
@@ -118,7 +118,7 @@ def test_changed_bags_cause_no_findings() -> None:
     assert sum(tried.values()) == SAMPLE * len(BAG_COMMANDS)
 
 
-def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
+def test_equal_seeds_change_a_bag_equally(tmp_path: Path) -> None:
     made = []
     for name in ('one', 'other'):
         (tmp_path / name).mkdir()
@@ -143,12 +143,12 @@ def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
         (('no end', '', 'more than 60 s'), 'more than 60 s'),
     ],
 )
-def test_faults_are_findings(end: tuple[object, str, str], fault: str) -> None:
+def test_judge_reports_bad_ends_of_commands(end: tuple[object, str, str], fault: str) -> None:
     code, stdout, stderr = end
     finding = fault_of(Ended(code, stderr, stdout))
     assert fault in finding
     assert bool(finding) == bool(fault)
 
 
-def test_every_command_that_reads_a_bag_is_tried() -> None:
+def test_every_bag_command_is_attacked() -> None:
     assert set(BAG_COMMANDS) == {'info', 'report', 'export', 'plot'}

@@ -53,7 +53,7 @@ def test_damage_is_reported_or_harmless(tally: Tally) -> None:
 
 
 @pytest.mark.sample(0)
-def test_the_sample_has_every_usual_verdict(tally: Tally) -> None:
+def test_damage_sample_contains_every_usual_verdict(tally: Tally) -> None:
     ours = Counter[tuple[str, str, str]]()
     for (kind, *rest), count in tally.verdicts.items():
         if kind == OURS:
@@ -65,7 +65,7 @@ def test_the_sample_has_every_usual_verdict(tally: Tally) -> None:
     assert ours['flip', 'recover', 'all, nothing reported'] > SAMPLE / 50
 
 
-def test_no_single_bit_takes_all_of_a_killed_bag(tally: Tally) -> None:
+def test_single_bit_never_loses_all_of_a_killed_bag(tally: Tally) -> None:
     verdicts = {
         verdict: count
         for (kind, damage, judge, verdict), count in tally.verdicts.items()

@@ -56,7 +56,7 @@ def test_a_failing_call_loses_no_counted_message(tried: list[Tried]) -> None:
 
 
 @pytest.mark.sample(0)
-def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None:
+def test_disk_sample_covers_targets_phases_and_faults(tried: list[Tried]) -> None:
     assert len(tried) > 100
     verdicts = [one.outcome.verdict for one in tried]
     assert min(verdicts.count(verdict) for verdict in (EARLY, COMPLETE, REFUSED)) > 5
@@ -79,7 +79,7 @@ def test_the_sample_has_every_target_phase_and_fault(tried: list[Tried]) -> None
         ('ring of 3', 'the recording alone'),
     ],
 )
-def test_a_disk_that_fills_loses_no_counted_message(disk: Disk, storage: str, filler: str) -> None:
+def test_full_disk_loses_no_counted_message(disk: Disk, storage: str, filler: str) -> None:
     try:
         filled = filling.fill(disk, storage, filler, 40_000)
     except NotPermittedError as error:
@@ -100,7 +100,7 @@ def stalled(request: pytest.FixtureRequest) -> stalling.Stalled:
 
 
 @pytest.mark.ros
-def test_a_disk_that_stalls_delays_no_tick_and_loses_no_message(stalled: stalling.Stalled) -> None:
+def test_stalled_disk_delays_no_tick_and_loses_no_message(stalled: stalling.Stalled) -> None:
     assert stalled.faults == []
     assert stalled.total('received') == stalled.total('recorded') > 200
     # No tick waited for the disk.
@@ -159,6 +159,6 @@ def test_the_judge_detects_broken_bags(tmp_path: Path) -> None:
     ],
     ids=['another order', 'gaps', 'one twice', 'other bytes'],
 )
-def test_a_run_is_consecutive_and_unchanged(found: list) -> None:
+def test_run_of_messages_is_consecutive_and_unchanged(found: list) -> None:
     assert Expectation(expected_messages(20)).run_of(found) is None
     assert Expectation(expected_messages(20)).run_of(expected_messages(20)[3:9]) == range(3, 9)

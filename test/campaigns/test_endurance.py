@@ -27,7 +27,7 @@ MINUTES = 15.0 / 60.0  # h
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('scene', ['demo', 'excavator_delay', 'worn_press'])
-def test_memory_is_flat_and_messages_are_counted_over_a_quarter_of_an_hour(scene: str) -> None:
+def test_memory_stays_flat_over_15_minutes(scene: str) -> None:
     # A process of its own: memory freed by other tests would hide growth.
     [done] = run_all([Plan(scene, MINUTES / (3 if scene == 'worn_press' else 1), 100.0)], 1)
     assert done.faults == []
@@ -79,12 +79,12 @@ SERIES = {
 
 
 @pytest.mark.parametrize('name', SERIES)
-def test_flat_series_are_told_from_growing_ones(name: str) -> None:
+def test_flatness_separates_flat_from_growing_series(name: str) -> None:
     samples, flat = SERIES[name]
     assert flatness(samples).flat is flat
 
 
-def test_the_slope_is_robust_against_a_few_samples() -> None:
+def test_slope_is_robust_against_outliers() -> None:
     line = series(lambda t: 30_000 + 40 * t)
     for at in (40, 55, 90):
         line[at] = line[at]._replace(resident=90_000)

@@ -38,7 +38,7 @@ def test_a_killed_bag_begins_with_the_offered_messages(outcomes: list[Outcome]) 
     assert [outcome.faults for outcome in outcomes] == [[]] * (KILLS + AIMED)
 
 
-def test_the_sample_has_kills_in_all_phases(
+def test_kill_sample_covers_all_phases(
     outcomes: list[Outcome],
 ) -> None:
     recorded = [o for o in outcomes if Phase.MAKING < o.phase < Phase.CLOSED]
@@ -77,7 +77,7 @@ def record(folder: Path, marks: Marks, count: int, storage: Storage | None = Non
     return writer
 
 
-def test_the_loss_is_the_age_of_the_oldest_missing_message(tmp_path: Path, marks: Marks) -> None:
+def test_loss_equals_age_of_the_oldest_missing_message(tmp_path: Path, marks: Marks) -> None:
     record(tmp_path / 'bag', marks, 120)
     marks.safe = 90
     outcome = judge(PLAN, tmp_path / 'bag', marks, 1105 * MS)
@@ -99,7 +99,7 @@ def test_messages_removed_by_the_ring_are_not_lost(tmp_path: Path, marks: Marks)
     assert (outcome.faults, outcome.loss) == ([], 0)
 
 
-def test_a_bag_that_is_not_yet_made_may_be_missing(tmp_path: Path) -> None:
+def test_bag_not_yet_made_may_be_missing(tmp_path: Path) -> None:
     marks = Marks.make(tmp_path / 'marks', 1)
     marks.enter(Phase.MAKING)
     assert judge(PLAN, tmp_path / 'bag', marks, 0).verdicts == {'bag': NO_FOLDER}

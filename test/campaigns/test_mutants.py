@@ -29,7 +29,7 @@ def test_each_mutant_differs_in_one_expression_and_parses(module):
         assert mutant.cut(source)[0].count(b'\n') + 1 == mutant.line
 
 
-def test_the_tests_beside_each_module_are_there():
+def test_files_of_each_mutated_module_exist():
     assert all((ROOT / 'test' / name).exists() for tests in TESTS.values() for name in tests)
 
 
@@ -43,6 +43,6 @@ def test_the_tests_beside_each_module_are_there():
         ('def test_sum():\n    while True:\n        pass\n', ''),
     ],
 )
-def test_a_mutant_is_killed_by_the_test_that_fails_within_its_time(tmp_path, text, killer):
+def test_mutant_is_killed_by_a_failing_test(tmp_path, text, killer):
     (tmp_path / 'test_sum.py').write_text(text)
     assert first_failure(tmp_path, ['test_sum.py'], longest=2) == killer

@@ -13,7 +13,7 @@ from subprocess import PIPE, run
 import sys
 
 
-def test_a_reader_that_leaves_ends_a_campaign_without_a_traceback():
+def test_closed_output_ends_a_campaign_without_a_traceback():
     reader, writer = os.pipe()
     os.close(reader)
     command = [sys.executable, '-m', 'campaigns.space', '--cases', '10', '--only', 'RSSR']

@@ -60,7 +60,7 @@ def notes_of(tally: Tally, family: str, test: str) -> str:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_the_kinematics_have_no_findings(
+def test_random_topologies_have_no_findings(
     tallies: dict[str, dict[str, Tally]], family: str
 ) -> None:
     tally = tallies[KINEMATICS][family]
@@ -81,7 +81,7 @@ def test_commands_succeed_or_refuse_in_one_line(
     assert sum(tally.counts['linkages'] for tally in tallies[test].values()) == WANTED[test]
 
 
-def test_the_result_does_not_depend_on_the_number_of_processes() -> None:
+def test_topology_result_is_independent_of_the_process_count() -> None:
     work = parts(
         SEED,
         {KINEMATICS: sample_count(6, 2), CHECK: sample_count(4, 1)},
@@ -106,14 +106,14 @@ def judged(topology: Topology, linkage: Any = None, closure: Any = None) -> Find
     return findings
 
 
-def test_another_assembly_is_found() -> None:
+def test_judge_detects_another_assembly() -> None:
     topology = topology_of('RRR input–ground')
     ((pin, side),) = topology.linkage.assembly.items()
     other = replace(topology.linkage, assembly={pin: 'right' if side == 'left' else 'left'})
     assert judged(topology, other).counts['wrong assembly']
 
 
-def test_a_linkage_that_is_not_quite_the_same_is_found() -> None:
+def test_judge_detects_a_slightly_changed_linkage() -> None:
     topology = topology_of('RRR input–ground')
     links = {name: dict(points) for name, points in topology.linkage.links.items()}
     link = next(name for name in links if name.startswith('link'))
@@ -140,7 +140,7 @@ def has_limits(topology: Topology) -> bool:
     return closure is not None and turning and not closure.input_ranges[0].is_whole
 
 
-def test_wrong_ranges_and_singular_inputs_are_found() -> None:
+def test_judge_detects_wrong_ranges_and_singular_inputs() -> None:
     topology = topology_of('RRR input–ground', has_limits)
     closure = Closure(topology.linkage)
     (low, high, *_), *_ = closure.input_ranges
@@ -161,7 +161,7 @@ def test_wrong_ranges_and_singular_inputs_are_found() -> None:
     assert not findings.notes
 
 
-def test_gaps_and_statuses_are_compared() -> None:
+def test_judge_detects_wrong_gaps_and_statuses() -> None:
     topology = topology_of('RRR input–ground', has_limits)
     closure = Closure(topology.linkage)
 
@@ -175,7 +175,7 @@ def test_gaps_and_statuses_are_compared() -> None:
 
 
 @pytest.mark.parametrize('family', ['chain of 3', 'cylinder and crank', 'class III two inputs'])
-def test_the_equations_agree_with_their_own_differences(family: str) -> None:
+def test_constraint_equations_agree_with_their_differences(family: str) -> None:
     topology = topology_of(family)
     equations = Equations(topology.linkage)
     start, begin = start_of(topology, equations)
@@ -207,6 +207,6 @@ def test_the_equations_agree_with_their_own_differences(family: str) -> None:
     )
 
 
-def test_every_linkage_can_be_made_again() -> None:
+def test_equal_seeds_make_equal_linkages() -> None:
     for family in FAMILIES:
         assert make(SEED, family, 3)[0] == make(SEED, family, 3)[0]

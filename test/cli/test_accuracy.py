@@ -47,7 +47,7 @@ def by_hand(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return asked
 
 
-def test_a_real_scene_is_answered_in_the_first_lines(capsys: Any) -> None:
+def test_accuracy_prints_its_answer_in_the_first_lines(capsys: Any) -> None:
     file = 'slider_crank'
     assert run(file, '--quick', '--only', 'errors', '--horizon', '0.5', '--need', '1e-4') in (0, 1)
     answer, off, write, *table = capsys.readouterr().out.splitlines()
@@ -57,7 +57,7 @@ def test_a_real_scene_is_answered_in_the_first_lines(capsys: Any) -> None:
     assert any(line.startswith('solving (closed form)') for line in table)
 
 
-def test_effects_alone_are_what_linkage_cost_was(capsys: Any) -> None:
+def test_only_effects_lists_every_effect_of_the_scene(capsys: Any) -> None:
     assert run('worn_press', '--quick', '--only', 'effects', '--horizon', '0.2') == 0
     said = capsys.readouterr().out
     assert said.startswith('on purpose: ')
@@ -66,7 +66,7 @@ def test_effects_alone_are_what_linkage_cost_was(capsys: Any) -> None:
     assert 'the whole tick' in said
 
 
-def test_the_answer_comes_first(by_hand: Any, capsys: Any) -> None:
+def test_accuracy_prints_the_answer_for_the_need_first(by_hand: Any, capsys: Any) -> None:
     assert run('demo', '--like', 'sine', '--need', '5e-3', '--horizon', '3') == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith('for 5e-3 rad: drive.torque.')
@@ -75,12 +75,12 @@ def test_the_answer_comes_first(by_hand: Any, capsys: Any) -> None:
     assert [*by_hand['parts']] == [*PARTS]
 
 
-def test_a_need_that_nothing_meets_is_an_exit_code(by_hand: Any, capsys: Any) -> None:
+def test_unreachable_need_exits_with_code_1(by_hand: Any, capsys: Any) -> None:
     assert run('demo', '--need', '1e-12') == 1
     assert 'prevents it' in capsys.readouterr().out.splitlines()[0]
 
 
-def test_the_tuned_scene_has_the_lines_of_the_answer(
+def test_tuned_scene_holds_the_settings_of_the_answer(
     by_hand: Any, tmp_path: Path, capsys: Any
 ) -> None:
     file = tmp_path / 'tuned.yaml'
@@ -97,14 +97,14 @@ def test_the_tuned_scene_has_the_lines_of_the_answer(
     assert tuned.linkages[0].effects == own.linkages[0].effects
 
 
-def test_a_page_and_a_picture_are_written(by_hand: Any, tmp_path: Path) -> None:
+def test_accuracy_writes_a_page_and_a_picture(by_hand: Any, tmp_path: Path) -> None:
     page, picture = tmp_path / 'x.html', tmp_path / 'x.svg'
     assert run('demo', '--page', str(page), '--picture', str(picture)) == 0
     assert page.read_text('utf-8').startswith('<!doctype html>')
     assert picture.read_text('utf-8').startswith('<svg')
 
 
-def test_it_can_be_stopped_and_leaves_nothing(
+def test_stopped_accuracy_command_writes_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -114,7 +114,7 @@ def test_it_can_be_stopped_and_leaves_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_bag_has_its_own_motion_and_rates(tmp_path: Path, capsys: Any) -> None:
+def test_accuracy_uses_motion_and_rate_of_a_bag(tmp_path: Path, capsys: Any) -> None:
     source = scene_file(tmp_path, 'rate: 100\n')
     Recorded(tmp_path / 'bag', source, lambda tick: {'crank_joint': (0.06 * tick, 6.0)}).run(200)
     bag = str(tmp_path / 'bag')

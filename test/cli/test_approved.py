@@ -95,7 +95,7 @@ def _play_session(text: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize('session', SESSIONS, ids=lambda file: file.stem)
-def test_a_session_goes_as_approved(session: Path, tmp_path: Path) -> None:
+def test_terminal_session_prints_the_approved_text(session: Path, tmp_path: Path) -> None:
     approved = session.read_text('utf-8')
     now = _play_session(approved, tmp_path)
     if os.environ.get('LINKAGE_APPROVE'):

@@ -27,12 +27,12 @@ import pytest
         ('runs/v1.5', 'runs/v1.5.png'),
     ],
 )
-def test_a_bag_by_its_name(named: str, file: str) -> None:
+def test_output_file_lies_beside_the_named_bag(named: str, file: str) -> None:
     assert path_beside(Path(named), '.png') == Path(file)
 
 
 @pytest.mark.parametrize(('here', 'file'), [('.', 'runs/first.png'), ('..', 'runs.png')])
-def test_a_folder_without_a_name(
+def test_output_file_takes_the_name_of_the_current_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: str, file: str
 ) -> None:
     folder = tmp_path / 'runs' / 'first'
@@ -41,7 +41,7 @@ def test_a_folder_without_a_name(
     assert path_beside(Path(here), '.png') == tmp_path / file
 
 
-def test_attachments_that_are_not_read_are_told_in_a_line(
+def test_warning_names_attachments_beyond_64_mib(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = {'note': ('', b'a'), 'huge\n': ('', bytes(64 * 2**20)), 'scene.yaml': ('', b'b: 1')}
@@ -53,7 +53,7 @@ def test_attachments_that_are_not_read_are_told_in_a_line(
     )
 
 
-def test_of_a_bag_that_is_read_as_a_whole_nothing_is_told(
+def test_bag_with_small_attachments_prints_no_warning(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     BagWriter(tmp_path / 'bag', [], {'note': ('', b'a')}).close()

@@ -38,7 +38,7 @@ def run(folder: Path, *words: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_no_bag_names_the_folder_of_its_user_and_each_replays_elsewhere(folder, tmp_path):
+def test_bags_name_no_folder_and_replay_after_a_move(folder, tmp_path):
     run(folder, 'simulate', str(folder / 'scenes/source.yaml'), '--seconds', '1', '-o', 'source')
     scene = str(folder / 'scenes/played.yaml')
     run(folder, 'simulate', scene, '--seconds', '0.5', '-o', 'played')

@@ -86,13 +86,13 @@ def channels(file: Path, number: int, qos: str, **options: Any) -> None:
     [BOMB, f'- {BOMB}', '- ' + 'x' * 4_000_000, f'- {"[" * 50_000}', '- depth: ' + ':59' * 50_000],
     ids=['aliases', 'a list of aliases', 'four megabytes', 'brackets', 'sixties'],
 )
-def test_a_qos_that_is_none_is_not_understood(tmp_path: Path, qos: str) -> None:
+def test_malformed_qos_is_counted_as_not_understood(tmp_path: Path, qos: str) -> None:
     channels(tmp_path / 'a.mcap', 1, qos)
     (topic,) = facts(tmp_path, 'a.mcap')['topics']
     assert (topic['messages'], topic['qos_understood']) == (1, False)
 
 
-def test_a_qos_of_hundreds_of_publishers_is_that_of_the_first(tmp_path: Path) -> None:
+def test_qos_of_many_publishers_equals_that_of_the_first(tmp_path: Path) -> None:
     one = (
         '- history: 1\n  depth: 7\n  reliability: 2\n  durability: 2\n'
         + ''.join(
@@ -107,7 +107,7 @@ def test_a_qos_of_hundreds_of_publishers_is_that_of_the_first(tmp_path: Path) ->
     assert (topic.qos.depth, topic.qos.reliability) == (7, 'best_effort')
 
 
-def test_channels_without_end_are_told_in_a_line(tmp_path: Path) -> None:
+def test_bag_of_65535_channels_is_refused_in_one_line(tmp_path: Path) -> None:
     channels(tmp_path / 'a.mcap', 65_535, '')
     for command in ('info', 'report', 'plot', 'replay'):
         ended = told(tmp_path, command, 'a.mcap')
@@ -131,7 +131,7 @@ METADATA = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', METADATA)
-def test_metadata_that_are_none_are_told_in_a_line(tmp_path: Path, name: str) -> None:
+def test_malformed_metadata_yaml_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
     text, reason = METADATA[name]
     (tmp_path / 'a').mkdir()
     channels(tmp_path / 'a' / 'a.mcap', 1, '')
@@ -143,7 +143,7 @@ def test_metadata_that_are_none_are_told_in_a_line(tmp_path: Path, name: str) ->
     )
 
 
-def test_metadata_within_the_file_are_passed_over(tmp_path: Path) -> None:
+def test_oversized_metadata_within_the_mcap_file_are_ignored(tmp_path: Path) -> None:
     with (tmp_path / 'a.mcap').open('wb') as stream:
         writer = Writer(stream)
         writer.start('ros2')
@@ -156,7 +156,7 @@ def test_metadata_within_the_file_are_passed_over(tmp_path: Path) -> None:
     assert len(account['topics']) == 1
 
 
-def test_what_is_counted_is_what_is_there(tmp_path: Path) -> None:
+def test_info_counts_messages_of_the_file_not_of_metadata(tmp_path: Path) -> None:
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n', 60)
     file = bag / METADATA_FILE
     before = facts(tmp_path, 'bag')['messages']
@@ -180,7 +180,7 @@ def packed(file: Path, chunks: int) -> None:
         writer.finish()
 
 
-def test_fifty_gigabytes_in_two_megabytes_are_not_unpacked(tmp_path: Path) -> None:
+def test_info_refuses_to_unpack_a_compression_bomb(tmp_path: Path) -> None:
     packed(tmp_path / 'a.mcap', 200)
     assert (tmp_path / 'a.mcap').stat().st_size < 6_000_000
     account = facts(tmp_path, 'a.mcap')
@@ -189,7 +189,7 @@ def test_fifty_gigabytes_in_two_megabytes_are_not_unpacked(tmp_path: Path) -> No
     assert sum(each['content_bytes'] for each in account['compressions']) > 50 * 10**9
 
 
-def test_an_index_that_names_a_chunk_again_and_again_is_damaged(tmp_path: Path) -> None:
+def test_index_that_repeats_a_chunk_is_damage(tmp_path: Path) -> None:
     channels(tmp_path / 'a.mcap', 1, '')
     content = (tmp_path / 'a.mcap').read_bytes()
     footer = len(content) - 37
@@ -216,7 +216,7 @@ SCENES = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
-def test_a_scene_without_end_is_told_in_a_line(tmp_path: Path, name: str) -> None:
+def test_oversized_scene_is_refused_in_one_line(tmp_path: Path, name: str) -> None:
     text, reason = SCENES[name]
     scene = scene_file(tmp_path, text)
     ended = told(tmp_path, 'scene', scene.name)
@@ -234,7 +234,7 @@ ENDS: dict[str, Callable[[int], str]] = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(('what', 'most'), [('levels', DEEPEST), ('values', MOST_VALUES)])
-def test_the_limits_are_where_they_are_said_to_be(what: str, most: int) -> None:
+def test_yaml_limits_refuse_one_level_or_value_more(what: str, most: int) -> None:
     bounded_yaml(ENDS[what](most))
     with pytest.raises(ValueError, match='it '):
         bounded_yaml(ENDS[what](most + 1))

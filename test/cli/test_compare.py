@@ -54,7 +54,7 @@ def ramp(time):
     return time
 
 
-def test_a_bias_is_found_whatever_the_rates_and_the_times_of_the_runs(tmp_path, capsys):
+def test_compare_finds_a_bias_between_different_rates_and_times(tmp_path, capsys):
     first = bag(tmp_path / 'a', {'p': swing, 'q': ramp})
     second = bag(
         tmp_path / 'b', {'q': lambda t: ramp(t) + 0.25, 'p': swing}, rate=40, begin=90, seconds=1.5
@@ -68,13 +68,13 @@ def test_a_bias_is_found_whatever_the_rates_and_the_times_of_the_runs(tmp_path, 
     assert rows['p']['greatest'] > 0.5 * (1 / 40) ** 2 * 4.5 / 8
 
 
-def test_a_run_and_itself_are_the_same(tmp_path, capsys):
+def test_run_compared_with_itself_shows_no_difference(tmp_path, capsys):
     first = bag(tmp_path / 'a', {'p': swing})
     _, rows = told(capsys, first, first)
     assert (rows['p']['different'], rows['p']['greatest_at']) == (0, None)
 
 
-def test_a_difference_is_placed_at_its_time(tmp_path, capsys):
+def test_compare_names_tick_and_time_of_the_greatest_difference(tmp_path, capsys):
     def kicked(time):
         return swing(time) + (0.5 if abs(time - 1.2) < 0.001 else 0.0)
 
@@ -83,7 +83,7 @@ def test_a_difference_is_placed_at_its_time(tmp_path, capsys):
     assert rows['p']['different'] == 1
 
 
-def test_wrapped_angles_differ_by_the_shorter_way(tmp_path, capsys):
+def test_wrapped_angles_differ_by_the_shorter_arc(tmp_path, capsys):
     def wrapped(offset):
         return lambda t: (3.0 * t + offset + pi) % (2.0 * pi) - pi
 
@@ -94,7 +94,7 @@ def test_wrapped_angles_differ_by_the_shorter_way(tmp_path, capsys):
 
 
 @pytest.mark.parametrize('name', ['x.png', 'x.svg'])
-def test_a_picture_is_drawn(tmp_path, name):
+def test_compare_draws_a_png_or_an_svg(tmp_path, name):
     first = bag(tmp_path / 'a', {'$p$': swing, 'q': ramp})
     second = bag(tmp_path / 'b', {'$p$': ramp, 'q': ramp})
     assert answer(compare, first, second, '-o', tmp_path / name) == 0
@@ -108,14 +108,14 @@ def test_a_picture_is_drawn(tmp_path, name):
         ({'p': swing}, '/elsewhere', 'holds no /joint_states'),
     ],
 )
-def test_what_cannot_be_compared_is_an_error(tmp_path, values, topic, reason):
+def test_compare_refuses_bags_without_joints_in_common(tmp_path, values, topic, reason):
     first = bag(tmp_path / 'a', {'p': swing})
     second = bag(tmp_path / 'b', values, topic=topic)
     with pytest.raises(LinkageError, match=reason):
         answer(compare, first, second)
 
 
-def test_a_curve_breaks_where_states_are_missing(tmp_path, monkeypatch):
+def test_difference_curve_breaks_at_missing_joint_states(tmp_path, monkeypatch):
     pytest.importorskip('matplotlib')
     first = bag(tmp_path / 'a', {'p': swing}, seconds=1.0)
     more = bag(tmp_path / 'c', {'p': swing}, begin=8, seconds=1.0)

@@ -41,7 +41,7 @@ def refused(linkage: Run, *typed: str) -> str:
     return line.removeprefix('linkage compile: ')
 
 
-def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: Path) -> None:
+def test_file_name_that_is_no_c_name_is_refused(linkage: Run, tmp_path: Path) -> None:
     shutil.copy(FOUR_BAR, tmp_path / '4.yaml')
     said = "4.yaml: '4' cannot be a name in C; write one, as --name four_bar"
     assert refused(linkage, '4.yaml', '-o', 'a.c') == said
@@ -51,9 +51,7 @@ def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: 
     assert linkage('compile', '4.yaml', '-o', 'a.py').returncode == 0
 
 
-def test_links_iterated_with_two_inputs_are_named_with_their_line(
-    linkage: Run, tmp_path: Path
-) -> None:
+def test_compile_names_the_line_of_iterated_two_input_links(linkage: Run, tmp_path: Path) -> None:
     (tmp_path / 'two.yaml').write_text(iterated_with_two_inputs(), 'utf-8')
     said = refused(linkage, 'two.yaml', '-o', 'a.c')
     assert said.startswith('two.yaml:18: input: 2 inputs move links that close only together')
@@ -61,7 +59,7 @@ def test_links_iterated_with_two_inputs_are_named_with_their_line(
 
 
 @pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py'])
-def test_links_iterated_with_one_input_are_compiled(
+def test_iterated_links_with_one_input_are_compiled(
     linkage: Run, tmp_path: Path, ending: str
 ) -> None:
     shutil.copy(LINKAGES / 'class_3.yaml', tmp_path)
@@ -69,7 +67,7 @@ def test_links_iterated_with_one_input_are_compiled(
     assert 'row' in (tmp_path / f'a.{ending}').read_text('utf-8')
 
 
-def test_a_linkage_that_closes_nowhere_is_told_to_say_where(linkage: Run, tmp_path: Path) -> None:
+def test_compile_asks_for_a_pose_where_no_loop_closes(linkage: Run, tmp_path: Path) -> None:
     text = (LINKAGES / 'five_bar.yaml').read_text('utf-8').replace('O2: [0.120, 0]', 'O2: [9, 0]')
     (tmp_path / 'apart.yaml').write_text(text, 'utf-8')
     said = 'no state is found at which the linkage is closed; write one at which it is: pose: '
@@ -79,7 +77,7 @@ def test_a_linkage_that_closes_nowhere_is_told_to_say_where(linkage: Run, tmp_pa
 @pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
 @pytest.mark.parametrize('odd', ODD)
 @pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py', 'py --arrays'])
-def test_names_of_links_stay_in_the_comments(
+def test_odd_names_of_links_stay_in_the_comments(
     linkage: Run, tmp_path: Path, ending: str, odd: str
 ) -> None:
     text = Path(FOUR_BAR).read_text('utf-8').replace('crank:', f'"{ODD[odd]}":')
@@ -106,7 +104,7 @@ def test_names_of_links_stay_in_the_comments(
         assert done.returncode == 0, done.stderr
 
 
-def test_arrays_are_a_python_module(linkage: Run, tmp_path: Path) -> None:
+def test_arrays_are_written_as_a_python_module_only(linkage: Run, tmp_path: Path) -> None:
     said = '--arrays: a.c is not a Python module; name it x.py'
     assert refused(linkage, FOUR_BAR, '-o', 'a.c', '--arrays') == said
     assert linkage('compile', FOUR_BAR, '-o', 'a.py', '--arrays').stdout == 'a.py\n'
@@ -117,7 +115,7 @@ def test_arrays_are_a_python_module(linkage: Run, tmp_path: Path) -> None:
     ]
 
 
-def test_what_has_too_many_cells_for_arrays_is_named(linkage: Run, tmp_path: Path) -> None:
+def test_compile_refuses_arrays_for_six_inputs(linkage: Run, tmp_path: Path) -> None:
     said = refused(linkage, 'hexapod', '-o', 'a.py', '--arrays')
     assert 'hexapod.yaml:35: input: 6 inputs move links that close only together, and' in said
     assert not (tmp_path / 'a.py').exists()

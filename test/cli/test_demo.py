@@ -46,7 +46,7 @@ def only_bag(runs: Path) -> Path:
     return bag
 
 
-def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) -> None:
+def test_demo_runs_records_replays_and_draws(linkage: Run, tmp_path: Path) -> None:
     answer = linkage('demo', '--seconds', '4')
     assert answer.returncode == 0, answer.stderr
     bag = only_bag(tmp_path / 'runs')
@@ -76,7 +76,7 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
         ('torque_crank', 'pd_controller', '/crank_commands'),
     ],
 )
-def test_the_duration_counts_from_the_first_message_for_the_crank(
+def test_duration_of_a_demo_starts_at_the_first_message(
     tmp_path: Path, name: str, beside: str, topic: str
 ) -> None:
     # The process beside it begins late, as on a busy machine.
@@ -99,9 +99,7 @@ def test_the_duration_counts_from_the_first_message_for_the_crank(
     assert messages(only_bag(tmp_path / 'runs'))[topic] > 50
 
 
-def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
-    linkage: Run, tmp_path: Path
-) -> None:
+def test_controller_moves_the_crank_of_a_torque_scene(linkage: Run, tmp_path: Path) -> None:
     answer = linkage('demo', 'torque_crank', '--seconds', '4')  # a busy machine begins late
     assert answer.returncode == 0, answer.stderr
     bag = only_bag(tmp_path / 'runs')
@@ -115,7 +113,7 @@ def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     assert Path(f'{bag}.png').read_bytes().startswith(PNG)
 
 
-def test_a_controller_moves_both_motors_of_an_ankle(linkage: Run, tmp_path: Path) -> None:
+def test_controller_moves_both_motors_of_the_ankle(linkage: Run, tmp_path: Path) -> None:
     answer = linkage('demo', 'torque_ankle', '--seconds', '3')
     assert answer.returncode == 0, answer.stderr
     assert 'several publishers' not in answer.stderr
@@ -142,9 +140,7 @@ def test_a_controller_moves_both_motors_of_an_ankle(linkage: Run, tmp_path: Path
         assert max(abs(state.effort[motor]) for state in states) > 0.1
 
 
-def test_a_scene_that_makes_its_crank_up_needs_nothing_beside_it(
-    linkage: Run, tmp_path: Path
-) -> None:
+def test_scene_with_its_own_drive_needs_no_crank_source(linkage: Run, tmp_path: Path) -> None:
     answer = linkage('demo', 'worn_press', '--seconds', '2')
     assert answer.returncode == 0, answer.stderr
     assert 'samples' not in answer.stdout
@@ -153,7 +149,7 @@ def test_a_scene_that_makes_its_crank_up_needs_nothing_beside_it(
     assert Path(f'{only_bag(tmp_path / "runs")}.png').read_bytes().startswith(PNG)
 
 
-def test_a_scene_that_records_nothing_is_not_drawn(linkage: Run, tmp_path: Path) -> None:
+def test_scene_without_a_recorder_draws_no_picture(linkage: Run, tmp_path: Path) -> None:
     answer = linkage('demo', 'bare', '--seconds', '2')
     assert answer.returncode == 0, answer.stderr
     assert re.search(r'samples +[1-9]', answer.stdout)
@@ -161,7 +157,7 @@ def test_a_scene_that_records_nothing_is_not_drawn(linkage: Run, tmp_path: Path)
     assert not (tmp_path / 'runs').exists()
 
 
-def test_the_list_names_every_scene_that_comes_along(linkage: Run) -> None:
+def test_demo_list_names_every_shipped_scene(linkage: Run) -> None:
     answer = linkage('demo', '--list')
     assert answer.returncode == 0, answer.stderr
     heading, *rows = answer.stdout.splitlines()
@@ -174,7 +170,7 @@ def test_the_list_names_every_scene_that_comes_along(linkage: Run) -> None:
     assert not any('yaml-language-server' in row for row in rows)
 
 
-def test_a_drill_names_its_faults_and_runs_until_they_have_ended(linkage: Run) -> None:
+def test_fault_drill_lists_its_faults_and_outlasts_them(linkage: Run) -> None:
     answer = linkage('demo', 'fault_drill', '--plain')
     assert answer.returncode == 0, answer.stderr
     first, faults = answer.stdout.splitlines()[:2]
@@ -195,7 +191,7 @@ def test_a_drill_names_its_faults_and_runs_until_they_have_ended(linkage: Run) -
         *(('torque_crank', after) for after in (0.6, 2.0)),
     ],
 )
-def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, name: str, after: float) -> None:
+def test_ctrl_c_leaves_no_unfinished_bag(tmp_path: Path, name: str, after: float) -> None:
     demo = subprocess.Popen(
         [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', name, '--seconds', '30'],
         cwd=tmp_path,
@@ -218,7 +214,7 @@ def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, name: str, afte
         messages(only_bag(tmp_path / 'runs'))
 
 
-def test_on_a_terminal_the_display_is_live(tmp_path: Path) -> None:
+def test_demo_shows_a_live_display_on_a_terminal(tmp_path: Path) -> None:
     shown = on_terminal(tmp_path, 'demo', '--seconds', '3')
     text = re.sub(r'\x1b\[[0-9;?]*[A-Za-z]', '', shown)
     assert '\x1b[' in shown

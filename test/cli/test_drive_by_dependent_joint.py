@@ -54,7 +54,7 @@ def joint_message(joint: str, stamp: int, value: float, rate: float) -> bytes:
     return JointStateWriter([joint]).write(stamp, (value,), (rate,))
 
 
-def test_scene_publishes_what_the_scene_driven_by_the_crank_does() -> None:
+def test_rocker_drive_publishes_the_same_states_as_crank_drive() -> None:
     by_crank = pipeline_of(RATES, FILE)
     by_rocker = pipeline_of(RATES + BY_ROCKER, FILE)
     for index in range(1, 800):
@@ -70,7 +70,7 @@ def test_scene_publishes_what_the_scene_driven_by_the_crank_does() -> None:
         assert second.velocity == pytest.approx(first.velocity, abs=1e-11, rel=1e-11)
 
 
-def test_sample_whose_joint_is_not_reached_is_rejected_and_changes_nothing() -> None:
+def test_unreachable_sample_is_rejected_and_changes_no_state() -> None:
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
     assert pipeline.offer(joint_message('rocker_joint', SECOND, 1.2, 0.1), SECOND) is None
     before = pipeline.tick(SECOND).message
@@ -93,7 +93,7 @@ def test_sample_whose_joint_is_not_reached_is_rejected_and_changes_nothing() -> 
     assert pipeline.tick(SECOND).message == before
 
 
-def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
+def test_crank_rate_at_a_turning_rocker_comes_from_differences() -> None:
     """Where the rocker turns back, its samples say nothing about the crank's rate."""
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
     end = LINKAGE.branches('rocker_joint')[0].high
@@ -110,7 +110,7 @@ def test_crank_without_a_rate_gets_that_of_the_differences() -> None:
 
 
 @pytest.mark.parametrize('joint', ['P.x', 'O2-B', 'coupler.angle'])
-def test_samples_may_name_a_coordinate_a_distance_or_an_angle(joint: str) -> None:
+def test_samples_drive_by_coordinate_distance_or_angle(joint: str) -> None:
     (branch, *_) = LINKAGE.branches(joint)
     drive = f'drive: {{topic: {{joint: {joint}, branch: {branch.number}}}}}\n'
     pipeline = pipeline_of(RATES + drive, FILE)
@@ -134,7 +134,7 @@ def test_samples_may_name_a_coordinate_a_distance_or_an_angle(joint: str) -> Non
         ('wishbone', ('wheel.z', 'rack'), (0.02, 0.01)),
     ],
 )
-def test_samples_name_as_many_joints_as_inputs_in_plane_and_space(
+def test_samples_of_several_joints_drive_as_many_inputs(
     name: str, joints: tuple[str, ...], start: tuple[float, ...]
 ) -> None:
     """The inputs, and their rates, are those of the linkage that has these joints."""
@@ -170,14 +170,14 @@ def test_samples_name_as_many_joints_as_inputs_in_plane_and_space(
         ('{joint: rocker_joint, branch: -1}', 'drive.topic.branch'),
     ],
 )
-def test_bad_drives_are_one_line(drive: str, line: str) -> None:
+def test_wrong_drive_joint_is_refused_in_one_line(drive: str, line: str) -> None:
     with pytest.raises(FileError) as error:
         pipeline_of(f'drive: {{topic: {drive}}}\n', FILE)
     assert line in str(error.value)
     assert '\n' not in str(error.value)
 
 
-def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
+def test_two_linkages_of_a_scene_read_their_own_samples(tmp_path: Path) -> None:
     text = (
         'linkages:\n- {name: left, linkage: l.yaml, ' + BY_ROCKER.strip() + '}\n'
         '- {name: right, linkage: l.yaml}\n'
@@ -192,7 +192,7 @@ def test_linkages_of_one_scene_get_their_own_samples(tmp_path: Path) -> None:
     assert values['left_rocker_joint'] == pytest.approx(values['right_rocker_joint'], abs=1e-14)
 
 
-def test_cost_and_fmu_feed_the_dependent_joint() -> None:
+def test_accuracy_and_fmu_feed_samples_of_the_dependent_joint() -> None:
     pipeline = pipeline_of(RATES + BY_ROCKER, FILE)
     (linkage,) = pipeline.linkages
     names = [variable.name for variable in _Sender(linkage).variables]
@@ -211,7 +211,9 @@ def recorded(folder: Path) -> Path:
     return Recorded(folder / 'bag', scene_file(folder, RATES + BY_ROCKER, FILE), rocker).run(300)
 
 
-def test_replay_has_the_bits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_driven_by_the_rocker_replays_to_same_bytes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bag = recorded(tmp_path)
     assert answer(replay, bag, '--json') == 0
     assert json.loads(capsys.readouterr().out)['verdict'] == 'identical'
@@ -222,7 +224,7 @@ def test_replay_has_the_bits(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     )
 
 
-def test_report_shows_the_crank(tmp_path: Path) -> None:
+def test_report_counts_samples_without_a_crank_angle(tmp_path: Path) -> None:
     page = tmp_path / 'run.html'
     assert answer(report, recorded(tmp_path), '-o', page) == 0
     assert Rejection.NO_CRANK.value in page.read_text('utf-8')

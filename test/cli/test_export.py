@@ -133,7 +133,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 PINS = ('O2', 'O4', 'A', 'B')
 
 
-def test_a_row_holds_what_was_published_at_a_tick(bag: Path, exported: Any) -> None:
+def test_exported_row_equals_the_messages_of_its_tick(bag: Path, exported: Any) -> None:
     heads, rows = exported(bag)
     joints = ('crank_joint', 'coupler_joint', 'rocker_joint')
     assert heads == [
@@ -177,7 +177,7 @@ def test_a_row_holds_what_was_published_at_a_tick(bag: Path, exported: Any) -> N
     assert rows[7][2] - rows[7][1] == 2 * MS
 
 
-def test_the_cranks_samples_are_a_table_of_their_own(bag: Path, exported: Any) -> None:
+def test_crank_samples_are_exported_as_their_own_table(bag: Path, exported: Any) -> None:
     heads, rows = exported(bag, '--topic', '/crank_states')
     assert heads == [*FIRST, 'crank_joint [rad]', 'crank_joint rate [rad/s]']
     assert rows == [
@@ -188,7 +188,7 @@ def test_the_cranks_samples_are_a_table_of_their_own(bag: Path, exported: Any) -
     ]
 
 
-def test_of_an_extra_topic_alone_all_is_told(bag: Path, exported: Any) -> None:
+def test_export_of_the_motion_topic_has_every_acceleration(bag: Path, exported: Any) -> None:
     heads, rows = exported(bag, '--topic', '/linkage/motion')
     assert heads[4::3] == [
         'crank_joint [rad]',
@@ -198,7 +198,7 @@ def test_of_an_extra_topic_alone_all_is_told(bag: Path, exported: Any) -> None:
     assert len(rows) == 398
 
 
-def test_a_slide_is_in_metres(tmp_path: Path, exported: Any) -> None:
+def test_slide_is_exported_in_metres(tmp_path: Path, exported: Any) -> None:
     scene = scene_file(tmp_path, 'effects: {acceleration: {}}\n', SLIDER_CRANK)
     run = Recorded(tmp_path / 'bag', scene, crank)
     heads, _ = exported(run.run(5))
@@ -218,7 +218,7 @@ linkages:
 
 
 @pytest.mark.parametrize('crank_topic', ['/crank_states', '/joint_states'])
-def test_a_linkage_without_a_reading_leaves_its_cells_empty(
+def test_silent_linkage_leaves_empty_cells(
     tmp_path: Path, exported: Any, crank_topic: str
 ) -> None:
     def cranks(number: int) -> dict[str, tuple[float, float]]:
@@ -243,7 +243,7 @@ def test_a_linkage_without_a_reading_leaves_its_cells_empty(
     assert not any(row[6] is None for row in rows)
 
 
-def test_on_a_shared_topic_the_pin_forces_are_in_the_rows(tmp_path: Path, exported: Any) -> None:
+def test_shared_topic_exports_pin_forces_in_the_same_rows(tmp_path: Path, exported: Any) -> None:
     scene = scene_file(tmp_path, EVERYTHING, FOUR_BAR)
     heads, rows = exported(Recorded(tmp_path / 'bag', scene, crank, '/joint_states').run(20))
     force = heads.index('A force x [N]')
@@ -258,7 +258,7 @@ def test_on_a_shared_topic_the_pin_forces_are_in_the_rows(tmp_path: Path, export
         ('drive: {constant_rate: {rate: 9}}\npublish_input: false', None),
     ],
 )
-def test_what_the_recorder_dropped_shifts_nothing(
+def test_dropped_messages_shift_no_exported_rows(
     tmp_path: Path, exported: Any, said: str, crank: Any
 ) -> None:
     gone = {(3, '/joint_states'), (4, '/linkage/motion'), (5, '/joint_states')}
@@ -274,9 +274,7 @@ def test_what_the_recorder_dropped_shifts_nothing(
     assert all(row[4] is not None and row[6] is not None for row in rows)
 
 
-def test_ticks_of_one_time_are_told_apart_by_what_lies_between(
-    tmp_path: Path, exported: Any
-) -> None:
+def test_ticks_of_equal_time_are_exported_as_separate_rows(tmp_path: Path, exported: Any) -> None:
     run = {
         'scene': 's', 'crank_topic': '/c', 'joint_states_topic': '/js', 'extra_topics': ['/m']
     }  # fmt: skip
@@ -337,7 +335,7 @@ ODD = [-0.0, 5e-324, 1.7976931348623157e308, float('inf'), float('-inf'), 0.1 + 
 
 
 @pytest.mark.parametrize('little', [True, False])
-def test_numbers_keep_every_bit(tmp_path: Path, exported: Any, little: bool) -> None:
+def test_exported_numbers_keep_every_bit(tmp_path: Path, exported: Any, little: bool) -> None:
     messages = [joint_state(k, ['j'], [value], little=little) for k, value in enumerate(ODD)]
     heads, rows = exported(foreign(tmp_path / 'bag', *messages))
     # Nobody says whether it turns or slides.
@@ -345,7 +343,7 @@ def test_numbers_keep_every_bit(tmp_path: Path, exported: Any, little: bool) -> 
     assert [bits(row[4]) for row in rows] == list(map(bits, ODD))
 
 
-def test_what_is_no_number_is_not_what_is_missing(tmp_path: Path, exported: Any) -> None:
+def test_exported_nan_differs_from_a_missing_value(tmp_path: Path, exported: Any) -> None:
     bag = foreign(
         tmp_path / 'bag', joint_state(1, ['j'], [float('nan')]), joint_state(2, ['j']),
         joint_state(3, [], []), joint_state(4, ['i', 'j'], [1.0, 2.0], effort=[5.0, 6.0]),
@@ -361,14 +359,14 @@ def test_what_is_no_number_is_not_what_is_missing(tmp_path: Path, exported: Any)
     assert [row[1] for row in rows] == [1, 2, 3, 4]
 
 
-def test_any_name_is_a_heading(tmp_path: Path, exported: Any) -> None:
+def test_any_joint_name_is_a_column_heading(tmp_path: Path, exported: Any) -> None:
     names = ['a,b', 'say "x"', 'two\nlines', 'größe', '', ' ']
     heads, rows = exported(foreign(tmp_path / 'bag', joint_state(1, names, range(6))))
     assert heads[4:] == [f'{name} [rad or m]' for name in names]
     assert rows[0][4:] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
 
 
-def test_a_command_has_a_row_though_the_joints_that_follow_have_no_effort(
+def test_commands_are_exported_for_joints_without_effort(
     tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     names = ['rocker_joint', 'crank_joint']
@@ -392,7 +390,7 @@ def test_a_command_has_a_row_though_the_joints_that_follow_have_no_effort(
     assert capsys.readouterr().err == ''
 
 
-def test_messages_that_tell_nothing_sure_are_left_out_and_counted(
+def test_malformed_messages_are_left_out_and_counted(
     tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     good = joint_state(1, ['j'], [1.0])
@@ -412,7 +410,7 @@ def test_messages_that_tell_nothing_sure_are_left_out_and_counted(
     assert ': 2 rows, 5 columns (2 of /js)\n' in said.out
 
 
-def test_of_two_topics_one_has_to_be_named(tmp_path: Path, exported: Any) -> None:
+def test_export_asks_for_one_of_two_topics(tmp_path: Path, exported: Any) -> None:
     bag = foreign(tmp_path / 'bag', joint_state(1, ['j'], [1.0]), topics=('/a', '/b'))
     with pytest.raises(LinkageError, match='holds joint states on /a, /b; name one with --topic'):
         exported(bag)
@@ -427,7 +425,9 @@ numbers = st.floats(width=64)
 
 @given(data=st.data(), stamp=st.integers(-(2**31) * SECOND, 2**31 * SECOND - 1))
 @pytest.mark.parametrize('kind', [JOINT_STATE_TYPE, TRAJECTORY, WRENCHES])
-def test_messages_tell_what_rosbags_has_written(data: Any, stamp: int, kind: str) -> None:
+def test_exported_values_equal_those_serialized_by_rosbags(
+    data: Any, stamp: int, kind: str
+) -> None:
     types, reader = STORE.types, MessageValues(kind)
     joints = data.draw(names)
 
@@ -484,7 +484,7 @@ def test_messages_tell_what_rosbags_has_written(data: Any, stamp: int, kind: str
         (WRENCHES, 'twist', 'transforms or twists'),
     ],
 )
-def test_messages_of_more_than_an_instant_in_the_plane_are_left_out(
+def test_trajectories_and_wrenches_beyond_one_instant_are_left_out(
     kind: str, changed: str, reason: str
 ) -> None:
     types = STORE.types
@@ -509,7 +509,7 @@ def test_messages_of_more_than_an_instant_in_the_plane_are_left_out(
     assert MessageValues(kind).read(bytes(STORE.serialize_cdr(message, kind))) == reason
 
 
-def test_of_a_bag_that_was_cut_the_whole_part_is_written(
+def test_truncated_bag_exports_its_whole_part(
     bag: Path, tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _, whole = exported(bag)
@@ -523,7 +523,7 @@ def test_of_a_bag_that_was_cut_the_whole_part_is_written(
     assert ': unfinished: its recording was killed, ' in capsys.readouterr().err
 
 
-def test_of_a_damaged_bag_nothing_is_written(bag: Path, tmp_path: Path) -> None:
+def test_damaged_bag_exports_nothing_and_keeps_the_old_file(bag: Path, tmp_path: Path) -> None:
     content = bytearray((bag / 'bag_0.mcap').read_bytes())
     content[len(content) // 2] ^= 1
     (tmp_path / 'bad.mcap').write_bytes(content)
@@ -535,7 +535,7 @@ def test_of_a_damaged_bag_nothing_is_written(bag: Path, tmp_path: Path) -> None:
 
 
 @needs_pyarrow
-def test_blocks_follow_each_other(
+def test_parquet_written_in_blocks_equals_one_block(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole, blocks = tmp_path / 'a.parquet', tmp_path / 'b.parquet'
@@ -547,7 +547,7 @@ def test_blocks_follow_each_other(
 
 
 @pytest.mark.parametrize('name', ['folder.csv', 'fifo.csv'])
-def test_what_is_no_file_is_not_replaced(
+def test_folder_or_fifo_is_not_replaced_by_a_table(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -558,7 +558,7 @@ def test_what_is_no_file_is_not_replaced(
     assert sorted(path.name for path in tmp_path.iterdir()) == ['fifo.csv', 'folder.csv']
 
 
-def test_a_bag_without_joints_says_so(bag: Path, tmp_path: Path) -> None:
+def test_export_refuses_a_bag_without_joint_states(bag: Path, tmp_path: Path) -> None:
     BagWriter(tmp_path / 'a', [topic('/t', 'std_msgs/msg/String')]).close()
     with pytest.raises(LinkageError, match='holds no topic of sensor_msgs/msg/JointState'):
         answer(export, tmp_path / 'a', '-o', tmp_path / 'x.csv')
@@ -571,7 +571,7 @@ def test_a_bag_without_joints_says_so(bag: Path, tmp_path: Path) -> None:
     assert not (tmp_path / 'x.csv').exists()
 
 
-def test_without_pyarrow_it_is_said_what_to_install(
+def test_parquet_without_pyarrow_names_what_to_install(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, 'pyarrow', None)
@@ -580,7 +580,7 @@ def test_without_pyarrow_it_is_said_what_to_install(
     assert answer(export, bag, '-o', tmp_path / 'x.csv') == 0
 
 
-def test_where_pyarrow_cannot_be_loaded_it_is_said_why_and_what_to_install(
+def test_broken_pyarrow_names_its_error_and_what_to_install(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As pyarrow 26 does beside the numpy of Ubuntu 24.04.
@@ -599,9 +599,7 @@ def test_where_pyarrow_cannot_be_loaded_it_is_said_why_and_what_to_install(
     assert answer(export, bag, '-o', tmp_path / 'x.csv') == 0
 
 
-def test_a_signal_leaves_nothing_behind(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_stopped_export_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write = JointStateWriter(['j']).write
     bag = foreign(tmp_path / 'bag', *(write(k, (0.0,), ()) for k in range(5000)))
     stop = Event()
@@ -612,9 +610,7 @@ def test_a_signal_leaves_nothing_behind(
 
 
 @pytest.mark.parametrize('ending', ENDINGS)
-def test_a_disk_without_room_keeps_the_file_that_was_there(
-    bag: Path, tmp_path: Path, ending: str
-) -> None:
+def test_full_disk_keeps_the_old_table(bag: Path, tmp_path: Path, ending: str) -> None:
     target = tmp_path / f'x{ending}'
     target.write_text('before')
     words = ['export', str(bag), '-o', target.name, '--force']
@@ -635,7 +631,7 @@ def test_a_disk_without_room_keeps_the_file_that_was_there(
     assert target.read_text() == 'before'
 
 
-def test_a_link_is_followed(bag: Path, tmp_path: Path) -> None:
+def test_export_writes_through_a_symbolic_link(bag: Path, tmp_path: Path) -> None:
     (tmp_path / 'data').mkdir()
     (tmp_path / 'x.csv').symlink_to('data/real.csv')
     assert answer(export, bag, '-o', tmp_path / 'x.csv') == 0

@@ -81,7 +81,7 @@ def test_help_ends_with_an_example(command: str) -> None:
 # A topic needs a publisher: test/node/test_echo.py has one.
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('command', [name for name in COMMANDS if name != 'echo'])
-def test_the_example_works(folder: Path, command: str) -> None:
+def test_example_of_the_help_exits_with_code_0(folder: Path, command: str) -> None:
     line = example(command)
     for part, instead in SHORTENED.items():
         line = line.replace(part, instead)
@@ -92,13 +92,13 @@ def test_the_example_works(folder: Path, command: str) -> None:
     assert answer.stdout
 
 
-def test_the_design_of_the_example_is_sound(tmp_path: Path) -> None:
+def test_synthesize_example_designs_a_crank_rocker_without_defects(tmp_path: Path) -> None:
     answer = linkage(tmp_path, *shlex.split(example('synthesize'))[1:])
     assert 'crank-rocker (GCRR), the crank turns fully' in answer.stdout
     assert 'none: order, branch and circuit are right' in answer.stdout
 
 
-def test_the_exit_codes_are_in_the_help() -> None:
+def test_help_lists_exit_codes_and_commands() -> None:
     answer = subprocess.run(
         [sys.executable, '-m', 'linkage_ros', '--help'],
         capture_output=True,
@@ -123,7 +123,7 @@ def refused(capsys: pytest.CaptureFixture[str], command: str, *typed: str) -> st
 
 
 @pytest.mark.parametrize('command', COMMANDS)
-def test_a_command_that_is_nearly_right_is_named(tmp_path: Path, command: str) -> None:
+def test_misspelt_command_names_the_nearest_command(tmp_path: Path, command: str) -> None:
     answer = linkage(tmp_path, f'{command}x')
     assert (answer.returncode, answer.stdout) == (2, '')
     assert answer.stderr == (
@@ -133,7 +133,7 @@ def test_a_command_that_is_nearly_right_is_named(tmp_path: Path, command: str) -
 
 
 @pytest.mark.parametrize('command', COMMANDS)
-def test_an_option_that_is_nearly_right_is_named(
+def test_misspelt_option_names_the_nearest_option(
     command: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for action in parser(command)._actions:
@@ -146,7 +146,7 @@ def test_an_option_that_is_nearly_right_is_named(
                 )
 
 
-def test_a_choice_that_is_nearly_right_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_misspelt_choice_names_the_nearest_choice(capsys: pytest.CaptureFixture[str]) -> None:
     tried = 0
     for command, action in options():
         for choice in action.choices or ():
@@ -158,7 +158,7 @@ def test_a_choice_that_is_nearly_right_is_named(capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names(), *scene_names()])
-def test_a_name_that_is_nearly_right_is_told(name: str) -> None:
+def test_misspelt_shipped_name_names_the_nearest_one(name: str) -> None:
     with pytest.raises(LinkageError, match=f'did you mean .{name}.?'):
         named_file(f'{name}x', 'scenes', 'linkages')
 
@@ -180,13 +180,13 @@ METAVARS = {
 """How arguments without an option are called, in all commands."""
 
 
-def test_arguments_have_the_same_name_in_all_commands() -> None:
+def test_positional_arguments_have_the_same_names_in_all_commands() -> None:
     assert {
         str(action.metavar) for _, action in options() if not action.option_strings
     } == METAVARS
 
 
-def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
+def test_options_of_one_name_have_one_metavar() -> None:
     typed = [(c, o) for c, o in options() if o.option_strings and o.nargs != 0 and not o.choices]
     # Of kinds of their own in some commands.
     several = {'output', 'rate', 'at', 'input', 'joint', 'need'}
@@ -199,7 +199,7 @@ def test_numbers_of_things_and_defaults_are_told_in_one_way() -> None:
         assert len(names) == 1 or action.dest in several, (*where, names)
 
 
-def test_every_output_file_refuses_a_suffix_that_it_cannot_write(tmp_path: Path) -> None:
+def test_output_option_refuses_an_unknown_ending(tmp_path: Path) -> None:
     written = {command: action for command, action in options() if action.dest == 'output'}
     folders = {command for command, action in written.items() if action.metavar == 'FOLDER'}
     assert folders == {'recover', 'replay'}
@@ -231,7 +231,7 @@ def scene(tmp_path: Path) -> Path:
     return scene_file(tmp_path, SCENE)
 
 
-def test_keys_are_set_and_the_rest_stays(scene: Path, tmp_path: Path) -> None:
+def test_set_changes_named_keys_of_a_scene_only(scene: Path, tmp_path: Path) -> None:
     loaded = load_scene(scene, ['rate=500', 'drive.sine.amplitude=0.3', 'effects.markers={}'])
     (scene_linkage,) = loaded.linkages
     name, sine = scene_linkage.drive
@@ -242,7 +242,7 @@ def test_keys_are_set_and_the_rest_stays(scene: Path, tmp_path: Path) -> None:
     assert load_scene(scene).rate == 100.0
 
 
-def test_the_files_of_a_scene_hold_what_was_set(scene: Path) -> None:
+def test_scene_file_of_a_bag_holds_the_set_keys(scene: Path) -> None:
     settings = ['rate=500', 'effects.noise.joints.rocker_joint.white=2e-3']
     loaded = load_scene(scene, settings)
     scene.write_bytes(loaded.files[SCENE_FILE])
@@ -252,7 +252,7 @@ def test_the_files_of_a_scene_hold_what_was_set(scene: Path) -> None:
     assert again.files[SCENE_FILE].startswith(b'# --set rate=500\n# --set effects.noise.')
 
 
-def test_keys_of_the_scene_of_a_linkage_are_set() -> None:
+def test_set_changes_keys_of_a_linkage_without_a_scene() -> None:
     assert load_scene('jansen_leg', ['rate=250']).rate == 250.0
     assert load_scene(named_file('hoeken', 'linkages'), ['rate=250']).rate == 250.0
 
@@ -266,7 +266,7 @@ drive: {sine: {amplitude: 0.4, frequency: 1.0}}
 """
 
 
-def test_keys_of_one_of_several_linkages_are_set_by_its_name(tmp_path: Path) -> None:
+def test_set_changes_keys_of_one_linkage_by_name(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, TWO)
     settings = [
         'linkages.left.drive.sine.amplitude=0.3',
@@ -294,9 +294,7 @@ OF_SEVERAL = {
 
 
 @pytest.mark.parametrize('setting', OF_SEVERAL)
-def test_a_setting_of_one_of_several_linkages_that_is_wrong_is_named(
-    tmp_path: Path, setting: str
-) -> None:
+def test_wrong_setting_of_one_linkage_is_named(tmp_path: Path, setting: str) -> None:
     with pytest.raises(LinkageError) as caught:
         load_scene(scene_file(tmp_path, TWO), [setting])
     assert str(caught.value).startswith(f'--set {setting}: {OF_SEVERAL[setting]}')
@@ -319,7 +317,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize('setting', WRONG)
-def test_a_setting_that_is_wrong_is_named_instead_of_the_file(scene: Path, setting: str) -> None:
+def test_wrong_setting_is_named_instead_of_the_file(scene: Path, setting: str) -> None:
     with pytest.raises(LinkageError) as caught:
         load_scene(scene, [setting])
     assert str(caught.value).startswith('--set ')
@@ -327,16 +325,14 @@ def test_a_setting_that_is_wrong_is_named_instead_of_the_file(scene: Path, setti
     assert 'scene of mine' not in str(caught.value)
 
 
-def test_what_is_wrong_in_the_file_is_said_of_the_file(scene: Path) -> None:
+def test_error_in_the_scene_file_names_the_file(scene: Path) -> None:
     scene.write_text(SCENE.replace('frequency: 1.0', 'frequency: -1.0'))
     with pytest.raises(LinkageError, match=r'scene of mine.yaml:3: drive.sine.frequency: -1'):
         load_scene(scene, ['drive.sine.amplitude=0.3'])
 
 
 @pytest.mark.parametrize('command', ['run', 'scene', 'accuracy', 'replay'])
-def test_commands_with_a_scene_refuse_a_wrong_setting_in_a_line(
-    folder: Path, command: str
-) -> None:
+def test_commands_refuse_a_wrong_setting_in_one_line(folder: Path, command: str) -> None:
     typed = ['my_bag'] if command == 'replay' else ['two_fingers']
     answer = linkage(folder, command, *typed, '--set', 'rate=-1')
     assert answer.returncode == 2
@@ -345,13 +341,13 @@ def test_commands_with_a_scene_refuse_a_wrong_setting_in_a_line(
 
 
 @pytest.mark.parametrize('typed', ['scene --list', 'scene --schema scene'])
-def test_a_setting_without_a_scene_is_refused(tmp_path: Path, typed: str) -> None:
+def test_set_without_a_scene_is_refused(tmp_path: Path, typed: str) -> None:
     answer = linkage(tmp_path, *typed.split(), '--set', 'rate=5')
     assert (answer.returncode, answer.stdout) == (2, '')
     assert '--set rate=5: is for a scene; name one' in answer.stderr
 
 
-def test_a_replay_runs_the_scene_of_the_bag_with_what_is_set(folder: Path) -> None:
+def test_replay_runs_the_recorded_scene_with_changed_keys(folder: Path) -> None:
     setting = 'effects={bias: {joints: {rocker_joint: 0.5}}}'
     answer = linkage(folder, 'replay', 'my_bag', '--set', setting, '-o', 'biased')
     assert answer.returncode == 0, answer.stderr
@@ -363,7 +359,7 @@ def test_a_replay_runs_the_scene_of_the_bag_with_what_is_set(folder: Path) -> No
 # The gallery.
 
 
-def test_the_gallery_lists_every_linkage_and_scene_with_a_line(tmp_path: Path) -> None:
+def test_gallery_lists_every_linkage_and_scene(tmp_path: Path) -> None:
     lines = linkage(tmp_path, 'gallery').stdout.splitlines()
     names = [line.split()[0] for line in lines if line]
     linkages = [*linkage_names(), *spatial_linkage_names()]
@@ -371,7 +367,7 @@ def test_the_gallery_lists_every_linkage_and_scene_with_a_line(tmp_path: Path) -
     assert all(len(line.split()) > 3 for line in lines if line not in ('', 'linkages', 'scenes'))
 
 
-def test_a_file_of_the_gallery_is_printed(tmp_path: Path) -> None:
+def test_gallery_prints_a_file_as_shipped(tmp_path: Path) -> None:
     for typed, file in (
         (['hoeken'], 'linkages/hoeken'),
         (['demo'], 'scenes/demo'),
@@ -384,7 +380,7 @@ def test_a_file_of_the_gallery_is_printed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('name', scene_names())
-def test_a_copied_scene_is_whole(tmp_path: Path, name: str) -> None:
+def test_copied_scene_loads_with_all_its_files(tmp_path: Path, name: str) -> None:
     answer = linkage(tmp_path, 'gallery', name, '--scene', '-o', 'mine.yaml')
     copied, shipped = load_scene(tmp_path / 'mine.yaml'), load_scene(name)
     assert [one.linkage for one in copied.linkages] == [one.linkage for one in shipped.linkages]
@@ -396,7 +392,7 @@ def test_a_copied_scene_is_whole(tmp_path: Path, name: str) -> None:
     assert {file.name for file in tmp_path.iterdir()} == {*answer.stdout.split()}
 
 
-def test_a_copy_replaces_no_other_linkage(tmp_path: Path) -> None:
+def test_copied_scene_replaces_no_linkage_of_another_content(tmp_path: Path) -> None:
     (tmp_path / 'four_bar.yaml').write_text('mine')
     answer = linkage(tmp_path, 'gallery', 'demo', '-o', 'x.yaml')
     assert answer.returncode == 2
@@ -421,7 +417,7 @@ COMPLETED = {
 
 
 @pytest.mark.parametrize('line', COMPLETED)
-def test_a_shell_completes_commands_options_names_and_files(tmp_path: Path, line: str) -> None:
+def test_shell_completes_commands_options_names_and_files(tmp_path: Path, line: str) -> None:
     pytest.importorskip('argcomplete')
     (tmp_path / 'mine.yaml').touch()
     (tmp_path / 'my_bag').mkdir()
@@ -447,7 +443,7 @@ def test_a_shell_completes_commands_options_names_and_files(tmp_path: Path, line
 
 
 @pytest.mark.parametrize('shell', SHELLS)
-def test_the_script_of_a_shell_asks_for_linkage(tmp_path: Path, shell: str) -> None:
+def test_completion_prints_a_script_for_each_shell(tmp_path: Path, shell: str) -> None:
     pytest.importorskip('argcomplete')
     answer = linkage(tmp_path, 'completion', shell)
     assert answer.returncode == 0
@@ -455,7 +451,7 @@ def test_the_script_of_a_shell_asks_for_linkage(tmp_path: Path, shell: str) -> N
     assert 'linkage' in answer.stdout
 
 
-def test_without_argcomplete_the_command_says_what_to_install(tmp_path: Path) -> None:
+def test_completion_without_argcomplete_names_what_to_install(tmp_path: Path) -> None:
     program = (
         'import importlib.util, sys; sys.modules["argcomplete"] = None; '
         'from linkage_ros.cli.main import main; sys.exit(main())'
@@ -472,7 +468,7 @@ def test_without_argcomplete_the_command_says_what_to_install(tmp_path: Path) ->
     assert answer.stderr.startswith('linkage completion: argcomplete: is not installed; pip insta')
 
 
-def test_no_other_command_loads_the_library_of_completion(tmp_path: Path) -> None:
+def test_check_does_not_import_argcomplete(tmp_path: Path) -> None:
     program = (
         'import sys; from linkage_ros.cli.main import main; main(["check", "four_bar"]); '
         'sys.exit("argcomplete" in sys.modules)'

@@ -111,7 +111,7 @@ def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterat
 
 
 @pytest.mark.parametrize('name', ACCOUNTS)
-def test_a_damaged_account_is_told_in_a_line(tmp_path, capsys, bag, name) -> None:
+def test_damaged_run_json_is_reported_in_one_line(tmp_path, capsys, bag, name) -> None:
     odd = with_account(bag, tmp_path, ACCOUNTS[name])
     lines = list(tried(odd, tmp_path, capsys))
     assert lines[0].startswith(f'{odd}: its run.json is damaged; ')
@@ -120,7 +120,7 @@ def test_a_damaged_account_is_told_in_a_line(tmp_path, capsys, bag, name) -> Non
 @pytest.mark.sample(12)
 @pytest.mark.parametrize('value', VALUES)
 @pytest.mark.parametrize('key', KEYS)
-def test_an_account_of_wrong_values_is_told_in_a_line(tmp_path, capsys, bag, key, value) -> None:
+def test_wrong_run_json_value_is_reported_in_one_line(tmp_path, capsys, bag, key, value) -> None:
     said = json.loads(read_bag(bag).attachments[RUN_FILE]) | {key: '@'}
     odd = with_account(bag, tmp_path, json.dumps(said).replace('"@"', VALUES[value]).encode())
     lines = list(tried(odd, tmp_path, capsys))
@@ -142,14 +142,14 @@ CHANGES = {
 
 
 @pytest.mark.parametrize('name', CHANGES)
-def test_a_change_that_is_none_is_a_value_error(name: str) -> None:
+def test_malformed_fault_change_raises_value_error(name: str) -> None:
     with pytest.raises(ValueError):  # noqa: PT011 (whatever it says, the bag is named elsewhere)
         read_change(CHANGES[name])
 
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', CHANGES)
-def test_a_change_that_is_none_is_told_in_a_line(tmp_path, capsys, name) -> None:
+def test_malformed_fault_change_is_reported_in_one_line(tmp_path, capsys, name) -> None:
     bag = recorded(tmp_path, 'faults: {quiet: {silence: {}}}\n', 60)
     account = {'faults_topic': '/linkage/withheld', 'withheld_topic': ''}
     time = BEGIN + 60 * MS
@@ -160,7 +160,7 @@ def test_a_change_that_is_none_is_told_in_a_line(tmp_path, capsys, name) -> None
 
 
 @pytest.mark.parametrize('time', [2**31 * 10**9, 2**63 - 1])
-def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> None:
+def test_tick_beyond_all_stamps_is_reported_in_one_line(tmp_path, capsys, time) -> None:
     bag = recorded(tmp_path, 'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n', 60)
     *_, last = read_bag(bag).messages()
     more = (last._replace(log_time=time, publish_time=time),)
@@ -224,7 +224,7 @@ def odd_bag(folder: Path, odd: str) -> Path:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('name', ODD)
-def test_what_is_shown_is_printable(tmp_path: Path, name: str) -> None:
+def test_commands_print_no_control_characters_of_a_bag(tmp_path: Path, name: str) -> None:
     odd_bag(tmp_path, ODD[name])
     for command, more in COMMANDS.items():
         ended = linkage(tmp_path, *command.split(), 'odd', *more)
@@ -238,7 +238,7 @@ def test_what_is_shown_is_printable(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize('name', ODD)
-def test_an_error_is_a_printable_line_with_an_end(name: str) -> None:
+def test_error_message_is_printable_and_bounded(name: str) -> None:
     odd = ODD[name]
     error = LinkageError(odd, odd, odd)
     for text in (str(error), error.where, error.reason, error.remedy):
@@ -257,11 +257,11 @@ def test_an_error_is_a_printable_line_with_an_end(name: str) -> None:
         ('\U000e0001', r'\U000e0001'),
     ],
 )
-def test_only_what_is_not_printable_is_written_otherwise(text: str, expected: str) -> None:
+def test_only_unprintable_characters_are_escaped(text: str, expected: str) -> None:
     assert escape_unprintable(text) == expected
 
 
-def test_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
+def test_printable_stream_keeps_line_breaks(capsys: pytest.CaptureFixture[str]) -> None:
     import sys
 
     print('one\x1b[0m\ntwo\r', file=PrintableStream(sys.stdout))
@@ -351,7 +351,7 @@ def typed(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return linkage(folder, *words, timeout=120.0)
 
 
-def test_every_command_that_takes_a_bag_is_tried() -> None:
+def test_hostile_bags_are_tested_with_every_bag_command() -> None:
     assert {name for name in ALL_COMMANDS if takes_a_bag(name)} == set(TYPED)
 
 
@@ -360,7 +360,7 @@ LINES = [[name, 'strange', *more] for name, lines in TYPED.items() for more in l
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('words', [*LINES, *WITH_A_SCENE], ids=' '.join)
-def test_nothing_that_a_bag_names_is_imported(folder: Path, words: list[str]) -> None:
+def test_commands_import_no_module_named_in_a_bag(folder: Path, words: list[str]) -> None:
     ended = typed(folder, *words)
     assert not (folder / RAN).exists(), ended.stdout
     assert 'Traceback' not in ended.stderr
@@ -371,7 +371,7 @@ def test_nothing_that_a_bag_names_is_imported(folder: Path, words: list[str]) ->
     ), ended.stderr
 
 
-def test_a_replay_says_what_it_would_import(folder: Path) -> None:
+def test_replay_names_the_module_of_an_untrusted_effect(folder: Path) -> None:
     ended = typed(folder, 'replay', 'strange')
     assert ended.stderr == (
         f'linkage replay: strange: scene.yaml:2: effects.{EFFECT}: names a module, and what a '
@@ -380,7 +380,7 @@ def test_a_replay_says_what_it_would_import(folder: Path) -> None:
     )
 
 
-def test_info_names_the_effect_and_says_why_the_rest_is_not_known(folder: Path) -> None:
+def test_info_names_the_effect_that_was_not_imported(folder: Path) -> None:
     account = json.loads(typed(folder, 'info', 'strange', '--json').stdout)
     (linkage,) = account['scene']['linkages']
     assert (linkage['effects'], linkage['effects_not_imported']) == ([], [EFFECT])
@@ -390,7 +390,7 @@ def test_info_names_the_effect_and_says_why_the_rest_is_not_known(folder: Path) 
     assert f'{EFFECT} (not imported)' in typed(folder, 'info', 'strange').stdout
 
 
-def test_a_report_names_it(folder: Path) -> None:
+def test_report_names_the_effect_that_was_not_imported(folder: Path) -> None:
     typed(folder, 'report', 'strange')
     page = (folder / 'strange.html').read_text()
     assert (
@@ -400,7 +400,7 @@ def test_a_report_names_it(folder: Path) -> None:
 
 
 @pytest.mark.parametrize('command', ['info', 'report', 'plot', 'replay'])
-def test_who_trusts_a_bag_is_told_first_what_runs(folder: Path, command: str) -> None:
+def test_trust_effects_prints_the_module_before_the_import(folder: Path, command: str) -> None:
     force = ['--force'] * (command in {'report', 'plot'})
     ended = typed(folder, command, 'strange', '--trust-effects', *force)
     assert (folder / RAN).exists()
@@ -412,7 +412,7 @@ def test_who_trusts_a_bag_is_told_first_what_runs(folder: Path, command: str) ->
     assert ended.returncode == (3 if command == 'replay' else 0), ended.stderr
 
 
-def test_where_the_package_is_found_is_said_before_it_runs(folder: Path) -> None:
+def test_trusted_package_path_is_printed_before_the_import(folder: Path) -> None:
     init = folder / 'canary' / '__init__.py'
     init.write_text(f'{CANARY}\nprint("runs", flush=True)\n')
     try:
@@ -432,7 +432,7 @@ def test_where_the_package_is_found_is_said_before_it_runs(folder: Path) -> None
     assert [lines[0][:27], lines[1]] == ['linkage: strange is trusted', 'runs']
 
 
-def test_the_scene_of_a_bag_is_not_trusted_where_nobody_says_so(folder: Path) -> None:
+def test_recorded_scene_is_not_trusted_by_default(folder: Path) -> None:
     scene = recorded_scene(read_bag(folder / 'strange'))
     assert scene.not_imported == (EFFECT,)
     with pytest.raises(FileError, match='leads to no module here'):
@@ -442,6 +442,6 @@ def test_the_scene_of_a_bag_is_not_trusted_where_nobody_says_so(folder: Path) ->
 @pytest.mark.parametrize(
     'name', ['__main__.effect', 'no_such_package.effect', '.effect', 'a b.effect', 'os.path', '..']
 )
-def test_any_name_is_told_in_a_line(name: str) -> None:
+def test_module_path_of_any_effect_name_is_printable(name: str) -> None:
     own = import_module('linkage_ros.stages.effects.user_effects')
     assert own.found_in(name).isprintable()

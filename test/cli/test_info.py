@@ -77,7 +77,7 @@ def tell(capsys: pytest.CaptureFixture[str]) -> Any:
     return tell
 
 
-def test_counts_and_times_are_those_that_rosbags_finds(bag: Path, tell: Any) -> None:
+def test_info_counts_and_times_equal_those_of_rosbags(bag: Path, tell: Any) -> None:
     account = tell(bag)
     with AnyReader([bag]) as reader:
         assert account['duration_ns'] == reader.end_time - 1 - reader.start_time
@@ -100,7 +100,7 @@ def test_counts_and_times_are_those_that_rosbags_finds(bag: Path, tell: Any) -> 
     assert read.timestamp() == pytest.approx(account['begin_ns'] / SECOND, abs=1e-6)
 
 
-def test_a_run_says_what_ran_and_with_what(bag: Path, tell: Any) -> None:
+def test_info_prints_versions_scene_and_replay_of_a_run(bag: Path, tell: Any) -> None:
     account = tell(bag)
     assert account['versions'] == {
         'linkage_ros': '9.8.7',
@@ -128,9 +128,7 @@ def transmission(crank_angle: float, a: float, b: float, c: float, d: float) -> 
     return min(angle, pi - angle)
 
 
-def test_the_nearest_approach_to_a_toggle_is_that_of_the_law_of_cosines(
-    bag: Path, tell: Any
-) -> None:
+def test_nearest_toggle_distance_follows_the_law_of_cosines(bag: Path, tell: Any) -> None:
     (linkage,) = tell(bag)['scene']['linkages']
     angles = [1.0 + 0.007 * index for index in range(1500)]
     least = min(range(1500), key=lambda number: transmission(angles[number], A, B, C, D))
@@ -146,7 +144,7 @@ def test_the_nearest_approach_to_a_toggle_is_that_of_the_law_of_cosines(
     assert linkage['toggles'] == 0
 
 
-def test_the_way_to_a_toggle_is_counted_in_the_input(tmp_path: Path, tell: Any) -> None:
+def test_distance_to_a_toggle_is_given_in_the_input(tmp_path: Path, tell: Any) -> None:
     a, b, c, d = 0.1, 0.05, 0.06, 0.12  # the crank swings: b + c < a + d
     limit = acos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
     run = Recorded(
@@ -166,7 +164,7 @@ def test_the_way_to_a_toggle_is_counted_in_the_input(tmp_path: Path, tell: Any) 
     )
 
 
-def test_a_state_at_the_toggle_is_counted_as_one(tmp_path: Path, tell: Any) -> None:
+def test_state_at_a_toggle_is_counted_as_toggle(tmp_path: Path, tell: Any) -> None:
     # Stretched out where the crank lies along the ground: b + c = d - a, at 0 and only there.
     run = Recorded(
         tmp_path / 'bag',
@@ -179,7 +177,7 @@ def test_a_state_at_the_toggle_is_counted_as_one(tmp_path: Path, tell: Any) -> N
     assert linkage['nearest_to_toggle']['inputs'] == [0.0]
 
 
-def test_the_worst_residual_is_the_greatest_of_all_and_stands_where_it_was(
+def test_worst_residual_is_the_greatest_with_its_time(
     bag: Path, tell: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (linkage,) = tell(bag)['scene']['linkages']
@@ -203,7 +201,7 @@ linkages:
 """
 
 
-def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any) -> None:
+def test_info_describes_each_of_two_linkages(tmp_path: Path, tell: Any) -> None:
     account = tell(Recorded(tmp_path / 'bag', scene_file(tmp_path, TWO)).run(400))
     left, right = account['scene']['linkages']
     assert (left['name'], right['name']) == ('left', 'right')
@@ -218,12 +216,14 @@ def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any)
         )
 
 
-def test_the_file_alone_says_what_the_folder_says(bag: Path, tell: Any) -> None:
+def test_info_of_an_mcap_file_equals_its_folder(bag: Path, tell: Any) -> None:
     whole, alone = tell(bag), tell(bag / 'bag_0.mcap')
     assert alone | {'bag': ''} == whole | {'bag': ''}
 
 
-def test_a_bag_of_nothing(tmp_path: Path, tell: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_describes_a_bag_without_messages(
+    tmp_path: Path, tell: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     BagWriter(tmp_path / 'empty', [topic('/a', JOINT_STATE)]).close()
     account = tell(tmp_path / 'empty')
     assert (account['duration_ns'], account['begin'], account['messages']) == (None, None, 0)
@@ -245,7 +245,7 @@ def foreign(tmp_path: Path) -> Path:
     return tmp_path / 'foreign'
 
 
-def test_of_a_foreign_bag_the_rest_is_told(
+def test_info_describes_a_bag_without_a_scene(
     foreign: Path, tell: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     account = tell(foreign)
@@ -273,7 +273,7 @@ def test_of_a_foreign_bag_the_rest_is_told(
         ({'scene.yaml': b'linkage: l.yaml\ndrive: {bag: {file: gone}}\n'}, 'gone'),
     ],
 )
-def test_of_a_scene_that_cannot_be_run_the_rest_is_told(
+def test_info_describes_a_bag_whose_scene_fails_to_load(
     tmp_path: Path, tell: Any, attached: dict[str, bytes], reason: str
 ) -> None:
     run = {'scene': 's', 'joint_states_topic': '/a', 'linkage_ros': '99.0'}
@@ -296,7 +296,7 @@ def test_of_a_scene_that_cannot_be_run_the_rest_is_told(
 
 
 @pytest.mark.parametrize('kept', [0.3, 0.6, 0.9])
-def test_of_a_bag_that_was_cut_its_whole_part_is_told(
+def test_info_describes_the_whole_part_of_a_truncated_bag(
     bag: Path, tmp_path: Path, tell: Any, kept: float
 ) -> None:
     content = (bag / 'bag_0.mcap').read_bytes()
@@ -314,7 +314,7 @@ def test_of_a_bag_that_was_cut_its_whole_part_is_told(
     assert linkage['states'] == account['replay']['joint_states'] > 30
 
 
-def test_of_a_damaged_bag_what_lies_before_is_told(
+def test_info_describes_a_damaged_bag_up_to_the_damage(
     bag: Path, tmp_path: Path, tell: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     content = bytearray((bag / 'bag_0.mcap').read_bytes())
@@ -331,7 +331,7 @@ def test_of_a_damaged_bag_what_lies_before_is_told(
 @pytest.mark.parametrize(
     'said', ['rubbish', '[1, 2]', '{"/a": "many"}', '{"/b": 2}', '{"/a": NaN}', 'null', '']
 )
-def test_drops_that_are_not_told_are_not_made_up(tmp_path: Path, tell: Any, said: str) -> None:
+def test_malformed_drop_counts_are_shown_as_unknown(tmp_path: Path, tell: Any, said: str) -> None:
     writer = BagWriter(tmp_path / 'bag', [topic('/a', JOINT_STATE)])
     writer.close({'linkage_ros.dropped': said, 'linkage_ros.failure': 'the disk is full'})
     account = tell(tmp_path / 'bag')
@@ -340,7 +340,7 @@ def test_drops_that_are_not_told_are_not_made_up(tmp_path: Path, tell: Any, said
 
 
 @pytest.mark.parametrize('version', ['new', '9.5', '[9]', 'null', '[9], ros_distro: [9]'])
-def test_a_version_that_is_no_number_is_not_told(
+def test_malformed_metadata_version_is_shown_as_unknown(
     bag: Path, tmp_path: Path, tell: Any, version: str
 ) -> None:
     folder = tmp_path / 'bag'
@@ -353,7 +353,7 @@ def test_a_version_that_is_no_number_is_not_told(
     assert account['versions']['ros_distro'] is None
 
 
-def test_a_signal_ends_the_reading_and_what_was_read_is_told(
+def test_signal_ends_info_while_reading_and_prints_the_part(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stop = Event()
@@ -376,7 +376,7 @@ class Later(Event):
         return before
 
 
-def test_a_signal_ends_looking_at_states_too(
+def test_signal_ends_info_while_examining_states(
     bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert answer(info, bag, '--json', stop=Later()) == 1
@@ -386,7 +386,7 @@ def test_a_signal_ends_looking_at_states_too(
     assert account['scene']['linkages'][0]['states'] == 1024
 
 
-def test_joint_states_that_come_out_otherwise_are_counted(
+def test_info_counts_joint_states_that_replay_differently(
     bag: Path, tmp_path: Path, tell: Any
 ) -> None:
     def edit(index: int, message: BagMessage) -> BagMessage:
@@ -399,7 +399,7 @@ def test_joint_states_that_come_out_otherwise_are_counted(
     }
 
 
-def test_what_a_terminal_would_obey_is_spelled_out(
+def test_info_escapes_terminal_sequences_in_topic_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     BagWriter(tmp_path / 'bag', [topic('/a\x1b[2J\n', JOINT_STATE)]).close()
@@ -410,7 +410,7 @@ def test_what_a_terminal_would_obey_is_spelled_out(
 
 
 @pytest.mark.parametrize(('beyond', 'states', 'limited'), [('publish', 10, 4), ('silent', 6, 0)])
-def test_states_beyond_limits_are_counted(
+def test_info_counts_states_beyond_joint_limits(
     tmp_path: Path, tell: Any, beyond: str, states: int, limited: int
 ) -> None:
     """Where nothing is published there, there are no such states to count."""
@@ -428,7 +428,7 @@ def test_states_beyond_limits_are_counted(
 
 
 @pytest.mark.parametrize('linkage', ['ankle_motors', 'four_bar'])
-def test_of_states_no_rates_are_asked_for(tmp_path, tell, monkeypatch, linkage):
+def test_info_computes_no_rates_of_states(tmp_path, tell, monkeypatch, linkage):
     # Only the pose says how well a loop closed: rates, in space, would take most of the time.
     scene = tmp_path / 'scene.yaml'
     scene.write_text(
@@ -461,7 +461,7 @@ def read_worst(scene: Scene) -> tuple[float, float]:
     return max(residuals), min(conditionings)
 
 
-def test_a_simulated_clock_has_no_date(tmp_path, tell):
+def test_simulated_clock_is_printed_without_a_date(tmp_path, tell):
     scene = tmp_path / 'scene.yaml'
     scene.write_text('linkage: four_bar\nrate: 10\ndrive: {constant_rate: {rate: 1}}\n')
     simulate_run(load_scene(scene), tmp_path / 'bag', 21, lambda _: True)

@@ -39,7 +39,7 @@ def shipped(name: str) -> str:
     return str(LINKAGES / f'{name}.yaml')
 
 
-def test_check_gives_json_in_si_units(linkage: Run) -> None:
+def test_check_prints_json_in_si_units(linkage: Run) -> None:
     account = json.loads(linkage('check', shipped('double_rocker'), '--json').stdout)
     limit = acos(0.8)
     assert min(abs(one['low']) for one in account['ranges']) == pytest.approx(limit, abs=1e-12)
@@ -48,7 +48,7 @@ def test_check_gives_json_in_si_units(linkage: Run) -> None:
     assert min(map(abs, toggles)) == pytest.approx(limit, abs=1e-12)
 
 
-def test_check_on_a_terminal_draws_tables(tmp_path: Path) -> None:
+def test_check_draws_tables_on_a_terminal(tmp_path: Path) -> None:
     pytest.importorskip('rich')
     shown = on_terminal(tmp_path, 'check', FOUR_BAR, columns=160)
     assert '╭' in shown
@@ -66,7 +66,7 @@ def by_hand(a: float, b: float, c: float, d: float, phi: float) -> tuple[float, 
     return phase(b_pin - crank_pin) - phi, phase(b_pin - d)
 
 
-def test_solve_gives_full_precision_at_the_inputs_asked_for(linkage: Run) -> None:
+def test_solve_prints_full_precision_at_the_given_inputs(linkage: Run) -> None:
     answer = linkage('solve', FOUR_BAR, '--at', '40', '--at=-100.5', '--json')
     assert answer.returncode == 0, answer.stderr
     told = json.loads(answer.stdout)
@@ -82,7 +82,7 @@ def test_solve_gives_full_precision_at_the_inputs_asked_for(linkage: Run) -> Non
             assert -pi < state[name] <= pi
 
 
-def test_a_sweep_goes_over_the_whole_range_from_toggle_to_toggle(linkage: Run) -> None:
+def test_solve_sweeps_the_whole_range_between_toggles(linkage: Run) -> None:
     answer = linkage('solve', shipped('elliptic_trammel'), '--steps', '6', '--csv')
     rows = list(csv.DictReader(io.StringIO(answer.stdout)))
     assert len(rows) == 7
@@ -93,7 +93,7 @@ def test_a_sweep_goes_over_the_whole_range_from_toggle_to_toggle(linkage: Run) -
         assert x * x + y * y == pytest.approx(0.0144, abs=1e-15)
 
 
-def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
+def test_solved_rates_and_accelerations_equal_differences_of_positions(linkage: Run) -> None:
     """Against central differences of positions, of joints and of a traced point."""
     step = 1e-3  # s; at 20 °/s and 5 °/s²
     at = [f'{50.0 + 20.0 * t + 0.5 * 5.0 * t * t!r}' for t in (-step, 0.0, step)]
@@ -112,7 +112,7 @@ def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
         assert now[f'{name} acceleration'] == pytest.approx(change, rel=1e-4, abs=1e-4)
 
 
-def test_several_inputs_are_separate_words(linkage: Run) -> None:
+def test_solve_takes_several_inputs_as_separate_words(linkage: Run) -> None:
     answer = linkage(*('solve', shipped('five_bar'), '--at', '120', '60', '--points', '--json'))
     (state,) = json.loads(answer.stdout)['states']
     assert (state['left_crank_joint'], state['right_crank_joint']) == (radians(120), radians(60))
@@ -139,14 +139,14 @@ PNG = b'\x89PNG\r\n\x1a\n'
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', NAMES)
-def test_every_shipped_linkage_is_drawn(linkage: Run, tmp_path: Path, name: str) -> None:
+def test_draw_draws_every_shipped_linkage(linkage: Run, tmp_path: Path, name: str) -> None:
     answer = linkage('draw', shipped(name), '--names')
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout == f'{name}.png\n'
     assert (tmp_path / f'{name}.png').read_bytes().startswith(PNG)
 
 
-def test_a_picture_is_the_same_each_time(tmp_path: Path) -> None:
+def test_repeated_drawing_gives_the_same_bytes(tmp_path: Path) -> None:
     for kind in ('svg', 'png'):
         drawn = []
         for index in range(2):
@@ -164,7 +164,7 @@ def test_a_picture_is_the_same_each_time(tmp_path: Path) -> None:
         assert drawn[0] == drawn[1]
 
 
-def test_a_pose_and_what_lies_behind_it_can_be_named(linkage: Run, tmp_path: Path) -> None:
+def test_draw_takes_several_poses(linkage: Run, tmp_path: Path) -> None:
     answer = linkage(
         *('draw', FOUR_BAR, '--at', '40', '--at', '80', '--at=-20', '--names', '-o', 'x.svg')
     )
@@ -172,7 +172,7 @@ def test_a_pose_and_what_lies_behind_it_can_be_named(linkage: Run, tmp_path: Pat
     assert '<!-- four_bar, crank_joint 40° -->' in (tmp_path / 'x.svg').read_text('utf-8')
 
 
-def test_without_matplotlib_a_line_says_what_to_install(tmp_path: Path) -> None:
+def test_draw_without_matplotlib_names_what_to_install(tmp_path: Path) -> None:
     code = (
         'import sys; sys.modules["matplotlib"] = None\n'
         'import importlib.util as u; find = u.find_spec\n'
@@ -194,7 +194,7 @@ def test_without_matplotlib_a_line_says_what_to_install(tmp_path: Path) -> None:
     assert 'Traceback' not in answer.stderr
 
 
-def test_solving_takes_neither_ros_nor_matplotlib(tmp_path: Path) -> None:
+def test_solve_imports_neither_rclpy_nor_matplotlib(tmp_path: Path) -> None:
     code = (
         'import sys\nfrom linkage_ros.cli.main import main\n'
         f'main(["solve", {FOUR_BAR!r}, "--at", "40"])\n'
@@ -206,7 +206,7 @@ def test_solving_takes_neither_ros_nor_matplotlib(tmp_path: Path) -> None:
     assert answer.returncode == 0, answer.stderr
 
 
-def test_a_full_turn_of_a_parallelogram_is_solved_by_continuity(linkage: Run) -> None:
+def test_solve_follows_a_parallelogram_over_a_full_turn(linkage: Run) -> None:
     answer = linkage('solve', shipped('parallelogram'), '--steps', '8', '--json')
     for state in json.loads(answer.stdout)['states']:
         difference = state['follower_joint'] - state['crank_joint']
@@ -219,7 +219,7 @@ def test_a_full_turn_of_a_parallelogram_is_solved_by_continuity(linkage: Run) ->
 DEFECTS = Path(__file__).parents[1] / 'kinematics' / 'defects'
 
 
-def test_each_assembly_that_check_lists_is_a_pose_to_paste(linkage: Run, tmp_path: Path) -> None:
+def test_assemblies_that_check_lists_are_poses_to_paste(linkage: Run, tmp_path: Path) -> None:
     text = (DEFECTS / 'class3_beyond_range.yaml').read_text('utf-8')
     answer = linkage('check', str(DEFECTS / 'class3_beyond_range.yaml'))
     assert (
@@ -241,7 +241,7 @@ def test_each_assembly_that_check_lists_is_a_pose_to_paste(linkage: Run, tmp_pat
     assert len(set(joints)) == 4
 
 
-def test_solve_goes_from_toggle_to_toggle_of_more_than_a_turn(linkage: Run) -> None:
+def test_solve_sweeps_more_than_a_turn_between_toggles(linkage: Run) -> None:
     file = str(DEFECTS / 'class3_over_a_turn.yaml')
     answer = linkage('solve', file, '--radians', '--steps', '60')
     rows = [line.split() for line in answer.stdout.splitlines()[1:]]
@@ -249,7 +249,7 @@ def test_solve_goes_from_toggle_to_toggle_of_more_than_a_turn(linkage: Run) -> N
     assert float(rows[-1][0]) - float(rows[0][0]) > 7.5
 
 
-def test_solve_is_open_beyond_the_range_that_check_names(linkage: Run) -> None:
+def test_solve_prints_open_beyond_the_range_of_check(linkage: Run) -> None:
     file = str(DEFECTS / 'class3_beyond_range.yaml')
     answer = linkage(
         'solve', file, '--radians', '--at', '6.75324', '--at', '0.47', '--at', '0.4731'

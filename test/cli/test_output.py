@@ -43,7 +43,7 @@ PLACES = {
 @pytest.mark.sample(12)
 @pytest.mark.parametrize('place', PLACES)
 @pytest.mark.parametrize('command', COMMANDS)
-def test_no_command_shows_a_traceback_wherever_its_output_goes(tmp_path, command, place) -> None:
+def test_commands_show_no_traceback_for_any_output(tmp_path, command, place) -> None:
     script, variables = PLACES[place]
     done = subprocess.run(
         ['sh', '-c', script, 'sh', *LINKAGE, command, *COMMANDS[command]],
@@ -76,7 +76,7 @@ sys.exit(main())
 """
 
 
-def test_no_room_for_temporary_files_is_one_line(tmp_path: Path) -> None:
+def test_full_temporary_folder_is_reported_in_one_line(tmp_path: Path) -> None:
     words = ['simulate', 'worn_press', '--seconds', '0.1', '-o', 'x.csv']
     done = subprocess.run(
         [sys.executable, '-c', FULL, *words],
@@ -118,7 +118,7 @@ IMPORTED = (
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize('name', IMPORTED)
-def test_a_signal_during_an_import_is_one_line(tmp_path, name, number) -> None:
+def test_signal_during_an_import_is_reported_in_one_line(tmp_path, name, number) -> None:
     done = subprocess.run(
         [sys.executable, '-c', DURING, name, str(int(number)), 'check', 'four_bar'],
         cwd=tmp_path,

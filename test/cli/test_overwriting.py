@@ -62,7 +62,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_all_commands_that_write_are_tried() -> None:
+def test_overwriting_is_tested_for_every_command_that_writes() -> None:
     writing = set()
     for command in COMMANDS:
         parser = parser_of(command, find_command(command))
@@ -75,9 +75,7 @@ def test_all_commands_that_write_are_tried() -> None:
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('command', [name for name in WRITES if name != 'import'])
-def test_a_file_that_exists_is_overwritten_by_force_only_and_keeps_its_mode(
-    folder, command
-) -> None:
+def test_only_force_overwrites_a_file_and_keeps_its_mode(folder, command) -> None:
     words, name, is_default = WRITES[command]
     file = folder / name
     file.write_text('mine')
@@ -95,9 +93,7 @@ def test_a_file_that_exists_is_overwritten_by_force_only_and_keeps_its_mode(
 
 
 @pytest.mark.parametrize('command', FOLDERS)
-def test_a_bag_that_exists_is_overwritten_by_force_only_and_another_folder_never(
-    folder, command
-) -> None:
+def test_only_force_overwrites_a_bag_and_no_other_folder(folder, command) -> None:
     def run(*more: str) -> CompletedProcess[str]:
         return linkage(folder, command, *FOLDERS[command], '-o', 'new', *more)
 
@@ -119,7 +115,7 @@ def test_a_bag_that_exists_is_overwritten_by_force_only_and_another_folder_never
 
 @pytest.mark.parametrize('command', ['replay', 'recover'])
 @pytest.mark.parametrize('given', ['bag', 'bag/bag_0.mcap'])
-def test_the_bag_that_is_read_is_never_overwritten(folder, command, given) -> None:
+def test_input_bag_is_never_overwritten(folder, command, given) -> None:
     words = [given, *FOLDERS[command][1:]]
     refused = linkage(folder, command, *words, '-o', 'bag', '--force')
     assert refused.returncode == 2
@@ -139,7 +135,7 @@ READS = {
 
 
 @pytest.mark.parametrize('kind', READS)
-def test_a_file_that_the_command_reads_is_never_overwritten(tmp_path, kind) -> None:
+def test_input_file_is_never_overwritten(tmp_path, kind) -> None:
     command, words, output = READS[kind]
     files = {
         'scene.yaml': 'linkage: linkage.yaml\n',

@@ -47,7 +47,7 @@ def pieces(curve):
 
 @pytest.mark.parametrize('wrapped', [False, True], ids=['continuous', 'wrapped'])
 @pytest.mark.parametrize('way', [1.0, -1.0], ids=['onward', 'backward'])
-def test_angles_are_continuous_over_a_turn_in_whichever_turn_they_were_recorded(way, wrapped):
+def test_plotted_angles_of_wrapped_runs_are_continuous(way, wrapped):
     closure = closure_of('four_bar')
     cranks = [(1.0 + way * 0.03 * row,) for row in range(700)]
     positions = [closure.position(*crank).joints for crank in cranks]
@@ -71,7 +71,7 @@ def test_angles_are_continuous_over_a_turn_in_whichever_turn_they_were_recorded(
         assert joint.x[-1] == np.nanmax(joint.x)
 
 
-def test_a_crank_that_swings_is_drawn_over_its_range():
+def test_curve_of_a_swinging_crank_spans_its_range():
     closure = closure_of('double_rocker')
     reach = InputSweep(closure, usual_inputs(closure)).widest_range
     middle, half = (reach.lowest + reach.highest) / 2, 0.45 * (reach.highest - reach.lowest)
@@ -85,7 +85,7 @@ def test_a_crank_that_swings_is_drawn_over_its_range():
         assert np.nanmax(joint.x) == pytest.approx(middle + half, abs=0.01)
 
 
-def test_a_stuck_joint_stays_at_one_angle_within_a_turn():
+def test_stuck_joint_is_drawn_at_one_angle():
     closure = closure_of('four_bar')
     cranks = [(0.01 * row,) for row in range(628)]
     positions = [(-3.0, 1.0)] * 628
@@ -95,7 +95,7 @@ def test_a_stuck_joint_stays_at_one_angle_within_a_turn():
         assert np.ptp(values) == 0.0
 
 
-def test_a_reading_that_is_no_number_hides_itself_only():
+def test_nan_reading_removes_only_its_own_point():
     closure = closure_of('four_bar')
     cranks = [(0.01 * row,) for row in range(100)]
     positions = [closure.position(*crank).joints for crank in cranks]
@@ -106,7 +106,7 @@ def test_a_reading_that_is_no_number_hides_itself_only():
 
 
 @pytest.mark.parametrize('lost', [(), (100,), (100, 101), (50, 150, 151, 152)])
-def test_a_curve_breaks_where_ticks_were_lost(lost):
+def test_curve_breaks_at_lost_ticks(lost):
     closure = closure_of('four_bar')
     rows = [row for row in range(200) if row not in lost]
     cranks = [(0.01 * row,) for row in rows]
@@ -124,12 +124,12 @@ def test_a_curve_breaks_where_ticks_were_lost(lost):
         assert y[~np.isnan(y)].tolist() == [values[place] for values in positions]
 
 
-def test_samples_at_any_times_have_no_gaps_but_silences():
+def test_unsteady_samples_have_gaps_only_at_long_silences():
     times = np.cumsum([0.01, 0.02, 0.005, 0.02, 0.01, 0.5, 0.01])
     assert is_after_gap(times, steady=False).tolist() == [False] * 5 + [True, False]
 
 
-def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
+def test_axes_name_quantities_with_units(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
     bag = Recorded(
         tmp_path / 'bag', scene, lambda row: {'crank_joint': (1.0 + 0.007 * row, 7.0)}
@@ -142,7 +142,7 @@ def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
     assert text.count('<!-- rocker_joint -->') == 2
 
 
-def test_the_axis_of_time_has_its_unit(tmp_path: Path) -> None:
+def test_time_axis_names_its_unit(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
     bag = Recorded(
         tmp_path / 'bag', scene, lambda row: {'crank_joint': (1.0 + 0.007 * row, 7.0)}
@@ -157,7 +157,7 @@ def test_the_axis_of_time_has_its_unit(tmp_path: Path) -> None:
     ('typed', 'axis'),
     [((), 'time since the first joint state [s]'), (('--over', 'crank'), 'm1 [°]')],
 )
-def test_joints_of_several_inputs_are_drawn_over_time_unless_said(
+def test_joints_of_two_inputs_are_drawn_over_time(
     tmp_path: Path, typed: tuple[str, ...], axis: str
 ) -> None:
     linkage = shipped_path('linkages/space/ankle_motors.yaml').read_text()
@@ -181,9 +181,7 @@ def drawn(monkeypatch):
 
 
 @pytest.mark.parametrize('over', ['crank', 'time'])
-def test_accelerations_that_were_recorded_are_drawn_below_with_one_left_edge(
-    tmp_path, drawn, over
-):
+def test_recorded_accelerations_are_drawn_below_the_rates(tmp_path, drawn, over):
     linkage = shipped_path('linkages/slider_crank.yaml').read_text()
     scene = scene_file(tmp_path, 'effects: {acceleration: {}}\n', linkage)
     bag = Recorded(
@@ -209,7 +207,7 @@ def test_accelerations_that_were_recorded_are_drawn_below_with_one_left_edge(
         assert found[known] == pytest.approx(slopes[known], abs=0.02 * np.nanmax(np.abs(found)))
 
 
-def test_more_curves_than_colours_are_told_apart():
+def test_28_curves_differ_in_colour_or_dashes():
     names = [f'joint_{index}' for index in range(28)]
     curves = [Curve(name, True, (0.0, 1.0), (float(i), float(i))) for i, name in enumerate(names)]
     figure = Figure()

@@ -30,13 +30,13 @@ def bag(tmp_path_factory):
     return Recorded(folder / 'bag', scene_file(folder, SCENE, FOUR_BAR)).run(TICKS)
 
 
-def test_without_a_limit_all_is_proved(bag):
+def test_proof_without_a_limit_replays_the_whole_run(bag):
     text = proof_of(bag, TICKS, inf)
     assert f'{TICKS} of {TICKS} joint states and {TICKS} of {TICKS} motion' in text
     assert text.endswith('of the run all')
 
 
-def test_with_a_limit_it_is_a_sample_of_whole_ticks_that_says_so(bag, monkeypatch):
+def test_proof_with_a_limit_replays_a_sample_of_ticks(bag, monkeypatch):
     clock = iter(range(10**9))
     monkeypatch.setattr('linkage_ros.cli.proof.monotonic', lambda: next(clock))
     text = proof_of(bag, TICKS, 100.0)
@@ -47,7 +47,7 @@ def test_with_a_limit_it_is_a_sample_of_whole_ticks_that_says_so(bag, monkeypatc
     assert 'of the run a sample, its first 0.1 s: --prove proves all' in text
 
 
-def test_a_bag_without_end_takes_no_longer_than_the_limit():
+def test_proof_of_an_endless_bag_ends_at_the_limit():
     def endless():
         number = 0
         while True:

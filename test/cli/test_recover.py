@@ -34,7 +34,7 @@ def bag(linkage: Run, tmp_path: Path) -> Path:
     return tmp_path / 'runs' / 'run'
 
 
-def test_what_is_left_of_a_run_replays_to_the_same_bytes(
+def test_recovered_part_of_a_run_replays_to_same_bytes(
     linkage: Run, tmp_path: Path, bag: Path
 ) -> None:
     file = next(bag.glob('*.mcap'))
@@ -60,7 +60,7 @@ def test_what_is_left_of_a_run_replays_to_the_same_bytes(
     assert file.read_bytes() == content[: len(content) // 2]
 
 
-def test_a_whole_bag_loses_nothing_and_no_folder_is_used_twice(linkage: Run, bag: Path) -> None:
+def test_recovery_of_a_whole_bag_loses_no_message(linkage: Run, bag: Path) -> None:
     answer = linkage('recover', str(bag), '-o', 'whole')
     assert answer.returncode == 0, answer.stdout + answer.stderr
     assert answer.stdout.splitlines()[-2:] == ['nothing lost', 'bag          whole']

@@ -49,7 +49,7 @@ def refusal(setting: str) -> str:
 
 @pytest.mark.sample(20)
 @pytest.mark.parametrize('setting', MAPPINGS)
-def test_the_example_of_a_mapping_can_be_pasted(setting):
+def test_example_mapping_of_an_error_can_be_pasted(setting):
     text = refusal(setting)
     found = re.search(r"is not a mapping; write (?:--set ')?(\w+)(?:: |=)(\{.*\})'?$", text)
     assert found, text
@@ -62,7 +62,7 @@ def test_the_example_of_a_mapping_can_be_pasted(setting):
     assert not re.search(rf'{key}.*(is missing|is not a mapping|unknown key|below|above)', again)
 
 
-def test_masses_are_added_as_the_error_writes_them(tmp_path):
+def test_masses_of_the_error_message_complete_the_linkage(tmp_path):
     scene, linkage = tmp_path / 's.yaml', tmp_path / 'l.yaml'
     scene.write_text(
         'linkage: l.yaml\nrate: 100\ndrive: {torque: {}}\nloads: {gravity: [0, -9.81]}\n'
@@ -84,7 +84,7 @@ def test_masses_are_added_as_the_error_writes_them(tmp_path):
     Pipeline(load_scene(scene))
 
 
-def test_of_two_inputs_one_joint_is_not_asked_for_by_two_names():
+def test_drive_joint_of_two_inputs_asks_for_two_joints():
     text = refusal_of('five_bar', 'drive={topic: {joint: left_elbow}}')
     assert '1 for 2 inputs; name 2 different joints' in text
     load_scene('five_bar', ['drive={topic: {}}'])
@@ -97,7 +97,7 @@ def refusal_of(linkage: str, setting: str) -> str:
 
 
 @pytest.mark.parametrize('options', [[], ['--assemblies']])
-def test_a_spatial_linkage_is_drawn_as_the_error_says(tmp_path, capsys, options):
+def test_spatial_linkage_is_drawn_to_the_suggested_file(tmp_path, capsys, options):
     assert main(['draw', 'rssr', '-o', str(tmp_path / 'x.dxf'), *options]) == 2
     told = capsys.readouterr().err.strip()
     assert ('--assemblies' in told) == bool(options)

@@ -100,7 +100,7 @@ def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', SCENES)
-def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
+def test_recorded_run_replays_to_the_same_bytes(tmp_path, capsys, name):
     bag = recorded(tmp_path, SCENES[name], resets=RESETS.get(name, ()))
     code, account = told(capsys, bag)
     assert (code, account['verdict']) == (0, 'identical')
@@ -116,7 +116,7 @@ def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
     assert 'identical' in capsys.readouterr().out
 
 
-def test_on_a_shared_topic_messages_without_an_open_linkage_are_compared(tmp_path, capsys):
+def test_replay_compares_messages_without_an_open_linkage(tmp_path, capsys):
     def cranks(number: int) -> Mapping[str, tuple[float, float]]:
         first = {'a_crank_joint': (0.01 * number, 10.0)}
         return first | ({'b_crank_joint': (0.02 * number, 20.0)} if number > 40 else {})
@@ -129,7 +129,7 @@ def test_on_a_shared_topic_messages_without_an_open_linkage_are_compared(tmp_pat
     assert states['same'] == states['recorded'] == 80
 
 
-def test_two_linkages_that_withhold_at_one_tick_say_so_once(tmp_path, capsys):
+def test_tick_withheld_by_two_linkages_is_counted_once(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['two that withhold'])
     code, account = told(capsys, bag)
     assert (code, account['verdict']) == (0, 'identical')
@@ -148,7 +148,7 @@ def spoil(data: bytes, place: int, bits: int) -> tuple[bytes, float, float]:
     return data.replace(pack('<d', value), pack('<d', other)), value, other
 
 
-def test_one_bit_of_one_position_is_named(tmp_path, capsys):
+def test_replay_names_one_changed_bit_of_a_position(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['rates'])
     found = {}
 
@@ -189,7 +189,7 @@ def test_one_bit_of_one_position_is_named(tmp_path, capsys):
     assert f'replayed by linkage_ros {versions_here()["linkage_ros"]}' in text
 
 
-def test_json_has_the_documented_keys(tmp_path, capsys):
+def test_replay_json_has_the_documented_keys(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['rates'])
     assert set(told(capsys, bag)[1]) == json_keys('replay')
 
@@ -211,7 +211,7 @@ def test_json_has_the_documented_keys(tmp_path, capsys):
     assert set(row) | set(row['ulp_at']) == json_keys_of('replay', 'greatest')
 
 
-def test_a_bag_of_another_machine_is_told_by_how_much_it_differs(tmp_path, capsys):
+def test_replay_counts_differences_of_a_bag_from_another_machine(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['rates'])
     apart = []
 
@@ -234,7 +234,7 @@ def test_a_bag_of_another_machine_is_told_by_how_much_it_differs(tmp_path, capsy
     assert (row['ulp_at']['joint'], row['unit']) == ('coupler_joint', 'rad')
 
 
-def test_what_the_recorder_dropped_is_no_difference(tmp_path, capsys):
+def test_dropped_messages_are_no_difference(tmp_path, capsys):
     text = 'effects: {acceleration: {}}\n'
     bag = recorded(
         tmp_path, text, drop=lambda number, name: name == '/joint_states' and not number % 5
@@ -246,7 +246,7 @@ def test_what_the_recorder_dropped_is_no_difference(tmp_path, capsys):
     assert motions['recorded'] == motions['same'] == 300
 
 
-def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys):
+def test_tick_withheld_then_and_published_now_is_a_difference(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {dropout: {probability: 0.3}}\n')
     files = read_bag(bag).attachments
 
@@ -285,7 +285,7 @@ def from_tick(number: int) -> Edit:
 
 
 @pytest.mark.parametrize('name', MID_RUN)
-def test_a_bag_that_was_begun_in_mid_run(tmp_path, capsys, name):
+def test_replay_judges_a_bag_recorded_from_mid_run(tmp_path, capsys, name):
     text, first, begun, code, verdict, untold = MID_RUN[name]
     said = {'begun': begun} if begun else {}
     bag = rewritten(recorded(tmp_path, text), 'part', from_tick(first), **said)
@@ -317,7 +317,7 @@ def test_whole_turns_before_the_bag_are_no_difference(tmp_path, capsys):
     assert answer(replay, rewritten(bag, 'whole', from_tick(690), begun='with the run')) == 3
 
 
-def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
+def test_replay_finds_a_changed_bit_in_mid_run_bags(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
 
     def edit(number: int, message: BagMessage) -> BagMessage | None:
@@ -332,7 +332,7 @@ def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(('running', 'said'), [(True, 'mid-run'), (False, 'with the run')])
-def test_a_recording_says_when_it_was_begun(tmp_path, running, said):
+def test_run_json_records_whether_recording_began_in_mid_run(tmp_path, running, said):
     logger = SimpleNamespace(info=lambda _: None, error=lambda _: None)
     pipeline = SimpleNamespace(linkages=[])
     loop = SimpleNamespace(is_running=running, recorder=None, pipeline=pipeline)
@@ -345,7 +345,7 @@ def test_a_recording_says_when_it_was_begun(tmp_path, running, said):
     assert json.loads(read_bag(folder).attachments[RUN_FILE])['begun'] == said
 
 
-def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
+def test_truncated_bag_is_replayed_up_to_its_end(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['rates'], 12_000)
     whole = (bag / 'bag_0.mcap').read_bytes()
     part = tmp_path / 'part.mcap'
@@ -370,7 +370,7 @@ def long_bag(tmp_path_factory):
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('part', [0.09, 0.3, 0.66, 0.98])
 @pytest.mark.parametrize('more', [[], ['--set', 'angles=wrapped']])
-def test_a_bag_that_is_shorter_than_its_metadata_says_is_a_loss(
+def test_replay_counts_messages_missing_against_the_metadata(
     tmp_path, capsys, long_bag, part, more
 ):
     bag = Path(shutil.copytree(long_bag, tmp_path / 'bag'))
@@ -384,7 +384,7 @@ def test_a_bag_that_is_shorter_than_its_metadata_says_is_a_loss(
     assert f'{len(whole) - len(there):,} messages that its metadata.yaml promises are not' in err
 
 
-def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
+def test_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
     bag = recorded(tmp_path, SCENES['rates'], 12_000)
     file = bag / 'bag_0.mcap'
     data = bytearray(file.read_bytes())
@@ -399,7 +399,7 @@ def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
     assert 'the part before it was replayed' in err
 
 
-def test_a_wish_to_stop_is_heard(tmp_path, capsys):
+def test_stop_ends_the_replay_with_code_1(tmp_path, capsys):
     bag = recorded(tmp_path, '', 6000)
     stop = Event()
     stop.set()
@@ -409,7 +409,7 @@ def test_a_wish_to_stop_is_heard(tmp_path, capsys):
     assert err == 'linkage replay: stopped; the rest of the bag was not replayed\n'
 
 
-def test_a_bag_that_does_not_say_what_ran_is_answered_with_what_is_missing(tmp_path):
+def test_replay_names_the_files_that_a_bag_lacks(tmp_path):
     with BagWriterOf(tmp_path / 'foreign') as write:
         write(0)
     with pytest.raises(LinkageError) as raised:
@@ -419,7 +419,7 @@ def test_a_bag_that_does_not_say_what_ran_is_answered_with_what_is_missing(tmp_p
     )
 
 
-def test_a_bag_of_no_joint_states_is_refused(tmp_path):
+def test_replay_refuses_a_bag_without_joint_states(tmp_path):
     bag = rewritten(
         recorded(tmp_path, ''), 'silent', lambda _, m: m if m.topic == '/crank_states' else None
     )
@@ -464,7 +464,7 @@ def compared(recorded: bytes, now: bytes, turning: tuple[str, ...] = ()) -> Comp
 @example(-5e-324, 2, inf)
 @example(1.0, 3, -inf)
 @example(2.0**-1022, 5, -inf)
-def test_ulps_are_the_steps_from_one_double_to_the_other(value, steps, towards):
+def test_ulp_distance_counts_steps_between_two_doubles(value, steps, towards):
     other = value
     for _ in repeat(None, steps):
         other = nextafter(other, towards)
@@ -472,13 +472,13 @@ def test_ulps_are_the_steps_from_one_double_to_the_other(value, steps, towards):
     assert ulp_distance(value, other) == ulp_distance(other, value) == steps
 
 
-def test_the_zeros_are_none_apart():
+def test_ulp_distance_of_the_two_zeros_is_0():
     assert ulp_distance(-0.0, 0.0) == 0
 
 
 @given(st.floats(-3.141, 3.141), st.integers(-10_000, 10_000), st.integers(-10_000, 10_000))
 @example(0.1, -3, 5)
-def test_whole_turns_are_no_difference_where_turns_do_not_count(angle, then, now):
+def test_comparison_ignores_whole_turns_of_a_crank(angle, then, now):
     recorded = WRITE(1, [angle + then * tau, 0.5], [1.0, 2.0])
     again = WRITE(1, [angle + now * tau, 0.5], [1.0, 2.0])
     assert compared(recorded, again, ('crank',)).differing == 0
@@ -497,7 +497,7 @@ def test_whole_turns_are_no_difference_where_turns_do_not_count(angle, then, now
         (([1.0, 0.5], [tau, 0.0]), ([1.0, 0.5], [0.0, 0.0])),
     ],
 )
-def test_what_is_no_whole_turn_is_a_difference(then, now):
+def test_comparison_counts_partial_turns_and_slides_as_differences(then, now):
     found = compared(WRITE(1, *then), WRITE(1, *now), ('crank',))
     assert found.differing == 1
 
@@ -529,7 +529,7 @@ DIFFERENCES = {
 
 
 @pytest.mark.parametrize('name', DIFFERENCES)
-def test_the_first_difference_is_told(name):
+def test_comparison_names_the_first_difference(name):
     recorded, now, what, joint = DIFFERENCES[name]
     found = compared(recorded, now)
     assert (found.ticks, found.differing) == (1, 1)
@@ -538,7 +538,7 @@ def test_the_first_difference_is_told(name):
     assert found.first.joint == joint
 
 
-def test_deviations_are_those_of_all_messages():
+def test_deviations_cover_all_compared_messages():
     found = Comparison([('/s', JOINT_STATE)])
     positions = [(0.0, 0.0), (0.0, 3.0), (1.0, 1.0), (2.0, -2.0)]
     for number, (then, now) in enumerate(positions, 1):

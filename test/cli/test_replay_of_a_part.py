@@ -53,7 +53,7 @@ RINGS = {
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', RINGS)
-def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
+def test_replay_of_a_ring_names_the_removed_beginning(tmp_path, capsys, name) -> None:
     effects, code, verdict, lost = RINGS[name]
     bag = recorded(tmp_path, f'effects: {{{effects}}}\n')
     ring = rewritten(bag, 'ring', storage=RING)
@@ -68,7 +68,7 @@ def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
     assert f'\n{why}\n' in capsys.readouterr().out
 
 
-def test_a_difference_in_a_ring_is_found(tmp_path, capsys) -> None:
+def test_replay_finds_a_difference_in_a_ring(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
 
     def edit(_: int, message: BagMessage) -> BagMessage:
@@ -80,7 +80,7 @@ def test_a_difference_in_a_ring_is_found(tmp_path, capsys) -> None:
     assert (code, account['verdict'], account['different_ticks']) == (3, 'different', 1)
 
 
-def test_a_file_alone_that_is_not_the_first_says_so(tmp_path, capsys) -> None:
+def test_replay_of_a_later_split_file_names_missing_beginning(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n')
     split = rewritten(bag, 'split', storage=Storage(split_seconds=0.1))
     code, account = told(capsys, split)
@@ -91,7 +91,7 @@ def test_a_file_alone_that_is_not_the_first_says_so(tmp_path, capsys) -> None:
 
 
 @pytest.mark.parametrize('said', ['mid-run', 'with the run'])
-def test_a_ring_that_was_begun_in_mid_run_is_one_case(tmp_path, capsys, said) -> None:
+def test_ring_begun_in_mid_run_is_identical(tmp_path, capsys, said) -> None:
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
     part = rewritten(bag, 'part', from_tick(31), storage=RING, begun=said)
     code, account = told(capsys, part)
@@ -99,7 +99,7 @@ def test_a_ring_that_was_begun_in_mid_run_is_one_case(tmp_path, capsys, said) ->
     assert account['beginning_missing'].startswith('its first ')
 
 
-def test_what_had_to_be_dropped_is_told_where_something_differs(tmp_path, capsys) -> None:
+def test_replay_names_dropped_messages_beside_a_difference(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n')
 
     def without_one(_: int, message: BagMessage) -> BagMessage | None:
@@ -123,7 +123,7 @@ def test_what_had_to_be_dropped_is_told_where_something_differs(tmp_path, capsys
     assert 'were dropped during the' not in capsys.readouterr().out
 
 
-def test_what_recovery_has_lost_is_told_where_something_differs(tmp_path, capsys) -> None:
+def test_replay_names_bytes_lost_by_recovery_beside_a_difference(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, f'effects: {{{NOISE}}}\n', 12_000)
     file = bag / 'bag_0.mcap'
     data = bytearray(file.read_bytes())
@@ -147,7 +147,7 @@ def facts(capsys: pytest.CaptureFixture[str], bag: Path) -> tuple[str, dict[str,
     return text, json.loads(capsys.readouterr().out)
 
 
-def test_info_tells_what_was_discarded(tmp_path, capsys) -> None:
+def test_info_counts_discarded_messages_of_a_ring(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, '')
     ring = rewritten(bag, 'ring', storage=RING)
     text, account = facts(capsys, ring)
@@ -158,7 +158,7 @@ def test_info_tells_what_was_discarded(tmp_path, capsys) -> None:
     assert '  discarded  ' in text
 
 
-def test_info_tells_what_was_received(tmp_path, capsys) -> None:
+def test_info_counts_received_messages(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, '')
     text, account = facts(capsys, bag)
     assert {topic['received'] for topic in account['topics']} == {None}
@@ -184,7 +184,7 @@ def test_info_tells_what_was_received(tmp_path, capsys) -> None:
     ['3', '[]', '{"/joint_states": "many"}', '{"/joint_states": -1}', '{"/joint_states": true}',
      '[' * 100_000, '{"/joint_states": 1e400}', 'nonsense'],
 )  # fmt: skip
-def test_counts_that_are_none_are_not_told(tmp_path, capsys, counts) -> None:
+def test_malformed_message_counts_are_shown_as_unknown(tmp_path, capsys, counts) -> None:
     custom = {f'linkage_ros.{word}': counts for word in ('received', 'dropped', 'discarded')}
     bag = rewritten(recorded(tmp_path, ''), 'odd', custom=custom)
     _, account = facts(capsys, bag)
@@ -194,7 +194,7 @@ def test_counts_that_are_none_are_not_told(tmp_path, capsys, counts) -> None:
     assert account['unfinished'] is None
 
 
-def test_info_tells_that_a_bag_is_unfinished(tmp_path, capsys) -> None:
+def test_info_marks_an_unfinished_bag(tmp_path, capsys) -> None:
     bag = recorded(tmp_path, '')
     text, account = facts(capsys, bag)
     assert account['unfinished'] is None

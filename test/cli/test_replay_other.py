@@ -100,7 +100,7 @@ def row(account: Mapping[str, Any], joint: str, quantity: str = 'position') -> d
     return found
 
 
-def test_a_bias_is_found_in_its_joint_and_no_other(tmp_path, capsys):
+def test_bias_in_another_scene_changes_its_joint_only(tmp_path, capsys):
     scene = other(tmp_path, 'effects: {velocity: {}, bias: {joints: {rocker_joint: 0.125}}}\n')
     account = told(capsys, recorded(tmp_path), '--scene', scene)
     assert row(account, 'rocker_joint')['rms'] == pytest.approx(0.125, rel=1e-12)
@@ -115,7 +115,7 @@ def test_a_bias_is_found_in_its_joint_and_no_other(tmp_path, capsys):
     assert set(found) | set(found['greatest_at']) == json_keys_of('replay --scene', 'joints')
 
 
-def test_another_linkage_differs_by_what_the_closed_form_says(tmp_path, capsys):
+def test_longer_coupler_changes_the_rocker_by_the_closed_form(tmp_path, capsys):
     longer = FOUR_BAR.replace('0.12', '0.125')
     scene = other(tmp_path, PLAIN, longer)
     account = told(capsys, recorded(tmp_path), '--scene', scene)
@@ -176,7 +176,7 @@ RUNS = {
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', RUNS)
-def test_the_new_bag_replays_by_itself(tmp_path, capsys, name):
+def test_new_bag_replays_to_the_same_bytes(tmp_path, capsys, name):
     text, linkage, other_text, other_linkage, expected = RUNS[name]
     bag, scene = recorded(tmp_path, text, linkage), other(tmp_path, other_text, other_linkage)
     account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
@@ -195,7 +195,7 @@ def test_the_new_bag_replays_by_itself(tmp_path, capsys, name):
 
 
 @pytest.mark.parametrize('rate', [1000, 500, 0])
-def test_a_reset_is_one_of_another_scene_too(tmp_path, capsys, rate):
+def test_replay_with_another_scene_repeats_recorded_resets(tmp_path, capsys, rate):
     resets = (40, 41, 200)
     bag = recorded(tmp_path, resets=resets)
     # A reset without a sample at its tick: nothing is published until the next one comes.
@@ -209,7 +209,7 @@ def test_a_reset_is_one_of_another_scene_too(tmp_path, capsys, rate):
     assert (again['verdict'], again['ticks'] > 100) == ('identical', True)
 
 
-def test_a_wish_to_stop_is_heard_while_the_samples_are_looked_for(tmp_path):
+def test_stop_ends_the_search_for_samples(tmp_path):
     bag = foreign(tmp_path, '/a', joints=('x', 'y'), count=6000)
     stop = Event()
     stop.set()
@@ -217,7 +217,7 @@ def test_a_wish_to_stop_is_heard_while_the_samples_are_looked_for(tmp_path):
         answer(replay, bag, '--scene', other(tmp_path, ''), stop=stop)
 
 
-def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys):
+def test_one_absurd_publish_time_adds_no_ticks(tmp_path, capsys):
     bag = recorded(tmp_path)
 
     def edit(_: int, message: BagMessage) -> BagMessage:
@@ -230,7 +230,7 @@ def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys)
     assert TICKS - 2 <= account['joint_states'] <= TICKS + 2
 
 
-def test_the_new_bag_says_what_it_is(tmp_path, capsys):
+def test_new_bag_holds_its_scene_linkage_and_run(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {acceleration: {}}\n')
     text = 'effects: {acceleration: {}, dropout: {probability: 0.1}, pin_forces: {}}\nseed: 3\n'
     scene = other(tmp_path, text, GENERAL)
@@ -282,7 +282,7 @@ def foreign(
         (['/motor', '/gripper'], ['--crank-topic', '/gripper'], '/gripper'),
     ],
 )
-def test_a_foreign_bag_takes_a_scene(tmp_path, capsys, topics, typed, used):
+def test_foreign_bag_is_replayed_with_a_scene(tmp_path, capsys, topics, typed, used):
     bag = foreign(tmp_path, *topics)
     scene = other(tmp_path, f'rate: 0\n{PLAIN}')
     account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new', *typed)
@@ -300,14 +300,14 @@ def test_a_foreign_bag_takes_a_scene(tmp_path, capsys, topics, typed, used):
         assert at[BEGIN + (5 * number + 1) * MS] == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_foreign_bag_that_is_refused_is_told_so_in_one_line(tmp_path, capsys):
+def test_foreign_bag_without_commands_is_refused_in_one_line(tmp_path, capsys):
     bag = foreign(tmp_path, '/motor', joints=('x', 'y'))
     assert main(['replay', str(bag), '--scene', 'torque_ankle']) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert 'its run took no commands, which a torque drive needs' in line
 
 
-def test_a_foreign_bag_is_ticked_at_the_rate_of_the_scene(tmp_path, capsys):
+def test_foreign_bag_is_ticked_at_the_scene_rate(tmp_path, capsys):
     bag, scene = foreign(tmp_path, '/motor'), other(tmp_path, f'rate: 1000\n{PLAIN}')
     account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
     # From the first sample's log time up to the last one's, both included.
@@ -316,7 +316,7 @@ def test_a_foreign_bag_is_ticked_at_the_rate_of_the_scene(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(('rate', 'each'), [(0, 100), (1000, 99 * 5 + 1)])
-def test_time_that_jumps_back_begins_anew(tmp_path, capsys, rate, each):
+def test_replay_restarts_where_time_jumps_back(tmp_path, capsys, rate, each):
     writer = BagWriter(tmp_path / 'jump', [topic('/motor', JOINT_STATE)])
     write = JointStateWriter(['crank_joint']).write
     for begin in (BEGIN + 5 * SECOND, BEGIN + 2 * SECOND):
@@ -331,7 +331,7 @@ def test_time_that_jumps_back_begins_anew(tmp_path, capsys, rate, each):
     assert (again['verdict'], again['ticks']) == ('identical', 2 * each)
 
 
-def test_a_run_that_was_silent_has_ticked_where_it_took_samples(tmp_path, capsys):
+def test_ticks_of_a_silent_run_are_its_sample_times(tmp_path, capsys):
     loaded = load_scene(scene_file(tmp_path, PLAIN, SWINGING))
     files = {name: ('', data) for name, data in loaded.files.items()}
     run = {'scene': 's', 'joint_states_topic': '/joint_states', 'crank_topic': '/crank_states'}
@@ -350,7 +350,7 @@ def test_a_run_that_was_silent_has_ticked_where_it_took_samples(tmp_path, capsys
     assert [m.publish_time for m in made if m.topic == '/joint_states'] == times
 
 
-def test_a_long_silence_is_passed_over(tmp_path, capsys):
+def test_replay_skips_a_silence_of_six_days(tmp_path, capsys):
     writer = BagWriter(tmp_path / 'gap', [topic('/motor', JOINT_STATE)])
     write = JointStateWriter(['crank_joint']).write
     for stamp in (BEGIN, BEGIN + 500_000 * SECOND):  # six days
@@ -374,7 +374,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('name', BAD)
-def test_a_scene_that_does_not_go_with_the_bag_is_refused_in_a_line(tmp_path, name):
+def test_scene_contradicting_the_bag_is_refused_in_one_line(tmp_path, name):
     text, other_text, linkage, line = BAD[name]
     scene = other(tmp_path, other_text, linkage)
     with pytest.raises(LinkageError) as raised:
@@ -392,14 +392,14 @@ def test_a_scene_that_does_not_go_with_the_bag_is_refused_in_a_line(tmp_path, na
         ([], ('x',), [], 'holds no samples of crank_joint; it has no topic of sensor_msgs'),
     ],
 )
-def test_a_foreign_bag_without_the_crank_is_refused(tmp_path, topics, joints, typed, line):
+def test_foreign_bag_without_the_crank_is_refused(tmp_path, topics, joints, typed, line):
     bag = foreign(tmp_path, *topics, joints=joints)
     with pytest.raises(LinkageError) as raised:
         answer(replay, bag, '--scene', other(tmp_path, ''), *typed)
     assert line in str(raised.value)
 
 
-def test_a_folder_that_exists_is_not_touched(tmp_path):
+def test_replay_leaves_an_existing_folder_untouched(tmp_path):
     bag, scene = recorded(tmp_path), other(tmp_path, PLAIN)
     (tmp_path / 'new').mkdir()
     with pytest.raises(LinkageError, match='exists already'):
@@ -430,7 +430,7 @@ def commanded(folder: Path, text: str = UNDER_TORQUE % '') -> Path:
     return Recorded(folder / 'bag', scene, efforts, COMMANDS).run(TICKS)
 
 
-def test_the_same_scene_on_the_commands_makes_the_same_bytes(tmp_path, capsys):
+def test_recorded_commands_and_same_scene_give_same_bytes(tmp_path, capsys):
     bag = commanded(tmp_path)
     scene = other(tmp_path, UNDER_TORQUE % '', GENERAL)
     account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
@@ -441,7 +441,7 @@ def test_the_same_scene_on_the_commands_makes_the_same_bytes(tmp_path, capsys):
     assert answer(replay, tmp_path / 'new') == 0
 
 
-def test_another_friction_moves_as_its_own_pipeline_under_the_commands(tmp_path, capsys):
+def test_recorded_commands_with_other_friction_equal_its_own_pipeline(tmp_path, capsys):
     bag = commanded(tmp_path)
     scene = other(tmp_path, UNDER_TORQUE % FRICTION, GENERAL)
     account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
@@ -457,7 +457,7 @@ def test_another_friction_moves_as_its_own_pipeline_under_the_commands(tmp_path,
     assert answer(replay, tmp_path / 'new') == 0
 
 
-def test_at_half_the_rate_the_motion_is_the_same(tmp_path, capsys):
+def test_replay_at_half_rate_gives_the_same_motion(tmp_path, capsys):
     bag = commanded(tmp_path)
     scene = other(tmp_path, (UNDER_TORQUE % '').replace('rate: 500', 'rate: 250'), GENERAL)
     account = told(capsys, bag, '--scene', scene)
@@ -475,7 +475,7 @@ WRONG_KINDS = {
 
 
 @pytest.mark.parametrize('case', WRONG_KINDS)
-def test_samples_of_another_kind_are_refused(tmp_path, case):
+def test_replay_refuses_samples_of_another_kind(tmp_path, case):
     is_commanded, text, reason = WRONG_KINDS[case]
     bag = commanded(tmp_path) if is_commanded else recorded(tmp_path, linkage=GENERAL)
     scene = other(tmp_path, text, GENERAL)

@@ -65,7 +65,7 @@ def warnings_of(page: Path) -> list[str]:
     return [item.strip().removesuffix('</li>') for item in items.split('<li>')[1:]] if rest else []
 
 
-def test_it_is_one_file_beside_the_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_is_one_file_beside_the_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = {*bag.parent.iterdir()}
     assert answer(command, bag) == 0
     page = bag.parent / 'bag.html'
@@ -89,7 +89,7 @@ def test_it_is_one_file_beside_the_bag(bag: Path, capsys: pytest.CaptureFixture[
         (['bag/../bag'], 'bag.html'),
     ],
 )
-def test_where_it_is_written(
+def test_report_file_is_named_after_the_bag(
     bag: Path, monkeypatch: pytest.MonkeyPatch, typed: list[str], written: str
 ) -> None:
     monkeypatch.chdir(bag.parent)
@@ -98,7 +98,7 @@ def test_where_it_is_written(
 
 
 @pytest.mark.parametrize('here', ['.', '../bag'])
-def test_from_within_the_bag_it_is_written_beside_it(
+def test_report_from_within_the_bag_lies_beside_it(
     bag: Path, monkeypatch: pytest.MonkeyPatch, here: str
 ) -> None:
     monkeypatch.chdir(bag)
@@ -107,7 +107,7 @@ def test_from_within_the_bag_it_is_written_beside_it(
 
 
 @pytest.mark.parametrize('name', ['taken.html', f'{"x" * 300}.html'])
-def test_files_that_are_refused(bag: Path, tmp_path: Path, name: str) -> None:
+def test_report_refuses_a_folder_or_an_overlong_name(bag: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / 'taken.html').mkdir()
     before = {*tmp_path.rglob('*')}
     reason = (
@@ -117,7 +117,7 @@ def test_files_that_are_refused(bag: Path, tmp_path: Path, name: str) -> None:
     assert {*tmp_path.rglob('*')} == before
 
 
-def test_on_a_full_disk_the_page_that_was_there_stays(
+def test_full_disk_keeps_the_old_report(
     bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = tmp_path / 'x.html'
@@ -135,7 +135,7 @@ def test_on_a_full_disk_the_page_that_was_there_stays(
     assert page.read_text() == 'old'
 
 
-def test_a_link_stays_a_link(bag: Path, tmp_path: Path) -> None:
+def test_report_writes_through_a_symbolic_link(bag: Path, tmp_path: Path) -> None:
     there = tmp_path / 'there'
     there.mkdir()
     (tmp_path / 'x.html').symlink_to(there / 'page.html')
@@ -144,7 +144,7 @@ def test_a_link_stays_a_link(bag: Path, tmp_path: Path) -> None:
     assert (there / 'page.html').stat().st_size > 10**6
 
 
-def test_a_part_of_a_run(bag: Path, tmp_path: Path) -> None:
+def test_report_shows_the_requested_part_of_a_run(bag: Path, tmp_path: Path) -> None:
     page = tmp_path / 'x.html'
     assert answer(command, bag, '-o', page, '--since', '0.1', '--until', '0.2') == 0
     assert '0.1 s to 0.2 s' in page.read_text()
@@ -153,14 +153,14 @@ def test_a_part_of_a_run(bag: Path, tmp_path: Path) -> None:
     assert warnings_of(page) == []
 
 
-def test_a_part_beyond_the_end_says_so(bag: Path, tmp_path: Path) -> None:
+def test_report_warns_of_a_part_beyond_the_run(bag: Path, tmp_path: Path) -> None:
     page = tmp_path / 'x.html'
     assert answer(command, bag, '-o', page, '--since', '5') == 0
     assert warnings_of(page) == ['The part begins after the end of the run, at 0.299 s.']
     assert data_of(page)['curves'] == []
 
 
-def test_a_spatial_linkage_is_drawn_at_the_recorded_inputs(tmp_path: Path) -> None:
+def test_report_draws_a_spatial_linkage_at_recorded_inputs(tmp_path: Path) -> None:
     scene = tmp_path / 'ankle_scene.yaml'
     scene.write_text('linkage: ankle\ndrive: {sine: {amplitude: 0.1, frequency: 1}}\n')
     for typed in (('simulate', scene, '--seconds', '1', '-o', 'bag'), ('report', 'bag')):
@@ -174,7 +174,7 @@ def test_a_spatial_linkage_is_drawn_at_the_recorded_inputs(tmp_path: Path) -> No
     assert {'b1', 'c2', 'm1', 'roll', 'rod1', 'foot'} <= names
 
 
-def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:
+def test_report_of_a_foreign_bag_draws_curves_without_linkage(bag: Path, tmp_path: Path) -> None:
     rewritten(bag, 'foreign', attachments={})
     assert answer(command, tmp_path / 'foreign') == 0
     page = tmp_path / 'foreign.html'
@@ -188,7 +188,7 @@ def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('topics', [[], [topic('/joint_states', JOINT_STATE)]])
-def test_a_bag_of_zero_messages(tmp_path: Path, topics: list[Any]) -> None:
+def test_report_of_an_empty_bag_draws_no_curves(tmp_path: Path, topics: list[Any]) -> None:
     BagWriter(tmp_path / 'empty', topics).close()
     assert answer(command, tmp_path / 'empty') == 0
     page = tmp_path / 'empty.html'
@@ -197,7 +197,7 @@ def test_a_bag_of_zero_messages(tmp_path: Path, topics: list[Any]) -> None:
     assert data_of(page)['curves'] == []
 
 
-def test_a_run_that_published_nothing(tmp_path: Path) -> None:
+def test_report_describes_a_run_without_joint_states(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
     Recorded(tmp_path / 'bag', scene, lambda _: {}).run(50)
     assert answer(command, tmp_path / 'bag') == 0
@@ -226,7 +226,7 @@ def longer(tmp_path: Path) -> Path:
     return Recorded(tmp_path / 'bag', scene, crank).run(3000)
 
 
-def test_a_bag_that_was_cut_is_told_as_far_as_it_goes(longer: Path) -> None:
+def test_report_shows_a_truncated_bag_up_to_its_end(longer: Path) -> None:
     harmed(longer, lambda content: content[: len(content) * 2 // 3])
     assert answer(command, longer) == 0
     page = longer.parent / 'bag.html'
@@ -237,7 +237,7 @@ def test_a_bag_that_was_cut_is_told_as_far_as_it_goes(longer: Path) -> None:
     assert 0 < data_of(page)['curves'][0]['of'] < 3000
 
 
-def test_a_damaged_chunk_is_told_as_far_as_it_goes(longer: Path, tmp_path: Path) -> None:
+def test_report_shows_a_damaged_bag_up_to_the_damage(longer: Path, tmp_path: Path) -> None:
     bag = longer
     content = (bag / 'bag_0.mcap').read_bytes()
     harmed(bag, flip(len(content) * 2 // 3))
@@ -247,7 +247,7 @@ def test_a_damaged_chunk_is_told_as_far_as_it_goes(longer: Path, tmp_path: Path)
     assert warning.endswith('; the page shows what lies before.')
 
 
-def test_a_damaged_attachment_is_a_line(bag: Path) -> None:
+def test_damaged_attachment_is_refused_in_one_line(bag: Path) -> None:
     content = (bag / 'bag_0.mcap').read_bytes()
     harmed(bag, flip(content.index(b'four_bar: {a')))
     assert 'is damaged: ' in refused(bag)
@@ -263,7 +263,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize('name', SCENES)
-def test_a_scene_that_cannot_be_read_here_is_told_and_the_rest_is_shown(
+def test_report_warns_of_an_unreadable_scene_and_draws_curves(
     bag: Path, tmp_path: Path, name: str
 ) -> None:
     rewritten(bag, 'odd', attachments={**read_bag(bag).attachments, 'scene.yaml': SCENES[name]})
@@ -275,14 +275,14 @@ def test_a_scene_that_cannot_be_read_here_is_told_and_the_rest_is_shown(
 
 
 @pytest.mark.parametrize('content', [b'', b'no bag', b'\x89MCAP1\r\n'])
-def test_what_is_no_bag_is_a_line(tmp_path: Path, content: bytes) -> None:
+def test_report_refuses_a_file_that_is_no_bag(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / 'x.mcap'
     file.write_bytes(content)
     assert refused(file).startswith(f'{file}: ')
     assert {*tmp_path.iterdir()} == {file}
 
 
-def test_without_plotly_it_says_so_before_the_bag_is_read(
+def test_report_without_plotly_names_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr('linkage_ros.errors.find_spec', lambda name: None)
@@ -290,7 +290,7 @@ def test_without_plotly_it_says_so_before_the_bag_is_read(
     assert line == "plotly: is not installed; pip install 'linkage_ros[report]'"
 
 
-def test_it_can_be_stopped_and_leaves_nothing(bag: Path) -> None:
+def test_stopped_report_writes_no_file(bag: Path) -> None:
     stop = Event()
     stop.set()
     before = {*bag.parent.iterdir()}
@@ -299,7 +299,7 @@ def test_it_can_be_stopped_and_leaves_nothing(bag: Path) -> None:
     assert {*bag.parent.iterdir()} == before
 
 
-def test_what_is_in_a_bag_is_no_part_of_the_page_but_text(bag: Path, tmp_path: Path) -> None:
+def test_report_escapes_html_in_names_of_a_bag(bag: Path, tmp_path: Path) -> None:
     name = '</script><script>alert(1)</script>'
     topics = read_bag(bag).topics
     odd = [replace(each, name=each.name.replace('withheld', name)) for each in topics]

@@ -48,7 +48,7 @@ def sheets_of(file: Path) -> dict[str, list[list[str | None]]]:
         return found
 
 
-def test_a_sheet_holds_every_bit_and_no_formula(tmp_path: Path) -> None:
+def test_spreadsheet_keeps_every_bit_and_holds_no_formula(tmp_path: Path) -> None:
     write_tables(tmp_path / 'x.xlsx', [TABLE, TABLE])
     sheets = sheets_of(tmp_path / 'x.xlsx')
     assert list(sheets) == ['all_of_it', 'all_of_it 2']
@@ -79,7 +79,7 @@ def test_parquet_and_csv_hold_texts_and_numbers(tmp_path: Path) -> None:
     assert rows[1] == ["'=cmd|1", str(2**60), '5e-324', '1.0']
 
 
-def test_a_cell_is_converted_and_a_zero_has_no_sign() -> None:
+def test_cell_is_converted_and_zero_has_no_sign() -> None:
     column = Column('>slide', 'slide', 'rad/s', '.3f')
     table = Table('', ['name', column], [('a', -1e-9), ('b', 1.0), ('c', None)])
     assert table.as_texts(DEGREES).rows == [['a', '0.000'], ['b', '57.296'], ['c', '']]
@@ -99,7 +99,7 @@ def test_a_cell_is_converted_and_a_zero_has_no_sign() -> None:
     ],
     ids=lambda value: ' '.join(value[:2]) if isinstance(value, list) else '',
 )
-def test_all_tables_of_a_command_are_sheets(
+def test_tables_of_a_command_become_sheets_of_one_file(
     linkage: Run, tmp_path: Path, typed: list[str], sheets: set[str]
 ) -> None:
     answer = linkage(*typed, '-o', 'x.xlsx')
@@ -111,9 +111,7 @@ def test_all_tables_of_a_command_are_sheets(
         assert all(len(row) == len(rows[0]) for row in rows)
 
 
-def test_values_in_sheets_are_numbers_in_the_units_of_the_file(
-    linkage: Run, tmp_path: Path
-) -> None:
+def test_sheet_values_are_numbers_in_units_of_the_file(linkage: Run, tmp_path: Path) -> None:
     """As the JSON of the same file has them, in SI."""
     (tmp_path / 'l.yaml').write_text(
         'units: mm\nangles: degrees\nlinks: {ground: {O2: [0, 0], O4: [100, 0]},\n'

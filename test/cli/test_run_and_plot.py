@@ -50,7 +50,7 @@ def crank(tmp_path: Path):
     assert process.wait(20) == 0
 
 
-def test_a_run_is_remapped_recorded_and_drawn(
+def test_run_is_remapped_recorded_and_plotted(
     linkage: Run, tmp_path: Path, scene: Path, crank: object
 ) -> None:
     answer = linkage(
@@ -70,7 +70,7 @@ def test_a_run_is_remapped_recorded_and_drawn(
     assert svg.startswith('<?xml')
 
 
-def test_a_linkage_file_runs_as_it_is(linkage: Run, tmp_path: Path) -> None:
+def test_run_takes_a_linkage_file_without_a_scene(linkage: Run, tmp_path: Path) -> None:
     (tmp_path / 'designed.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
     answer = linkage('run', 'designed.yaml', '--seconds', '1', '--plain')
     assert answer.returncode == 0, answer.stderr
@@ -81,7 +81,7 @@ def test_a_linkage_file_runs_as_it_is(linkage: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('options', 'unit'), [((), '°'), (('--radians',), ' rad')])
-def test_a_person_reads_joints_with_their_units(
+def test_run_prints_joints_with_their_units(
     linkage: Run, options: tuple[str, ...], unit: str
 ) -> None:
     file = Path(__file__).parents[2] / 'config' / 'linkages' / 'slider_crank.yaml'
@@ -91,7 +91,7 @@ def test_a_person_reads_joints_with_their_units(
     assert re.search(rf'crank_joint {number}{unit}  .*piston_slide {number} m', answer.stdout)
 
 
-def test_a_folder_that_exists_is_not_touched_and_the_bag_gets_a_number(
+def test_run_numbers_its_bag_where_the_folder_exists(
     linkage: Run, tmp_path: Path, scene: Path
 ) -> None:
     taken = tmp_path / 'runs' / 'b 1'
@@ -103,7 +103,9 @@ def test_a_folder_that_exists_is_not_touched_and_the_bag_gets_a_number(
     assert not read_bag(tmp_path / 'runs' / 'b 1_2').truncated
 
 
-def test_a_bag_of_nothing_is_not_drawn(linkage: Run, tmp_path: Path, scene: Path) -> None:
+def test_plot_refuses_a_bag_without_joint_states(
+    linkage: Run, tmp_path: Path, scene: Path
+) -> None:
     files = {
         'scene.yaml': ('', b'linkage: x\n'),
         'linkage.yaml': ('', b'four_bar: {a: 1, b: 3, c: 3, d: 4}\n'),
@@ -119,7 +121,7 @@ def test_a_bag_of_nothing_is_not_drawn(linkage: Run, tmp_path: Path, scene: Path
     )
 
 
-def test_a_picture_that_cannot_be_written_is_named(
+def test_plot_names_a_picture_that_it_cannot_write(
     linkage: Run, tmp_path: Path, scene: Path, crank: object
 ) -> None:
     linkage('run', str(scene), '--seconds', '3', '--ros-args', '-r', 'crank_states:=motor')

@@ -171,7 +171,7 @@ def stuck_at(folder: Path, place: str, *arguments: str) -> subprocess.Popen[str]
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', READS)
-def test_a_command_ends_while_it_reads(folder, command, number) -> None:
+def test_signal_ends_a_command_while_it_reads(folder, command, number) -> None:
     typed, reads = READS[command]
     before = sorted(folder.iterdir())
     found = ended_by(stuck_at(folder, reads, command, *typed), number)
@@ -182,7 +182,7 @@ def test_a_command_ends_while_it_reads(folder, command, number) -> None:
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
-def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
+def test_signal_ends_a_run_before_its_first_tick(folder, at, number) -> None:
     found = ended_by(stuck_at(folder, at, 'run', 'four.yaml', '--plain'), number)
     assert found == (1, 'linkage run: stopped\n')
 
@@ -190,7 +190,7 @@ def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
-def test_a_command_ends_while_it_computes(folder, command, number) -> None:
+def test_signal_ends_a_command_while_it_computes(folder, command, number) -> None:
     before = sorted(folder.iterdir())
     found = ended_by(stuck_at(folder, CLOSES, command, *READS[command][0]), number)
     assert found == (1, f'linkage {command}: stopped\n')
@@ -199,7 +199,7 @@ def test_a_command_ends_while_it_computes(folder, command, number) -> None:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'fmu', 'urdf', 'mjcf'])
-def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
+def test_command_stopped_while_writing_keeps_the_old_file(folder, command) -> None:
     typed, _ = READS[command]
     old = folder / typed[-1]
     old.write_text('old')
@@ -210,22 +210,22 @@ def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder,
     assert old.read_text() == 'old'
 
 
-def test_an_impatient_user_gets_one_line(folder) -> None:
+def test_repeated_signals_print_one_line(folder) -> None:
     found = ended_by(stuck_at(folder, CLOSES, 'check', 'four.yaml'), *SIGNALS, *SIGNALS)
     assert found == (1, 'linkage check: stopped\n')
 
 
-def test_a_signal_is_not_lost_in_a_finalizer(folder) -> None:
+def test_signal_within_a_finalizer_ends_the_command(folder) -> None:
     process = start(folder, FINALIZER, 'check', 'four.yaml')
     assert ended_by(process, signal.SIGTERM) == (1, 'linkage check: stopped\n')
 
 
-def test_a_signal_that_a_library_takes_for_an_error_of_its_own_is_a_stop(folder) -> None:
+def test_signal_wrapped_in_a_library_error_ends_the_command(folder) -> None:
     process = start(folder, CONVERTED, 'check', 'four.yaml')
     assert ended_by(process, signal.SIGTERM) == (1, 'linkage check: stopped\n')
 
 
-def test_a_command_ends_whose_output_nobody_reads(folder) -> None:
+def test_signal_ends_a_command_whose_output_is_not_read(folder) -> None:
     process = start(
         folder,
         'import sys; from linkage_ros.cli.main import main; sys.exit(main())',
@@ -253,7 +253,7 @@ def wait_until_it_sleeps(process: subprocess.Popen[str]) -> None:
     pytest.skip('the kernel does not say where a process waits')
 
 
-def test_a_signal_that_comes_while_its_wish_is_waited_for_is_no_deadlock(folder) -> None:
+def test_repeated_signals_during_a_wait_cause_no_deadlock(folder) -> None:
     subprocess.run([sys.executable, '-c', STORM], cwd=folder, timeout=60, check=True)
 
 
@@ -302,7 +302,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('command', COMMANDS)
-def test_a_signal_is_heeded_while_a_bag_is_searched(tmp_path, large, command) -> None:
+def test_signal_ends_the_search_of_a_large_bag(tmp_path, large, command) -> None:
     typed, said = COMMANDS[command]
     process = subprocess.Popen(
         [sys.executable, '-m', 'linkage_ros.cli.main', command, str(large), *typed],
@@ -366,7 +366,7 @@ PROGRAMS = {
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('program', PROGRAMS)
-def test_a_signal_in_the_first_instants_shows_no_traceback(tmp_path, program):
+def test_signal_during_startup_shows_no_traceback(tmp_path, program):
     for number in (1, 2, 3, 5, 8, 13, 21, 34, 55, 89):
         done = subprocess.run(
             [sys.executable, '-c', STARTS, str(number), program, *PROGRAMS[program]],
@@ -399,7 +399,7 @@ with signals.bounded_end(2):
         ('None', 0),
     ],
 )
-def test_a_shutdown_that_hangs_ends_with_the_exit_code_if_python_still_runs(hanging, code):
+def test_hanging_shutdown_ends_with_the_exit_code(hanging, code):
     done = subprocess.run(
         [sys.executable, '-c', HANGS, hanging], capture_output=True, text=True, check=False,
         timeout=20,

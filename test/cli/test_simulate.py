@@ -85,7 +85,7 @@ effects: {dropout: {probability: 0.3}, delay: {seconds: 0.05}, rate_limit: {rate
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENES)
-def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys, name):
+def test_simulated_bag_replays_to_the_same_bytes(tmp_path, monkeypatch, capsys, name):
     monkeypatch.chdir(tmp_path)
     text = SCENES[name]
     if '\n' in text:
@@ -103,7 +103,7 @@ def test_a_replay_of_the_bag_gives_the_same_bytes(tmp_path, monkeypatch, capsys,
     assert once
 
 
-def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
+def test_simulated_ticks_equal_the_pipeline_at_whole_nanoseconds(tmp_path):
     scene = load_scene('torque_crank', ['rate=300'])
     simulate_run(scene, tmp_path / 'bag', 7, lambda _: True)
     pipeline = Pipeline(scene)
@@ -119,7 +119,7 @@ def test_ticks_are_those_of_the_pipeline_at_whole_nanoseconds(tmp_path):
     assert found == expected
 
 
-def test_a_table_has_the_ticks_of_the_bag(tmp_path):
+def test_simulated_table_holds_the_ticks_of_the_bag(tmp_path):
     file = tmp_path / 'run.csv'
     assert main(['simulate', 'torque_crank', '--seconds', '0.03', '-o', str(file)]) == 0
     assert (
@@ -136,7 +136,7 @@ def test_a_table_has_the_ticks_of_the_bag(tmp_path):
         assert float(row['crank_joint rate [rad/s]']) == state.rates[0]
 
 
-def test_nothing_of_rclpy_is_imported(tmp_path):
+def test_simulate_does_not_import_rclpy(tmp_path):
     check = (
         'import sys; from linkage_ros.cli.main import main; '
         f'main(["simulate", "torque_crank", "--seconds", "0.1", "-o", {str(tmp_path / "b")!r}]); '
@@ -168,7 +168,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('typed', REFUSED)
-def test_what_cannot_be_simulated_is_refused_in_a_line(tmp_path, monkeypatch, capsys, typed):
+def test_simulate_refuses_wrong_arguments_in_one_line(tmp_path, monkeypatch, capsys, typed):
     monkeypatch.chdir(tmp_path)
     Path('there').mkdir()
     try:
@@ -181,7 +181,7 @@ def test_what_cannot_be_simulated_is_refused_in_a_line(tmp_path, monkeypatch, ca
     assert sorted(path.name for path in tmp_path.iterdir()) == ['there']
 
 
-def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
+def test_stopped_simulation_keeps_its_ticks(tmp_path):
     scene = load_scene('torque_crank')
     asked = []
     simulate_run(
@@ -193,7 +193,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
     assert main(['replay', str(tmp_path / 'bag')]) == 0
 
 
-def test_a_disk_that_fills_ends_the_run_and_keeps_what_was_written(tmp_path, monkeypatch):
+def test_full_disk_ends_the_simulation_and_keeps_its_ticks(tmp_path, monkeypatch):
     class Full(simulated_run.BagWriter):
         def write(self, topic, log_time, publish_time, data):
             if log_time > BEGIN + 500_000_000:

@@ -113,7 +113,7 @@ def check_answer(typed: list[str], capsys: pytest.CaptureFixture[str]) -> bool:
 @pytest.mark.sample(5)
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_length_of_any_size_is_computed_or_refused_in_one_line(
+def test_lengths_of_any_size_are_computed_or_refused(
     kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / 'sized.yaml'
@@ -136,7 +136,7 @@ def test_a_length_of_any_size_is_computed_or_refused_in_one_line(
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('size', [1e-150, 1e-15])
 @pytest.mark.parametrize('kind', ['a four-bar', 'a yoke', 'its offset'])
-def test_a_length_of_any_size_is_drawn(
+def test_lengths_of_any_size_are_drawn(
     kind: str, size: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / 'sized.yaml'

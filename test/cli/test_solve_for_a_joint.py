@@ -30,7 +30,7 @@ def solved(linkage: Run, *arguments: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(answer.stdout)))
 
 
-def test_every_branch_has_its_crank(linkage: Run) -> None:
+def test_solve_joint_finds_the_crank_on_every_branch(linkage: Run) -> None:
     rows = solved(linkage, 'four_bar', '--joint', 'rocker_joint=68.7549')
     closure = load('four_bar')
     assert [row['branch'] for row in rows] == ['1', '2']
@@ -41,7 +41,7 @@ def test_every_branch_has_its_crank(linkage: Run) -> None:
         assert remainder(off, tau) == pytest.approx(0.0, abs=1e-14)
 
 
-def test_rates_are_those_of_the_joint(linkage: Run) -> None:
+def test_solve_joint_takes_rates_of_the_joint(linkage: Run) -> None:
     asked = ('--joint', 'foot.y=-0.08', '--rate', '0.01', '--acceleration', '0.02', '--points')
     rows = solved(linkage, 'jansen_leg', *asked)
     assert [row['branch'] for row in rows] == ['2', '3']
@@ -57,7 +57,7 @@ def test_rates_are_those_of_the_joint(linkage: Run) -> None:
         assert found == pytest.approx([-0.08, 0.01, 0.02], rel=1e-11)
 
 
-def test_as_many_joints_as_inputs_become_inputs(linkage: Run) -> None:
+def test_solve_takes_as_many_joints_as_inputs(linkage: Run) -> None:
     asked = ('--joint', 'right_elbow=1.4', '--joint', 'left_elbow=-1.2', '--radians')
     rows = solved(linkage, 'five_bar', *asked)
     assert rows
@@ -79,7 +79,7 @@ def test_as_many_joints_as_inputs_become_inputs(linkage: Run) -> None:
         ('spherical_four_bar', ['rocker']),
     ],
 )
-def test_values_that_are_not_reached_are_refused_in_plane_and_space(
+def test_solve_refuses_unreachable_values_of_joints(
     name: str, joints: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     random, seen = Random(48), set()
@@ -127,7 +127,7 @@ def place(name: str, at: complex) -> str:
     return f'{name}: [{at.real!r}, {at.imag!r}]'
 
 
-def test_states_of_links_that_are_then_iterated_are_found(linkage: Run, tmp_path: Path) -> None:
+def test_solve_finds_states_of_iterated_links_by_search(linkage: Run, tmp_path: Path) -> None:
     (tmp_path / 'arms.yaml').write_text(three_arms(), 'utf-8')
     closure = load(tmp_path / 'arms.yaml')
     pose = closure.linkage.pose

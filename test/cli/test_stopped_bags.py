@@ -145,7 +145,7 @@ def faults(folder: Path, done: list[tuple[str, int, int]]) -> list[tuple[str, st
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('command', COMMANDS)
-def test_a_stop_within_any_record_damages_no_bag(folder, command) -> None:
+def test_stop_within_any_record_damages_no_bag(folder, command) -> None:
     ((target, code, pieces),) = stopped(folder, command, 'short', [('whole', 'SIGINT', 0, 0.0)])
     assert code == 0
     assert pieces > 5 * MOMENTS
@@ -164,7 +164,7 @@ def test_a_stop_within_any_record_damages_no_bag(folder, command) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('command', COMMANDS)
-def test_a_stop_at_any_time_damages_no_bag(folder, command) -> None:
+def test_stop_at_any_time_damages_no_bag(folder, command) -> None:
     cases = [
         (f'{SIGNALS[index % 3]}_{index}', SIGNALS[index % 3], 0, 0.05 + 0.15 * index)
         for index in range(INSTANTS)

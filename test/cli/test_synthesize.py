@@ -59,7 +59,7 @@ def proof(text: str) -> list[list[str]]:
 
 
 @pytest.mark.ros
-def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> None:
+def test_check_and_run_accept_a_linkage_of_three_pairs(linkage: Run) -> None:
     made = linkage('synthesize', *SOURCE_003, '-o', 'designed.yaml')
     assert made.returncode == 0, made.stderr
     for link, exact in EXACT_003.items():
@@ -87,7 +87,7 @@ def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> N
     assert re.search(r'published +[1-9]\d* joint states', ran.stdout)
 
 
-def test_a_negative_length_is_told_as_the_reversed_link_that_it_means(
+def test_synthesize_describes_a_negative_length_as_reversed_link(
     linkage: Run, tmp_path: Path
 ) -> None:
     pairs = typed_pairs(-0.5 + 0j, 1.2, 0.9 + 0j, 1.0, [20.0, 50.0, 95.0])
@@ -100,9 +100,7 @@ def test_a_negative_length_is_told_as_the_reversed_link_that_it_means(
     assert shown == pytest.approx(rocker_angle(-0.5 + 0j, 1.2, 0.9 + 0j, 1.0, 50.0), abs=1e-5)
 
 
-def test_more_pairs_are_fitted_and_the_error_is_told_and_drawn(
-    linkage: Run, tmp_path: Path
-) -> None:
+def test_synthesize_fits_seven_pairs_and_draws_the_error(linkage: Run, tmp_path: Path) -> None:
     # Seven pairs of a crank-rocker, two of them moved by 1°.
     pairs = typed_pairs(0.4 + 0j, 1.2, 0.8 + 0j, 1.0, [10.0, 30.0, 50.0, 70.0, 90.0, 110.0, 130.0])
     pairs[5] = str(float(pairs[5]) + 1.0)
@@ -118,7 +116,7 @@ def test_more_pairs_are_fitted_and_the_error_is_told_and_drawn(
     assert (tmp_path / 'fit.svg').read_text().startswith('<?xml')
 
 
-def test_pairs_come_from_a_file_too(linkage: Run, tmp_path: Path) -> None:
+def test_synthesize_reads_pairs_from_a_file(linkage: Run, tmp_path: Path) -> None:
     (tmp_path / 'pairs.csv').write_text('crank,rocker\n25,30\n35,40\n# the last\n50,60\n')
     from_file = linkage('synthesize', '--pairs', 'pairs.csv')
     assert from_file.returncode == 0, from_file.stderr
@@ -126,9 +124,7 @@ def test_pairs_come_from_a_file_too(linkage: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('count', [4, 5])
-def test_free_zeros_list_all_solutions_with_the_one_that_made_the_pairs(
-    linkage: Run, count: int
-) -> None:
+def test_free_zeros_find_the_linkage_of_the_pairs(linkage: Run, count: int) -> None:
     zero = 0.0 if count == 4 else 0.3
     crank, rocker = rect(0.45, zero), rect(0.9, 0.5)
     angles = [15.0, 40.0, 70.0, 105.0, 150.0][:count]
@@ -146,7 +142,7 @@ def test_free_zeros_list_all_solutions_with_the_one_that_made_the_pairs(
     ]
 
 
-def test_three_pairs_with_free_zeros_are_searched_for_what_is_needed(linkage: Run) -> None:
+def test_synthesize_searches_free_zeros_that_meet_the_needs(linkage: Run) -> None:
     typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
     needs = ['--min-transmission', '60', '--max-link-ratio', '4']
     made = linkage('synthesize', *typed, *needs, '--candidates', '50000', '--best', '1')
@@ -156,7 +152,9 @@ def test_three_pairs_with_free_zeros_are_searched_for_what_is_needed(linkage: Ru
     assert 'none: order, branch and circuit are right' in made.stdout
 
 
-def test_a_function_tells_its_structural_error(linkage: Run, tmp_path: Path) -> None:
+def test_synthesize_prints_the_structural_error_of_a_function(
+    linkage: Run, tmp_path: Path
+) -> None:
     made = linkage('synthesize', *LOG, *RANGES, '--draw', 'log.svg', '-o', 'log.yaml')
     assert made.returncode == 0, made.stderr
     # P. L. Chebyshev's points of three: 1.5 ∓ 0.5·cos 30°, and the crank's angles there.
@@ -169,7 +167,7 @@ def test_a_function_tells_its_structural_error(linkage: Run, tmp_path: Path) -> 
     assert (tmp_path / 'log.svg').exists()
 
 
-def test_a_curve_is_found_again(linkage: Run, tmp_path: Path) -> None:
+def test_synthesize_finds_the_linkage_of_a_curve(linkage: Run, tmp_path: Path) -> None:
     # The coupler point of a crank-rocker, by two circles that meet.
     lines = ['x,y']
     for step in range(12):
@@ -189,7 +187,7 @@ def test_a_curve_is_found_again(linkage: Run, tmp_path: Path) -> None:
     assert linkage('check', 'found.yaml').returncode == 0
 
 
-def test_three_poses_are_met_exactly(linkage: Run, tmp_path: Path) -> None:
+def test_synthesized_linkage_meets_three_poses_exactly(linkage: Run, tmp_path: Path) -> None:
     made = linkage('synthesize', *POSES, *MOVING, '-o', 'poses.yaml', '--draw', 'poses.svg')
     assert made.returncode == 0, made.stderr
     for row in proof(made.stdout):
@@ -236,9 +234,7 @@ def in_radians(typed: list[str]) -> list[str]:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('kind', IN_DEGREES)
-def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
-    linkage: Run, kind: str
-) -> None:
+def test_synthesis_in_radians_designs_the_same_linkage(linkage: Run, kind: str) -> None:
     typed = IN_DEGREES[kind]
     degrees_, radians_ = linkage('synthesize', *typed), linkage('synthesize', *in_radians(typed))
     assert radians_.returncode == degrees_.returncode
@@ -251,7 +247,7 @@ def test_in_radians_the_same_linkages_are_designed_and_no_angle_is_in_degrees(
     assert 'off [rad]' in radians_.stdout or kind == 'a timed curve'
 
 
-def test_a_search_shows_how_far_it_is(tmp_path: Path) -> None:
+def test_search_prints_its_progress(tmp_path: Path) -> None:
     typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
     typed += ['--candidates', '20000', '--best', '1']
     shown = on_terminal(tmp_path, 'synthesize', *typed, progress=True)

@@ -27,7 +27,7 @@ def says(folder, *words):
     return (done.stdout + done.stderr).replace(str(folder), 'FOLDER')
 
 
-def test_a_table_of_a_scene_that_publishes_nothing(tmp_path):
+def test_simulate_refuses_a_table_without_joint_states(tmp_path):
     (tmp_path / 'scene.yaml').write_text(SCENE)
     (tmp_path / 'linkage.yaml').write_text(OPEN)
     assert says(tmp_path, 'simulate', 'scene.yaml', '--seconds', '1', '-o', 'x.csv') == (
@@ -52,7 +52,7 @@ def damage(kind, content):
 
 
 @pytest.mark.parametrize('kind', ['cut', 'flipped', 'foreign', 'empty'])
-def test_a_damaged_bag_that_is_packed(tmp_path, kind):
+def test_messages_on_a_packed_bag_name_no_temporary_file(tmp_path, kind):
     (tmp_path / 'scene.yaml').write_text(SCENE)
     (tmp_path / 'linkage.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
     says(tmp_path, 'simulate', 'scene.yaml', '--seconds', '3', '-o', 'run')

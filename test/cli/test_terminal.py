@@ -40,12 +40,12 @@ def words(tables: list[Table]) -> list[str]:
     return sorted(' '.join(map(table_text, tables)).split())
 
 
-def test_a_table_that_fits_stays_as_it_is():
+def test_table_that_fits_is_not_folded():
     table = Table('title', ['a', '>b'], [['x', '1']])
     assert fold_table(table, 80) == [table]
 
 
-def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
+def test_long_cell_is_wrapped_at_spaces():
     table = Table('', ('', ''), [['one', 'some words that are too many'], ['two', 'x']])
     (part,) = fold_table(table, 30)
     assert table_text(part).splitlines() == [
@@ -55,7 +55,7 @@ def test_a_long_cell_is_wrapped_at_spaces_beside_the_other_cells_of_its_row():
     ]
 
 
-def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
+def test_blocks_of_a_folded_table_repeat_the_first_column():
     heads = ['>crank [°]', *(f'>joint_{i} [°]' for i in range(8))]
     rows = [[f'{row}.5', *(f'{row}{i}.123456' for i in range(8))] for row in range(3)]
     parts = fold_table(Table('title', heads, rows), 50)
@@ -68,7 +68,7 @@ def test_many_columns_become_blocks_that_each_begin_with_the_first_column():
     assert [column.replace('\n', ' ') for column in columns] == heads[1:]
 
 
-def test_no_word_is_broken():
+def test_folded_table_breaks_no_word():
     path = '/a/path/that/is/longer/than/the/terminal.yaml'
     table = Table(path, ['a', '>b c'], [[path, '1 2'], ['x', path]])
     parts = fold_table(table, 20)
@@ -76,7 +76,7 @@ def test_no_word_is_broken():
 
 
 @pytest.mark.parametrize('columns', [60, 80, 120])
-def test_no_line_of_a_wide_table_is_wider_than_the_terminal(tmp_path, columns):
+def test_folded_lines_fit_the_width_of_the_terminal(tmp_path, columns):
     shown = on_terminal(
         tmp_path,
         *('solve', str(LINKAGES / 'jansen_leg.yaml'), '--steps', '2', '--rate', '60'),
@@ -87,7 +87,7 @@ def test_no_line_of_a_wide_table_is_wider_than_the_terminal(tmp_path, columns):
     assert sum('crank_joint' in line for line in lines) > 1
 
 
-def test_in_a_pipe_each_row_is_one_line(capsys):
+def test_piped_table_has_one_line_per_row(capsys):
     print_tables(Table('', ['a', 'b'], [['x ' * 200, 'y ' * 200], ['1', '2']]))
     assert len(capsys.readouterr().out.splitlines()) == 3
 
@@ -109,7 +109,7 @@ def clock(monkeypatch) -> Clock:
     return made
 
 
-def test_on_a_terminal_a_bar_goes_with_the_task_and_is_gone_after_it():
+def test_progress_bar_is_erased_after_the_task():
     ours, theirs = pty.openpty()
     program = (
         'from linkage_ros.cli import show_progress\n'
@@ -126,14 +126,14 @@ def test_on_a_terminal_a_bar_goes_with_the_task_and_is_gone_after_it():
     assert shown.endswith('\x1b[1A\x1b[2K')  # up, and the line is erased
 
 
-def test_a_short_task_tells_no_progress_in_a_pipe(capsys, clock):
+def test_short_task_prints_no_progress_in_a_pipe(capsys, clock):
     with show_progress('parts') as advance:
         clock.now = 1.9
         advance(1, 2)
     assert capsys.readouterr().err == ''
 
 
-def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
+def test_long_task_prints_progress_and_end_in_a_pipe(capsys, clock):
     with show_progress('parts') as advance:
         for clock.now in (1.0, 2.0, 3.0, 31.0, 32.0):
             advance(int(clock.now), 40)
@@ -157,9 +157,7 @@ def test_a_long_task_tells_its_progress_and_its_end_in_a_pipe(capsys, clock):
         ('compile ankle_motors -o x.c', {'cells of links that close only together made'}),
     ],
 )
-def test_a_command_whose_user_waits_tells_what_it_builds_and_how_far_that_is(
-    command, told, capsys, monkeypatch, tmp_path
-):
+def test_slow_command_prints_progress_of_each_part(command, told, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(terminal, 'FIRST_LINE', 0.0)
     monkeypatch.setattr(terminal, '_EVERY', 0.0)
@@ -171,7 +169,7 @@ def test_a_command_whose_user_waits_tells_what_it_builds_and_how_far_that_is(
     assert all(int(done) <= int(of) for _, done, of in found if of)
 
 
-def test_progress_is_told_to_the_thread_that_waits_alone():
+def test_progress_is_reported_to_the_waiting_thread_only():
     """A tick has a thread of its own, and never writes on what it builds."""
     heard = []
     with progress_told_to(lambda *told: heard.append(told)):

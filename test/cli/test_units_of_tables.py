@@ -103,7 +103,7 @@ def write_files(folder: Path, kind: str) -> Path:
     return folder
 
 
-def test_all_commands_that_write_tables_are_tried() -> None:
+def test_units_are_tested_for_every_command_with_tables() -> None:
     writing = set()
     for command in COMMANDS:
         parser = parser_of(command, find_command(command))
@@ -119,7 +119,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.mark.parametrize('command', TABLES)
-def test_a_table_has_the_units_of_its_file(folders: list[Path], command: str) -> None:
+def test_tables_have_the_units_of_their_file(folders: list[Path], command: str) -> None:
     found = []
     for folder in folders:
         answer = linkage(folder, command, *TABLES[command], '-o', f'{command}.xlsx')
@@ -153,7 +153,7 @@ def test_a_table_has_the_units_of_its_file(folders: list[Path], command: str) ->
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('command', sorted(TABLES.keys() - {'export', 'simulate'}))
-def test_json_is_in_si(folders: list[Path], command: str) -> None:
+def test_json_of_commands_is_in_si_units(folders: list[Path], command: str) -> None:
     in_si, in_mm = (
         json.loads(linkage(folder, command, *TABLES[command], '--json').stdout)
         for folder in folders
@@ -162,7 +162,7 @@ def test_json_is_in_si(folders: list[Path], command: str) -> None:
 
 
 @pytest.mark.parametrize('own', [True, False], ids=['its own', 'of its linkage'])
-def test_a_scene_in_si_has_the_units_of_its_linkage(tmp_path: Path, own: bool) -> None:
+def test_scene_in_si_prints_units_of_its_linkage(tmp_path: Path, own: bool) -> None:
     write_files(tmp_path, 'mm')
     scene = tmp_path / 'sine.yaml'
     if not own:
@@ -175,7 +175,7 @@ def test_a_scene_in_si_has_the_units_of_its_linkage(tmp_path: Path, own: bool) -
     }
 
 
-def test_a_study_and_its_keys_have_the_units_of_the_scene(folders: list[Path]) -> None:
+def test_study_table_has_the_units_of_the_scene(folders: list[Path]) -> None:
     tables = []
     for folder, values in zip(
         folders, ('0.25,0.5', '14.32394487827058,28.64788975654116'), strict=True
@@ -216,9 +216,7 @@ traced: [A]
         'solve x.yaml --at {far}',
     ],
 )
-def test_what_is_wrong_is_told_in_the_units_of_the_file(
-    tmp_path: Path, typed: str, unit: str
-) -> None:
+def test_error_messages_have_the_units_of_the_file(tmp_path: Path, typed: str, unit: str) -> None:
     """Each length in the line, whichever part of the package wrote it."""
     per_metre = {'m': 1.0, 'cm': 100.0, 'mm': 1000.0, 'in': 1.0 / 0.0254}
     lines = {}

@@ -78,7 +78,7 @@ def answer(command: str, *typed: str) -> str:
 
 @pytest.mark.parametrize('command', [*OF_LINKAGES, *OF_SCENES, *OF_BAGS, 'import'])
 @pytest.mark.parametrize('kind', FILES)
-def test_a_file_of_another_kind_is_called_by_its_name(
+def test_file_of_another_kind_is_named_by_its_kind(
     folder: Path, command: str, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
@@ -100,7 +100,7 @@ def test_a_file_of_another_kind_is_called_by_its_name(
 
 @pytest.mark.parametrize('command', sorted({*OF_LINKAGES, *OF_SCENES} - WITH_BAGS_TOO))
 @pytest.mark.parametrize('bag', ['my_bag', 'x.mcap'])
-def test_a_bag_in_the_place_of_a_linkage_is_called_so(
+def test_bag_given_as_a_linkage_is_named_a_bag(
     folder: Path, command: str, bag: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
@@ -110,7 +110,7 @@ def test_a_bag_in_the_place_of_a_linkage_is_called_so(
 
 
 @pytest.mark.parametrize('command', sorted(OF_LINKAGES))
-def test_a_scene_in_the_place_of_a_linkage_names_its_linkage(
+def test_scene_given_as_a_linkage_names_its_linkage(
     folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
@@ -125,7 +125,7 @@ def test_a_scene_in_the_place_of_a_linkage_names_its_linkage(
 
 @pytest.mark.parametrize('command', [*OF_BAGS, 'import'])
 @pytest.mark.parametrize(('name', 'noun'), [('linkage', 'linkage'), ('scene', 'scene')])
-def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
+def test_linkage_given_as_a_bag_is_named_a_linkage(
     folder: Path, command: str, name: str, noun: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
@@ -145,7 +145,7 @@ def test_a_linkage_or_a_scene_in_the_place_of_a_bag_or_a_urdf_is_called_so(
         'simulate demo --seconds 1 --seeds 2 -o no/x.svg', 'view four_bar -o no/x.html',
     ],
 )  # fmt: skip
-def test_a_folder_that_is_not_there_is_named_before_the_work(
+def test_missing_output_folder_is_named_before_the_work(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -154,7 +154,7 @@ def test_a_folder_that_is_not_there_is_named_before_the_work(
 
 
 @pytest.mark.parametrize('at', ['1e300', '-1e17', '1e15'])
-def test_a_large_number_is_written_short(capsys: pytest.CaptureFixture[str], at: str) -> None:
+def test_solve_prints_large_numbers_in_short(capsys: pytest.CaptureFixture[str], at: str) -> None:
     module = find_command('solve')
     module.run(parser_of('solve', module).parse_args(['four_bar', f'--at={at}']), Event())
     assert max(map(len, capsys.readouterr().out.split())) < 30

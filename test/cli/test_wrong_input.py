@@ -25,7 +25,7 @@ from ..support.commands import environment
 from ..support.scenes import closure_of
 
 
-def test_an_argument_of_ros_without_its_value_is_refused(linkage: Run, tmp_path: Path) -> None:
+def test_ros_argument_without_its_value_is_refused(linkage: Run, tmp_path: Path) -> None:
     (tmp_path / 'x.yaml').write_text('linkage: four_bar\n')
     answer = linkage('run', 'x.yaml', '--ros-args', '-p')
     assert (answer.returncode, answer.stdout) == (2, '')
@@ -65,7 +65,7 @@ KINDS = {'pipe': 'a pipe', 'socket': 'a socket', 'device': 'a device'}
 @pytest.mark.sample(15)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('read', READS)
-def test_what_is_no_regular_file_is_refused(
+def test_commands_refuse_files_that_are_not_regular(
     linkage: Run, tmp_path: Path, read: str, kind: str
 ) -> None:
     for name in ('bag', 'bag_of_one'):
@@ -136,7 +136,7 @@ def without(
 
 
 @pytest.mark.parametrize('typed', NEED_BAGS, ids=' '.join)
-def test_without_mcap_a_command_that_needs_bags_says_what_to_install(folder, typed) -> None:
+def test_bag_commands_without_mcap_name_what_to_install(folder, typed) -> None:
     answer = without('mcap', folder, COMMAND, *typed)
     assert (answer.returncode, answer.stdout) == (2, '')
     (line,) = answer.stderr.splitlines()
@@ -145,19 +145,19 @@ def test_without_mcap_a_command_that_needs_bags_says_what_to_install(folder, typ
     )
 
 
-def test_without_mcap_the_node_is_not_configured_and_says_what_to_install(folder) -> None:
+def test_node_without_mcap_names_what_to_install(folder) -> None:
     answer = without('mcap', folder, NODE, '--ros-args', '-p', 'scene:=x.yaml')
     assert (answer.returncode, answer.stdout) == (2, '')
     (line,) = answer.stderr.splitlines()
     assert line.startswith('linkage_node: mcap: is not installed; python3 -m pip install mcap ')
 
 
-def test_without_mcap_a_command_without_bags_works(folder) -> None:
+def test_check_works_without_mcap(folder) -> None:
     answer = without('mcap', folder, COMMAND, 'check', 'four.yaml')
     assert answer.returncode == 0, answer.stderr
 
 
-def test_without_ros_a_run_says_how_to_get_it(folder) -> None:
+def test_run_without_ros_names_what_to_install(folder) -> None:
     answer = without('diagnostic_msgs', folder, COMMAND, 'run', 'x.yaml')
     assert answer.returncode == 2
     (line,) = answer.stderr.splitlines()
@@ -212,7 +212,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(('file', 'content', 'command'), ANSWERED)
-def test_a_linkage_at_an_end_of_what_there_is_is_answered(
+def test_check_mjcf_and_scene_answer_degenerate_linkages(
     linkage: Run, tmp_path: Path, file: str, content: str, command: str
 ) -> None:
     if content:
@@ -227,7 +227,7 @@ def test_a_linkage_at_an_end_of_what_there_is_is_answered(
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize(('content', 'typed', 'named'), REFUSED)
-def test_a_file_without_measure_is_refused_in_a_line(
+def test_oversized_or_degenerate_files_are_refused_in_one_line(
     linkage: Run, tmp_path: Path, content: str, typed: str, named: str
 ) -> None:
     (tmp_path / 'x').write_text(content)
@@ -251,7 +251,7 @@ LINKAGES = [
 
 
 @pytest.mark.parametrize('file', LINKAGES, ids=lambda file: file.stem)
-def test_points_that_are_hardly_apart_are_refused_in_a_line_or_solved(file: Path) -> None:
+def test_nearly_coincident_points_are_solved_or_refused(file: Path) -> None:
     """A point of a link is put next to another one, by the least that a number can be."""
     text = file.read_text()
     answers = []

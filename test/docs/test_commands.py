@@ -115,7 +115,7 @@ def run_block(block: Block, folder: Path, exports: dict[str, str]) -> None:
 @pytest.mark.skipif(find_spec('rclpy') is None, reason='needs rclpy')
 @pytest.mark.skipif(not (HERE / 'linkage').is_file(), reason='needs an installed linkage')
 @pytest.mark.parametrize('page', WITH_COMMANDS)
-def test_the_commands_of_a_page_have_its_output(page, tmp_path):
+def test_documented_commands_print_the_shown_output(page, tmp_path):
     if (needed := NEEDS.get(page)) and shutil.which(needed) is None:
         pytest.skip(f'needs {needed}')
     folder = tmp_path / 'here'
@@ -130,13 +130,13 @@ def test_the_commands_of_a_page_have_its_output(page, tmp_path):
             run_block(block, folder, exports)
 
 
-def test_blocks_that_are_not_run_have_a_reason_and_are_counted():
+def test_skipped_blocks_have_counted_reasons():
     reasons = [block.why_not for block in ALL if block.why_not]
     assert {reason: reasons.count(reason) for reason in sorted({*reasons})} == NOT_RUN
 
 
 @pytest.mark.parametrize('page', WITH_COMMANDS)
-def test_blocks_that_are_not_run_name_only_files_that_the_page_has_made(page):
+def test_skipped_blocks_name_only_files_of_the_page(page):
     made: set[str] = set()
     for block in BLOCKS[page]:
         if block.language in COMMANDS:
@@ -147,7 +147,7 @@ def test_blocks_that_are_not_run_name_only_files_that_the_page_has_made(page):
                 assert named <= made, f'{page}:{block.line}'
 
 
-def test_the_readme_has_at_most_160_lines():
+def test_readme_has_at_most_160_lines():
     assert len((ROOT / 'README.md').read_text('utf-8').splitlines()) <= 160
 
 
@@ -155,14 +155,14 @@ def test_most_blocks_of_the_documentation_are_run():
     assert len(ALL) - sum(NOT_RUN.values()) >= 30
 
 
-def test_a_fence_of_commands_has_only_its_language_and_a_reason():
+def test_command_fence_holds_language_and_reason_only():
     for block in ALL:
         assert block.why_not or not block.more, (
             f'{block.page}:{block.line}: unexpected {block.more!r}'
         )
 
 
-def test_every_block_of_commands_has_its_language():
+def test_every_command_block_names_its_language():
     for name, page in BLOCKS.items():
         for block in page:
             assert block.language not in ('bash', 'shell', 'zsh'), f'{name}:{block.line}: write sh'

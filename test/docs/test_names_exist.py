@@ -163,7 +163,7 @@ def unknown_in(where: str, text: str) -> Iterator[str]:
             yield word
 
 
-def test_what_stands_in_backticks_exists() -> None:
+def test_names_in_backticks_exist() -> None:
     unknown = [
         f'{where}: {word}' for where, text in in_backticks() for word in unknown_in(where, text)
     ]
@@ -180,5 +180,5 @@ def test_what_stands_in_backticks_exists() -> None:
         'is_nearness()',
     ],
 )
-def test_what_is_stale_is_found(text: str) -> None:
+def test_stale_names_are_found(text: str) -> None:
     assert [*unknown_in('linkage_ros/errors.py:1', text)]

@@ -24,16 +24,16 @@ PAGES = made_pages()
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_a_page_is_what_make_reference_writes(page):
+def test_reference_page_equals_make_reference(page):
     assert page.read_text('utf-8') == PAGES[page], 'run make reference'
 
 
-def test_every_part_is_on_a_page():
+def test_every_generated_part_is_on_a_page():
     made = re.findall(r'^<!-- made: (.+) -->$', ''.join(PAGES.values()), re.MULTILINE)
     assert sorted(made) == sorted(MADE)
 
 
-def test_a_reader_of_the_bare_files_finds_every_command_key_and_effect():
+def test_markdown_reference_lists_every_command_key_and_effect():
     names = {
         'commands.md': [f'## linkage {name}' for name in COMMANDS],
         'files.md': [

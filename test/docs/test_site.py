@@ -115,7 +115,7 @@ def test_every_source_page_is_in_the_site(pages):
     assert {*sources, 'tutorial.html'} <= {*pages}
 
 
-def test_no_link_is_dead(site, pages):
+def test_site_has_no_dead_link(site, pages):
     dead = []
     for name, page in pages.items():
         for link in (*page.links, *page.brought):
@@ -133,17 +133,17 @@ def test_no_link_is_dead(site, pages):
     assert not dead
 
 
-def test_the_site_has_all_files_that_it_shows(pages):
+def test_site_loads_no_file_of_another_host(pages):
     foreign = {link for page in pages.values() for link in page.brought if urlsplit(link).netloc}
     assert not foreign
 
 
-def test_every_public_name_is_in_its_reference(pages):
+def test_python_reference_lists_every_public_name(pages):
     missing = {f'linkage_ros.{name}' for name in lr.__all__} - pages['reference/python.html'].ids
     assert not missing
 
 
-def test_every_command_is_in_its_reference(pages):
+def test_command_reference_lists_every_command(pages):
     found = headings(pages['reference/commands.html'])
     assert [heading for heading in found if heading.startswith('linkage ')] == [
         f'linkage {command}' for command in COMMANDS
@@ -169,11 +169,11 @@ def test_every_command_is_in_its_reference(pages):
         ('tutorial.html', 'crank 50°: rocker misses by'),
     ],
 )
-def test_reference_has_the_text_of_the_code(pages, page, text):
+def test_reference_quotes_the_text_of_the_code(pages, page, text):
     assert text in pages[page].text
 
 
-def test_every_drive_effect_and_fault_is_in_its_reference(pages):
+def test_parameter_reference_lists_every_drive_effect_and_fault(pages):
     found = headings(pages['reference/parameters.html'])[1:]
     kinds = {'Drives': 'drive', 'Effects': 'effect', 'Faults': 'fault'}
     expected = [word for kind, name in kinds.items() for word in (kind, *REGISTRIES[name])]
@@ -188,12 +188,12 @@ SCHEMAS = {
 
 
 @pytest.mark.parametrize('schema', SCHEMAS.values(), ids=SCHEMAS.keys())
-def test_every_key_of_a_file_is_in_its_reference(pages, schema):
+def test_file_reference_lists_every_key(pages, schema):
     words = {word.strip() for word in pages['reference/files.html'].words}
     assert {*schema['properties']} <= words
 
 
-def test_the_tutorial_shows_its_pictures(site):
+def test_tutorial_page_shows_its_pictures(site):
     assert (site / 'tutorial.html').read_text('utf-8').count('<svg') >= 3
 
 
@@ -202,9 +202,7 @@ def test_the_tutorial_shows_its_pictures(site):
     [(1600, 'light'), (400, 'dark')],
     ids=['wide and light', 'narrow and dark'],
 )
-def test_in_a_browser_the_site_loads_no_other_host_and_fits_its_window(
-    browser, site, pages, width, scheme
-):
+def test_site_fits_its_window_without_foreign_requests(browser, site, pages, width, scheme):
     for name in LOOKED_AT:
         with opened(browser, site / f'{name}.html', width=width, color_scheme=scheme) as page:
             assert page.said == [], name

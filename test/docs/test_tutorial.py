@@ -33,7 +33,7 @@ def website(monkeypatch):
     return tutorial
 
 
-def test_the_file_runs(tmp_path):
+def test_tutorial_runs_as_a_script(tmp_path):
     done = subprocess.run(
         [sys.executable, '-W', 'error', str(TUTORIAL)],
         cwd=tmp_path,
@@ -45,7 +45,7 @@ def test_the_file_runs(tmp_path):
     assert (done.returncode, done.stderr) == (0, '')
 
 
-def test_a_page_shows_printed_output_the_last_value_and_the_picture(website):
+def test_tutorial_page_shows_output_values_and_pictures(website):
     text = (
         '"""Not shown."""\n'
         '# %% [markdown]\n# # A title\n#\n# And text.\n'
@@ -61,19 +61,19 @@ def test_a_page_shows_printed_output_the_last_value_and_the_picture(website):
     assert page.endswith('```python\nNone\n```\n')
 
 
-def test_the_same_cells_make_the_same_page(website):
+def test_repeated_cells_make_the_same_page(website):
     text = '# %%\nfrom matplotlib import pyplot as plt\nlines = plt.plot([1, 2])\n'
     assert website.page(text, 'file.py') == website.page(text, 'file.py')
 
 
-def test_an_exception_has_file_and_line(website):
+def test_tutorial_exception_names_file_and_line(website):
     with pytest.raises(ZeroDivisionError) as caught:
         website.page('# %% [markdown]\n# Text\n# %%\nx = 0\n1 / x\n', 'file.py')
     last = caught.traceback[-1]
     assert (str(last.path).rpartition('/')[2], last.lineno + 1) == ('file.py', 5)
 
 
-def test_the_page_leaves_no_files(website, tmp_path, monkeypatch):
+def test_tutorial_page_leaves_no_files(website, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     website.page("# %%\nfrom pathlib import Path\nPath('here').touch()\n", 'file.py')
     assert list(tmp_path.iterdir()) == []

@@ -25,7 +25,7 @@ class Quiet(SimpleHTTPRequestHandler):
         """Do not log requests."""
 
 
-def test_the_web_page_shows_the_joints(tmp_path: Path, browser: Any) -> None:
+def test_compiled_javascript_page_shows_the_joints(tmp_path: Path, browser: Any) -> None:
     page = ROOT / 'docs' / 'how_to' / 'compile.md'
     texts = {block.language: block.text for block in blocks(page)}
     (tmp_path / 'page.html').write_text(f'<!doctype html>\n{texts["html"]}')

@@ -38,7 +38,7 @@ def moved(name, seconds=1.0):
 
 
 @pytest.mark.parametrize('name', SOME)
-def test_links_are_where_the_closure_has_them(name):
+def test_animated_links_equal_the_closure(name):
     motion = moved(name)
     closure = motion.view.closure
     assert len(motion.x) == RATE
@@ -49,7 +49,7 @@ def test_links_are_where_the_closure_has_them(name):
             assert cos(angle - found[link].angle) == pytest.approx(1.0)
 
 
-def test_a_range_with_ends_is_shown_there_and_back():
+def test_bounded_range_is_animated_there_and_back():
     motion = moved('double_rocker')
     low, high = motion.view.interval.lowest, motion.view.interval.highest
     assert motion.x[0] == low
@@ -111,7 +111,7 @@ def placed(transform):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
-def test_keyframes_of_an_svg_put_links_where_the_closure_has_them(tmp_path, name):
+def test_svg_keyframes_place_links_as_the_closure(tmp_path, name):
     motion = moved(name, 2.0)
     file = tmp_path / 'x.svg'
     animate(motion, file)
@@ -137,7 +137,7 @@ def test_keyframes_of_an_svg_put_links_where_the_closure_has_them(tmp_path, name
     assert max(abs(each - scale) for each in scales) < 0.02 * abs(scale)
 
 
-def test_reduced_motion_shows_the_first_picture(tmp_path):
+def test_reduced_motion_shows_the_first_frame(tmp_path):
     motion = moved('double_rocker')  # begins at an end of its range, not at the pose of its shapes
     file = tmp_path / 'x.svg'
     animate(motion, file)
@@ -153,7 +153,7 @@ def test_reduced_motion_shows_the_first_picture(tmp_path):
         assert placed(group.get('transform')) == pytest.approx(placed(first), abs=1e-3)
 
 
-def test_a_gif_shows_a_turn_in_its_time_and_is_small(tmp_path):
+def test_gif_lasts_one_turn_and_is_small(tmp_path):
     file = tmp_path / 'x.gif'
     done = []
     animate(moved('jansen_leg', 2.0), file, lambda i, of: done.append((i, of)))
@@ -167,14 +167,14 @@ def test_a_gif_shows_a_turn_in_its_time_and_is_small(tmp_path):
 
 
 @pytest.mark.parametrize('seconds', ['0', '-1', '31', 'nan'])
-def test_a_time_out_of_bounds_is_told_with_them(tmp_path, monkeypatch, capsys, seconds):
+def test_animate_refuses_a_duration_out_of_bounds(tmp_path, monkeypatch, capsys, seconds):
     monkeypatch.chdir(tmp_path)
     assert main(['animate', 'four_bar', '--seconds', seconds]) == 2
     assert f'seconds: {seconds} is not between 0.1 and 30 s' in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_of_another_kind_is_refused_before_anything_is_read(tmp_path, monkeypatch, capsys):
+def test_animate_refuses_another_file_ending_first(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(['animate', 'no_such_linkage', '-o', 'x.png']) == 2
     said = capsys.readouterr().err
@@ -183,14 +183,14 @@ def test_a_file_of_another_kind_is_refused_before_anything_is_read(tmp_path, mon
     )
 
 
-def test_without_ffmpeg_an_mp4_is_refused(monkeypatch):
+def test_mp4_without_ffmpeg_is_refused(monkeypatch):
     monkeypatch.setenv('PATH', '')
     with pytest.raises(LinkageError, match='ffmpeg: is not installed; apt install ffmpeg'):
         check_kind(Path('x.mp4'))
 
 
 @pytest.mark.parametrize('kind', ['gif', 'svg'])
-def test_an_interrupted_picture_leaves_the_old_file(tmp_path, kind):
+def test_interrupted_animation_keeps_the_old_file(tmp_path, kind):
     file = tmp_path / f'x.{kind}'
     file.write_text('old')
 
@@ -203,7 +203,7 @@ def test_an_interrupted_picture_leaves_the_old_file(tmp_path, kind):
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_an_svg_moves_in_a_browser_without_an_error(tmp_path):
+def test_svg_moves_in_a_browser_without_errors(tmp_path):
     file = tmp_path / 'x.svg'
     animate(moved('four_bar', 2.0), file)
     with browser() as started, opened(started, file, width=400) as seen:

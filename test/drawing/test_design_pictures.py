@@ -137,7 +137,7 @@ def legend(axes: Any) -> list[str]:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('name', DESIGNS)
-def test_no_number_lies_on_another_and_none_outside(name):
+def test_numbers_of_a_design_picture_do_not_overlap(name):
     found = sheet(name)
     for axes in (found.left, found.right, *found.panels):
         boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
@@ -153,7 +153,7 @@ def test_no_number_lies_on_another_and_none_outside(name):
 
 
 @pytest.mark.parametrize('name', [name for name in DESIGNS if 'places' not in name])
-def test_a_position_is_marked_at_the_angles_that_were_wanted(name):
+def test_design_marks_lie_at_the_wanted_angles(name):
     design = DESIGNS[name]
     found = marks(sheet(name).right)
     assert len(found) == len(design.wanted)
@@ -164,7 +164,7 @@ def test_a_position_is_marked_at_the_angles_that_were_wanted(name):
 
 
 @pytest.mark.parametrize('name', ['drag link, zeros free', 'reversed rocker', 'example'])
-def test_a_ray_goes_from_the_pivot_through_the_pin_that_is_wanted(name):
+def test_ray_leads_from_the_pivot_through_the_pin(name):
     design = DESIGNS[name]
     four_bar = design.four_bar
     rays = lines(sheet(name).left, WANTED)
@@ -176,13 +176,13 @@ def test_a_ray_goes_from_the_pivot_through_the_pin_that_is_wanted(name):
         assert abs(end - start) > abs(pin)
 
 
-def test_a_pin_off_its_axis_is_said():
+def test_legend_names_the_offset_of_a_pin():
     said = legend(sheet('drag link, zeros free').left)
     assert f'wanted rocker angle φ, its pin at φ − {degrees(0.9):.4g}°' in said
     assert f'crank pin at θ + {degrees(0.4):.4g}°' in said
 
 
-def test_what_is_met_on_the_other_assembly_has_its_colour_and_is_said():
+def test_position_on_the_other_assembly_has_its_colour():
     found = sheet('example')
     drawn = [place for line in lines(found.left, OTHER) for place in line]
     for pin in (rect(A, radians(50.0)), 1.0 + rect(C, radians(60.0))):
@@ -193,7 +193,7 @@ def test_what_is_met_on_the_other_assembly_has_its_colour_and_is_said():
     assert 'met on the other assembly' not in legend(sheet('poses').left)
 
 
-def test_both_branches_obey_freudensteins_equation_and_end_at_the_toggles():
+def test_both_branches_obey_freudensteins_equation_up_to_toggles():
     found = sheet('example')
     # Coupler and rocker in line: the diagonal from A to O4 is c + b long, or c − b.
     ends = [degrees(acos((A * A + 1.0 - s * s) / (2.0 * A))) for s in (C - B, C + B)]
@@ -211,7 +211,7 @@ def test_both_branches_obey_freudensteins_equation_and_end_at_the_toggles():
     assert sorted(marked) == pytest.approx(ends, abs=1e-9)
 
 
-def test_a_crank_that_turns_fully_has_no_ends():
+def test_crank_that_turns_fully_has_no_range_ends():
     found = sheet('reversed rocker')
     (curve,) = (line for line in lines(found.right, INK) if len(line) > 100)
     assert curve[-1].real - curve[0].real == pytest.approx(360.0)
@@ -219,7 +219,7 @@ def test_a_crank_that_turns_fully_has_no_ends():
 
 
 @pytest.mark.parametrize(('name', 'panels'), [('example', 3), ('reversed rocker', 0)])
-def test_a_link_too_short_to_be_seen_is_drawn_larger_at_each_position(name, panels):
+def test_short_link_is_magnified_at_each_position(name, panels):
     found = sheet(name).panels
     assert len(found) == panels
     titles = [panel.get_title() for panel in found]
@@ -230,7 +230,7 @@ def test_a_link_too_short_to_be_seen_is_drawn_larger_at_each_position(name, pane
         assert {text.get_text() for text in panel.texts} == {'A', 'B'}
 
 
-def test_an_error_is_drawn_in_degrees_with_the_positions_on_it():
+def test_rocker_error_is_drawn_in_degrees():
     design = pairs(CRANK_ROCKER, 0.5, 1.0, 1.5)
     crank = np.linspace(0.4, 1.6, 241)
     found = drawn(design, error=(crank, 0.01 * np.sin(2.0 * pi * crank)))
@@ -244,7 +244,7 @@ def test_an_error_is_drawn_in_degrees_with_the_positions_on_it():
     assert 'error of the rocker [°]' in axes.get_ylabel()
 
 
-def test_places_that_are_missed_have_their_distances_drawn():
+def test_distances_of_missed_places_are_drawn():
     (axes,) = sheet('twenty places, missed').under
     assert axes.get_ylabel() == 'distance [mm]'
     (line,) = (line for line in axes.get_lines() if len(line.get_xdata()) == 20)
@@ -252,7 +252,7 @@ def test_places_that_are_missed_have_their_distances_drawn():
     assert not sheet('seven places').under
 
 
-def test_a_position_that_does_not_close_is_left_out_and_named():
+def test_open_position_is_omitted_and_named():
     design = EXAMPLE._replace(
         wanted=(*EXAMPLE.wanted, DesignRequest(radians(60.0), radians(70.0)))
     )
@@ -261,7 +261,7 @@ def test_a_position_that_does_not_close_is_left_out_and_named():
     assert len(marks(found.right)) == 3
 
 
-def test_a_position_beyond_a_toggle_by_rounding_is_drawn_there():
+def test_position_beyond_a_toggle_by_rounding_is_drawn():
     toggle = acos((A * A + 1.0 - (C - B) ** 2) / (2.0 * A))
     rocker = closed_left(EXAMPLE.four_bar, toggle + 1e-9)[2]
     design = EXAMPLE._replace(wanted=(DesignRequest(toggle - 1e-10, rocker), *EXAMPLE.wanted[1:]))
@@ -270,13 +270,13 @@ def test_a_position_beyond_a_toggle_by_rounding_is_drawn_there():
     assert marks(found.right)[0].real == pytest.approx(degrees(toggle), abs=1e-6)
 
 
-def test_a_design_that_closes_nowhere_is_refused(tmp_path):
+def test_design_that_closes_nowhere_is_refused(tmp_path):
     design = EXAMPLE._replace(wanted=(DesignRequest(radians(60.0), radians(70.0)),))
     with pytest.raises(LinkageError, match='closes at none of its positions'):
         draw_design(design, 'none', tmp_path / 'none.png')
 
 
-def test_the_same_design_is_the_same_bytes(tmp_path):
+def test_repeated_design_picture_has_the_same_bytes(tmp_path):
     one, other = tmp_path / 'one.svg', tmp_path / 'other.svg'
     for file in (one, other):
         draw_design(EXAMPLE, 'twice', file)
@@ -284,12 +284,12 @@ def test_the_same_design_is_the_same_bytes(tmp_path):
     assert one.read_text('utf-8').startswith('<?xml')
 
 
-def test_without_matplotlib_it_says_what_to_install(monkeypatch, tmp_path):
+def test_design_picture_without_matplotlib_names_the_package(monkeypatch, tmp_path):
     monkeypatch.setattr('linkage_ros.errors.find_spec', lambda _name: None)
     with pytest.raises(LinkageError, match=r'linkage_ros\[report\]'):
         draw_design(EXAMPLE, 'none', tmp_path / 'none.png')
 
 
-def test_a_picture_that_cannot_be_written_is_said_in_a_line(tmp_path):
+def test_design_picture_in_a_missing_folder_is_refused(tmp_path):
     with pytest.raises(LinkageError, match='there is no folder'):
         draw_design(EXAMPLE, 'none', tmp_path / 'missing' / 'none.png')

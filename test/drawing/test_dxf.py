@@ -54,7 +54,7 @@ WRITTEN_OUT = [
 
 
 @pytest.mark.parametrize('name', WRITTEN_OUT)
-def test_every_link_is_a_part_with_holes_at_its_pins(name: str, tmp_path: Path) -> None:
+def test_dxf_part_of_every_link_has_its_pin_holes(name: str, tmp_path: Path) -> None:
     document = read(links_dxf(load(name)), tmp_path)
     assert document.header['$INSUNITS'] == 4  # millimetres
     space = document.modelspace()
@@ -89,7 +89,7 @@ def test_every_link_is_a_part_with_holes_at_its_pins(name: str, tmp_path: Path) 
             assert low + radius < hole.y < top - radius
 
 
-def test_a_bar_is_as_wide_as_is_asked_and_its_holes_too(tmp_path: Path) -> None:
+def test_dxf_bar_has_the_given_width_and_holes(tmp_path: Path) -> None:
     document = read(links_dxf(load('four_bar'), width=0.012, hole=0.004), tmp_path)
     space = document.modelspace()
     left, low, right, top = box(space.query('LWPOLYLINE[layer=="CUT"]')[1])  # the crank
@@ -97,7 +97,7 @@ def test_a_bar_is_as_wide_as_is_asked_and_its_holes_too(tmp_path: Path) -> None:
     assert {circle.dxf.radius for circle in space.query('CIRCLE')} == {2.0}
 
 
-def test_a_link_in_which_another_slides_has_a_slot(tmp_path: Path) -> None:
+def test_dxf_link_with_a_slider_has_a_slot(tmp_path: Path) -> None:
     space = read(links_dxf(load('slider_crank')), tmp_path).modelspace()
     (slot,) = space.query('LWPOLYLINE[layer=="HOLE"]')
     left, _, right, _ = box(slot)
@@ -107,20 +107,20 @@ def test_a_link_in_which_another_slides_has_a_slot(tmp_path: Path) -> None:
     assert right - left == pytest.approx(stroke + 2.0 * circle.dxf.radius, abs=1e-2)
 
 
-def test_the_linkage_in_its_pose_is_on_a_layer_that_is_off(tmp_path: Path) -> None:
+def test_dxf_assembly_layer_is_off(tmp_path: Path) -> None:
     document = read(links_dxf(load('jansen_leg')), tmp_path)
     assert document.layers.get('ASSEMBLY').is_off()
     assert len(document.modelspace().query('LWPOLYLINE[layer=="ASSEMBLY"]')) == 8
 
 
-def test_a_hole_that_is_too_wide_is_refused() -> None:
+def test_dxf_hole_wider_than_its_bar_is_refused() -> None:
     with pytest.raises(
         LinkageError, match=r'^four_bar: a hole of 12 mm does not fit into a bar of'
     ):
         links_dxf(load('four_bar'), width=0.01, hole=0.012)
 
 
-def test_the_command_writes_parts_and_refuses_their_options_elsewhere(tmp_path: Path) -> None:
+def test_draw_writes_dxf_parts_and_refuses_stray_options(tmp_path: Path) -> None:
     answer: subprocess.CompletedProcess[str] = run(
         tmp_path, 'draw', 'four_bar', '-o', 'parts.dxf', '--width', '12', '--hole', '4'
     )

@@ -44,7 +44,7 @@ def page():
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_a_linkage_is_told_as_its_file_has_it(page, file):
+def test_gallery_chapter_equals_its_linkage_file(page, file):
     picture = ROOT / 'docs' / 'gallery' / f'{file.stem}.png'
     chapter = make_gallery.chapter(load(file), file, picture)
     text = picture.with_suffix('.md').read_text('utf-8')
@@ -56,7 +56,7 @@ def test_a_linkage_is_told_as_its_file_has_it(page, file):
     assert small.stat().st_size < make_gallery.LARGEST_SMALL
 
 
-def test_nothing_else_is_in_the_gallery(page):
+def test_gallery_lists_exactly_the_shipped_linkages(page):
     listed = re.findall(r'^- \[!\[\]\(gallery/thumbnails/(\w+)\.png', page, re.MULTILINE)
     assert listed == [file.stem for file in FILES]
     folder = ROOT / 'docs' / 'gallery'
@@ -65,7 +65,7 @@ def test_nothing_else_is_in_the_gallery(page):
 
 
 @pytest.mark.parametrize('kind', ['svg', 'gif'])
-def test_the_moving_picture_of_the_first_page_is_small(page, kind):
+def test_moving_picture_of_the_readme_is_small(page, kind):
     size = (ROOT / 'docs' / f'hero.{kind}').stat().st_size
     assert 0 < size <= make_gallery.LARGEST_MOVING[kind]
 
@@ -107,17 +107,17 @@ def equations(name):
     return [squeezed(line) for line in lines if line.startswith('    ') and '=' in line]
 
 
-def test_everything_has_its_section_in_physical_order():
+def test_effects_page_has_all_sections_in_order():
     names = [section.name for section in SECTIONS if section.name in NAMES]
     assert names == [*NAMES]
 
 
-def test_what_is_made_of_the_code_is_as_the_code_is_now():
+def test_generated_parts_of_the_effects_page_are_current():
     assert make_effects.filled(PAGE) == PAGE, 'make effects makes it anew'
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_a_section_says_what_a_reader_wants_to_know(name):
+def test_effects_section_names_source_output_and_limits(name):
     text = BY_NAME[name].text
     assert '**Not modelled.**' in text
     if name not in FAULTS:
@@ -129,12 +129,12 @@ def test_a_section_says_what_a_reader_wants_to_know(name):
 @pytest.mark.parametrize(
     ('name', 'equation'), [(name, each) for name in EFFECTS for each in equations(name)]
 )
-def test_the_equations_of_a_module_stand_in_its_section(name, equation):
+def test_equations_of_a_module_stand_in_its_section(name, equation):
     assert equation in squeezed(BY_NAME[name].text)
 
 
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
-def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
+def test_example_scene_uses_the_effect_of_its_section(section):
     scene = scene_of(section.scene)
     (scene_linkage,) = scene.linkages
     if section.name == 'Faults':
@@ -147,7 +147,7 @@ def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
         assert section.name in (scene_linkage.drive[0], *scene_linkage.effects)
 
 
-def test_the_page_says_what_each_is_held_against_and_where():
+def test_effects_page_links_the_tests_of_each_effect():
     section = BY_NAME['What each is held against']
     rows = [line.strip('| ').split(' | ') for line in section.text.splitlines() if line[:1] == '|']
     assert [name for name, _, _ in rows[2:]] == [*DRIVES, 'loads', *EFFECTS, *FAULTS]
@@ -157,13 +157,13 @@ def test_the_page_says_what_each_is_held_against_and_where():
         assert any(name in text.lower() for text in texts), f'no test of {name} among them'
 
 
-def test_every_drive_and_effect_has_a_scene_and_the_faults_have_one_together():
+def test_effects_page_has_one_scene_per_drive_and_effect():
     drives = [*DRIVES, *PARTS_OF_TORQUE]
     assert [section.name for section in DRAWN] == [*drives, *EFFECTS, 'Faults', 'loads']
 
 
 @pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
-def test_a_picture_shows_the_scene_beside_it(section):
+def test_effects_picture_is_drawn_from_its_scene(section):
     image = pytest.importorskip('PIL.Image')
     file = make_effects.PICTURES / f'{section.name.lower()}.png'
     assert file.stat().st_size < make_effects.LARGEST
@@ -178,12 +178,12 @@ def test_a_picture_shows_the_scene_beside_it(section):
 
 
 @pytest.mark.parametrize('folder', ['.', 'thumbnails'])
-def test_no_other_picture_lies_there(folder):
+def test_effects_folder_holds_no_other_pictures(folder):
     drawn = {file.name for file in (make_effects.PICTURES / folder).glob('*.png')}
     assert drawn == {f'{section.name.lower()}.png' for section in DRAWN}
 
 
-def test_the_effect_that_the_page_has_for_an_example_works(monkeypatch):
+def test_example_effect_of_the_page_works(monkeypatch):
     code = re.search(r'^```python\n(.*?)^```$', PAGE, re.MULTILINE | re.DOTALL).group(1)
     module = type(sys)('saturation')
     monkeypatch.setitem(sys.modules, 'saturation', module)

@@ -70,7 +70,7 @@ def struck_by_leaders(axes: Any) -> list[str]:
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', linkage_names())
-def test_names_are_apart_and_all_texts_are_within_the_picture(name):
+def test_names_in_a_picture_do_not_overlap(name):
     figure = drawn(name)
     names = [box(text) for text in figure.axes[0].texts]
     assert {*load(name).linkage.links} - {'ground'} <= {text for text, _ in names}
@@ -96,7 +96,7 @@ def test_names_are_apart_and_all_texts_are_within_the_picture(name):
         ('double_rocker', -320.0, 40.0, '-320° (40° on the axis)', (36.87, 101.5)),
     ],
 )
-def test_the_mark_of_a_pose_turns_away_is_in_the_range(name, at, mark, title, ends):
+def test_pose_mark_is_shown_within_the_range(name, at, mark, title, ends):
     figure = drawn(name, (radians(at),))
     plane, joints = figure.axes
     assert title in plane.get_title(loc='left')
@@ -105,7 +105,7 @@ def test_the_mark_of_a_pose_turns_away_is_in_the_range(name, at, mark, title, en
     assert joints.get_xlim() == pytest.approx(ends, abs=0.1)
 
 
-def test_a_pose_beyond_the_limits_does_not_stretch_the_axis(tmp_path):
+def test_pose_beyond_the_limits_keeps_the_axis(tmp_path):
     file = tmp_path / 'limited.yaml'
     file.write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0.5, 1.5]}}\n')
     plane, joints = drawn(str(file), (2.5,)).axes
@@ -113,7 +113,7 @@ def test_a_pose_beyond_the_limits_does_not_stretch_the_axis(tmp_path):
     assert joints.get_xlim() == pytest.approx((28.65, 85.94), abs=0.01)
 
 
-def test_lengths_below_a_metre_are_in_millimetres():
+def test_lengths_below_a_metre_are_drawn_in_millimetres():
     plane = drawn('four_bar').axes[0]
     assert plane.get_xlabel() == 'x [mm]'
     assert drawn('windscreen_wiper').axes[0].get_xlabel() == 'x [m]'
@@ -124,7 +124,7 @@ def test_lengths_below_a_metre_are_in_millimetres():
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('length', LENGTHS)
-def test_lengths_of_a_file_are_in_its_unit_and_round(length):
+def test_picture_lengths_have_round_numbers_in_file_units(length):
     shown = 'mm' if length == 'm' else length
     per_metre = {'mm': 1000.0, 'cm': 100.0, 'in': 1.0 / 0.0254}[shown]
     plane, *_, joints = drawn('elliptic_trammel', (0.05,), length).axes
@@ -142,7 +142,7 @@ def test_lengths_of_a_file_are_in_its_unit_and_round(length):
 
 
 @pytest.mark.parametrize('name', ['jansen_leg', 'slider_crank'])
-def test_curves_have_no_jumps_and_their_names_in_their_colours(name):
+def test_curves_are_continuous_with_names_in_their_colours(name):
     joints = drawn(name).axes[1]
     names = {text.get_text(): text.get_color() for text in joints.texts}
     for line in joints.lines:
@@ -165,7 +165,7 @@ joints: {rocker_joint: {parent: ground, child: rocker}}
 """
 
 
-def test_sides_that_a_file_leaves_out_are_chosen(tmp_path):
+def test_assemblies_vary_the_sides_missing_in_the_file(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text(WITHOUT_SIDES)
     sides = 'left', 'right'
@@ -178,7 +178,7 @@ def test_sides_that_a_file_leaves_out_are_chosen(tmp_path):
     assert len(find_assemblies(file)) == 4
 
 
-def test_a_shorthand_gets_its_own_text(tmp_path):
+def test_assemblies_of_a_shorthand_are_named_in_shorthand(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
     found = find_assemblies(file)
@@ -195,19 +195,19 @@ def test_each_assembly_closes_on_its_sides():
         assert (side > 0.0) == (closure.linkage.assembly['C'] == 'left')
 
 
-def test_choices_that_close_nowhere_are_left_out():
+def test_assemblies_that_close_nowhere_are_left_out():
     sides = 'left', 'right'
     found = [f'assembly: {{B: left, D: {other}}}' for other in sides]
     assert [*find_assemblies('stephenson_3')] == found
 
 
 @pytest.mark.parametrize('name', ['class_3', 'scotch_yoke'])
-def test_a_linkage_without_sides_is_told(name):
+def test_assemblies_of_a_linkage_without_dyads_are_refused(name):
     with pytest.raises(FileError, match='no dyad of this linkage has two assemblies'):
         find_assemblies(name)
 
 
-def test_a_file_that_closes_in_no_assembly_is_told_as_always(tmp_path):
+def test_assemblies_of_an_open_linkage_are_refused(tmp_path):
     file = tmp_path / 'x.yaml'
     file.write_text(WITHOUT_SIDES.replace('0.080', '0.380'))
     with pytest.raises(FileError, match='close at no value of the input'):
@@ -219,7 +219,7 @@ IN_MM = UNITS + re.sub(r'0\.\d+', lambda of: f'{1e3 * float(of[0]):g}', WITHOUT_
 
 
 @pytest.mark.parametrize('text', [WITHOUT_SIDES, IN_MM], ids=['m', 'mm'])
-def test_the_picture_of_assemblies_has_the_pose_for_the_file(text, tmp_path, monkeypatch, capsys):
+def test_draw_assemblies_prints_the_pose_of_each(text, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path('x.yaml').write_text(text)
     assert main(['draw', 'x.yaml', '--assemblies', '-o', 'x.svg']) == 0
@@ -237,7 +237,7 @@ def test_the_picture_of_assemblies_has_the_pose_for_the_file(text, tmp_path, mon
 
 
 @pytest.mark.parametrize('name', ['parallelogram', 'jansen_leg', 'slider_crank', 'watt_1'])
-def test_the_pose_of_each_assembly_of_the_gallery_leads_back(name, tmp_path, capsys):
+def test_printed_pose_reproduces_its_assembly(name, tmp_path, capsys):
     assert main(['draw', name, '--assemblies', '-o', str(tmp_path / 'x.svg')]) == 0
     lines = capsys.readouterr().out.splitlines()[:-1]
     text = named_file(name, 'linkages').read_text('utf-8')
@@ -254,5 +254,5 @@ def test_the_pose_of_each_assembly_of_the_gallery_leads_back(name, tmp_path, cap
     ('high', 'step'),
     [(7.0, 1.0), (200.0, 30.0), (360.0, 60.0), (1440.0, 180.0), (36000.0, 4680.0)],
 )
-def test_an_axis_of_many_turns_has_as_few_numbers(high, step):
+def test_axis_of_many_turns_has_few_ticks(high, step):
     assert degree_step((0.0, high)) == step

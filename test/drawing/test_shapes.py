@@ -77,7 +77,7 @@ joints: {slide: {slider: guide}}
 
 
 @given(st.lists(places, min_size=1, max_size=12))
-def test_a_hull_is_convex_and_holds_all_points(points):
+def test_convex_hull_contains_all_points(points):
     corners = convex_hull(points)
     assert set(corners) <= set(points)
     if len(corners) < 3:
@@ -91,14 +91,14 @@ def test_a_hull_is_convex_and_holds_all_points(points):
 
 
 @given(st.lists(places, min_size=1, max_size=8), st.floats(0.1, 3.0))
-def test_an_outline_lies_at_its_distance(points, radius):
+def test_rounded_outline_keeps_its_distance(points, radius):
     corners = convex_hull(points)
     for place in round_corners(corners, radius):
         assert min(abs(place - corner) for corner in corners) == pytest.approx(radius)
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_pin_is_a_circle_at_its_place(file):
+def test_every_pin_is_drawn_as_a_circle(file):
     closure, points, found = drawn(file.stem)
     circles = {shape.name: shape.centre for shape in found if isinstance(shape, Circle)}
     carriers: dict[str, int] = {}
@@ -112,7 +112,7 @@ def test_every_pin_is_a_circle_at_its_place(file):
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_link_is_drawn_around_all_its_points(file):
+def test_every_link_is_drawn_around_its_points(file):
     closure, points, found = drawn(file.stem)
     for link, named in closure.linkage.links.items():
         if link == GROUND:
@@ -131,7 +131,7 @@ def test_ground_pivots_stand_on_hatched_ground():
     assert sum(isinstance(s, Segment) and s.role == 'hatch' for s in found) >= 6
 
 
-def test_driven_links_are_told_apart_and_lie_on_top():
+def test_driven_links_are_drawn_on_top():
     _, _, found = drawn('four_bar')
     links = [
         s.name for s in found if isinstance(s, Polygon) and s.role in ('link', 'plate', 'input')
@@ -139,14 +139,14 @@ def test_driven_links_are_told_apart_and_lie_on_top():
     assert links == ['coupler', 'rocker', 'crank']
 
 
-def test_three_points_make_a_plate_and_points_in_line_a_bar():
+def test_three_points_form_a_plate_collinear_points_a_bar():
     _, _, found = drawn('klann_leg')
     assert {s.name: s.role for s in found if isinstance(s, Polygon)}['leg'] == 'plate'
     _, _, found = drawn('hoeken')
     assert {s.name: s.role for s in found if isinstance(s, Polygon)}['coupler'] == 'link'
 
 
-def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block():
+def test_cylinder_is_drawn_as_rod_in_a_tube():
     _, points, found = drawn('excavator_bucket')
     tube = next(s for s in found if isinstance(s, Polygon) and s.role == 'tube')
     rod = next(s for s in found if isinstance(s, Polygon) and s.name == 'cylinder_rod')
@@ -157,7 +157,7 @@ def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block():
     assert sum(block.corners) / 4 == pytest.approx(points['connecting_rod', 'B'])
 
 
-def test_ghosts_run_from_pin_to_pin():
+def test_skeleton_lines_run_from_pin_to_pin():
     closure, points, _ = drawn('four_bar')
     position = closure.position(*usual_inputs(closure))
     lines = {frozenset((line.start, line.end)) for line in draw_skeleton(closure, position)}
@@ -166,13 +166,13 @@ def test_ghosts_run_from_pin_to_pin():
 
 
 @given(st.lists(st.floats(-3.1, 3.1), min_size=1, max_size=60), st.integers(-3, 3))
-def test_a_curve_of_angles_has_no_jump_and_keeps_each_angle_but_for_whole_turns(steps, turns):
+def test_unwrapped_angles_differ_by_whole_turns(steps, turns):
     angles = list(accumulate(steps, initial=0.5))
     wrapped = [remainder(angle + turns * tau, tau) for angle in angles]
     assert unwrap_angles(wrapped) == pytest.approx(angles)
 
 
-def test_traced_points_of_a_peaucellier_cell_run_straight():
+def test_traced_point_of_a_peaucellier_cell_moves_straight():
     closure = Closure(read_linkage(read_yaml(LINKAGES / 'peaucellier.yaml')[0]))
     way = InputSweep(closure)
     path = sweep_range(way, way.ranges[0]).paths['P']
@@ -180,7 +180,7 @@ def test_traced_points_of_a_peaucellier_cell_run_straight():
     assert all(abs(place.real - 0.13125) < 1e-14 for place in path)
 
 
-def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is():
+def test_path_there_and_back_is_drawn_once():
     turn = [tau * i / 720 for i in range(721)]
     arc = [complex(cos(sin(t)), sin(sin(t))) for t in turn]  # as a rocker's end goes
     there = drawn_once(arc)
@@ -190,7 +190,7 @@ def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is():
     assert drawn_once(loop) == tuple(loop)
 
 
-def test_labels_have_room_and_do_not_overlap():
+def test_labels_do_not_overlap():
     rng = random.Random(3)
     labels = [
         Label((complex(rng.uniform(100, 500), rng.uniform(100, 300)),), 40.0, 10.0, 6.0)
@@ -203,7 +203,7 @@ def test_labels_have_room_and_do_not_overlap():
             assert abs(apart.real) >= 40.0 or abs(apart.imag) >= 10.0
 
 
-def test_a_label_keeps_off_what_is_drawn_and_on_the_paper():
+def test_label_avoids_lines_and_stays_on_the_paper():
     line = [complex(x, 50.0) for x in range(0, 200, 3)]
     (found,) = place_labels([Label((100.0 + 50.0j,), 30.0, 8.0, 4.0)], line, (0j, 200.0 + 100.0j))
     assert abs(found.centre.imag - 50.0) >= 4.0
@@ -212,7 +212,7 @@ def test_a_label_keeps_off_what_is_drawn_and_on_the_paper():
     assert corner.centre.imag >= 4.0
 
 
-def test_a_whole_turn_of_an_outline_is_one_turn():
+def test_rounded_point_is_a_16_cornered_circle():
     outline = round_corners([0j], 1.0)
     assert len(outline) == 16
     assert all(abs(place) == pytest.approx(1.0) for place in outline)
@@ -233,7 +233,7 @@ ratios: {planet_joint: {of: sun_joint, ratio: -2}}
 """
 
 
-def test_pitch_circles_are_round_and_meet():
+def test_pitch_circles_are_closed_and_round():
     """A chord leaves its circle by less than a tenth of a pixel of a circle 200 pixels wide."""
     closure = Closure(read_linkage(parse_yaml(GEARED.encode(), 'x.yaml')))
     shapes = draw_shapes(closure, closure.position(0.4), 0.002, {})
@@ -248,7 +248,7 @@ def test_pitch_circles_are_round_and_meet():
 
 
 @pytest.mark.parametrize('ratio', [1.0, 1e3, 1e6, 1e9])
-def test_a_rail_of_any_length_is_drawn_in_few_strokes(ratio):
+def test_rail_of_any_length_has_few_hatch_strokes(ratio):
     closure = Closure(read_linkage(parse_yaml(SLIDER_CRANK.encode(), 'slider_crank.yaml')))
     position = closure.position(0.3)
     drawn = draw_shapes(closure, position, 0.01, {'guide': (0.1, 0.1 + ratio)})

@@ -33,7 +33,7 @@ input: ram
 """
 
 
-def test_the_projection_is_a_rotation_that_keeps_z_upright():
+def test_camera_projection_is_a_rotation_with_z_upright():
     random = np.random.default_rng(1)
     for azimuth, elevation in random.uniform((-7, -1.5), (7, 1.5), (50, 2)):
         places = random.normal(size=(20, 3))
@@ -49,7 +49,7 @@ def test_the_projection_is_a_rotation_that_keeps_z_upright():
 
 
 @pytest.mark.parametrize('name', spatial_linkage_names())
-def test_every_point_has_its_dot_where_it_is_and_joints_are_where_links_meet(name):
+def test_spatial_points_and_joints_are_drawn_in_depth_order(name):
     closure = load(name)
     model = SpaceDrawing(closure)
     inputs = tuple(value + 0.05 for value in closure.linkage.pose.inputs)
@@ -84,7 +84,7 @@ def test_every_point_has_its_dot_where_it_is_and_joints_are_where_links_meet(nam
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('name', spatial_linkage_names())
-def test_all_names_are_within_the_picture_and_apart(name):
+def test_spatial_names_do_not_overlap(name):
     closure = load(name)
     figure = drawn(name)
     written = [box(text) for text in figure.axes[0].texts]
@@ -99,7 +99,7 @@ def test_all_names_are_within_the_picture_and_apart(name):
     assert [text for text, b in others if (b.min < low).any() or (b.max > high).any()] == []
 
 
-def test_the_camera_is_chosen_unless_it_is_given():
+def test_camera_is_chosen_unless_given():
     closure = load('delta')
     model = SpaceDrawing(closure)
     places = model.places(closure.position(*closure.linkage.pose.inputs))
@@ -113,7 +113,7 @@ def test_the_camera_is_chosen_unless_it_is_given():
     assert title.endswith(f'from azimuth {degrees(1.0):.4g}°, elevation {degrees(0.5):.4g}°')
 
 
-def test_a_strut_is_a_rod_in_a_tube_of_its_own_length(tmp_path):
+def test_strut_is_drawn_as_rod_in_a_tube(tmp_path):
     (tmp_path / 'lift.yaml').write_text(LIFT)
     lift = load_in_space(tmp_path / 'lift.yaml')
     model = SpaceDrawing(lift)

@@ -114,7 +114,7 @@ TIMELINES = {
 
 @pytest.mark.parametrize('begin', [BEGIN, 0, 1])
 @pytest.mark.parametrize('name', TIMELINES)
-def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, begin):
+def test_bag_samples_drive_the_crank_on_time(tmp_path, name, begin):
     parameters, messages, steps = TIMELINES[name]
     drive = BagDrive(write(tmp_path / 'bag', messages), **parameters).build(one_input())
     if steps[0][0]:
@@ -129,7 +129,7 @@ def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, 
             assert state == CrankState(angles, (rate,), (0.0,), age * MS), f'at {time} ms'
 
 
-def test_it_says_when_the_newest_sample_was_taken_and_for_how_long_it_is_good(tmp_path):
+def test_bag_drive_reports_newest_stamp_and_max_age(tmp_path):
     file = write(tmp_path / 'bag', THREE)
     drive = BagDrive(file, max_age=0.3).build(one_input())
     assert drive.max_age == 300 * MS
@@ -147,7 +147,7 @@ times = st.lists(st.integers(0, 400), min_size=1, max_size=20).map(sorted)
 
 
 @given(times, times, st.booleans())
-def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, carry_forward):
+def test_bag_drive_equals_the_topic_drive(tmp_path_factory, taken, ticks, carry_forward):
     values = [(0.1 * index, 3.0 - index) for index in range(len(taken))]
     folder = tmp_path_factory.mktemp('bag') / 'bag'
     samples = [sample(t, *v) for t, v in zip(taken, values, strict=True)]
@@ -163,7 +163,7 @@ def test_it_is_as_if_the_samples_came_by_topic(tmp_path_factory, taken, ticks, c
         assert drive.state(now) == topic.state(now)
 
 
-def test_by_arrival_samples_are_as_far_apart_as_they_were_recorded(tmp_path):
+def test_arrival_stamps_keep_the_recorded_spacing(tmp_path):
     angles = (0.1, 0.2, 0.4)
     samples = [CRANK.write(0, (7.0, angle), (9.0, 0.0)) for angle in angles]
     file = write(tmp_path / 'bag', crank(*samples))
@@ -173,7 +173,7 @@ def test_by_arrival_samples_are_as_far_apart_as_they_were_recorded(tmp_path):
     assert [drive.state(BEGIN + n * MS).angles[0] for n in range(3)] == [*angles]
 
 
-def test_several_inputs_are_read_from_one_message(tmp_path):
+def test_bag_drive_reads_several_inputs_from_one_message(tmp_path):
     both = JointStateWriter(['right_crank', 'other', 'left_crank'])
     messages = crank(
         both.write(RECORDED, (1.0, 2.0, 3.0), (10.0, 20.0, 30.0)),
@@ -187,7 +187,7 @@ def test_several_inputs_are_read_from_one_message(tmp_path):
     assert states[1:] == [CrankState((6.0, 4.0), (60.0, 40.0), (0.0, 0.0), 0), None]
 
 
-def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
+def test_bag_drive_skips_and_counts_bad_samples(tmp_path):
     bad = [
         (sample(1, nan), Rejection.NOT_FINITE),
         (sample(2, 0.0, inf), Rejection.NOT_FINITE),
@@ -222,7 +222,7 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         ('fast', True, False, False),
     ],
 )
-def test_absent_rates_are_those_that_the_topic_would_have(
+def test_bag_drive_differences_absent_rates(
     tmp_path, pace, carry_forward, needs_rate, differenced, rate
 ):
     samples = [sample(0, 0.5, rate), sample(10, 0.6, rate), sample(20, 0.65, rate)]
@@ -264,7 +264,7 @@ RUN = json.dumps({'scene': 's', 'crank_topic': '/b/crank'}).encode()
         'the account of the run is none',
     ],
 )
-def test_the_topic_that_is_taken(tmp_path, messages, run, topic, angle):
+def test_bag_drive_selects_the_crank_topic(tmp_path, messages, run, topic, angle):
     file = write(tmp_path / 'bag', messages, run=run)
     drive = BagDrive(file, topic=topic).build(one_input())
     assert drive.state(BEGIN).angles == (angle,)
@@ -282,7 +282,7 @@ STRING = {'/text': 'std_msgs/msg/String'}
     ([('/text', b'')], {}, 'holds no crank sample of crank_joint; name another bag'),
     ([], {}, 'holds no crank sample of crank_joint; name another bag'),
 ])  # fmt: skip
-def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
+def test_bag_without_the_crank_is_refused(tmp_path, messages, parameters, said):
     file = write(tmp_path / 'bag', messages, STRING)
     with pytest.raises(BagError) as caught:
         BagDrive(file, **parameters).build(one_input())
@@ -291,7 +291,7 @@ def test_a_bag_without_the_crank_says_so(tmp_path, messages, parameters, said):
     assert '\n' not in str(caught.value)
 
 
-def test_what_is_no_bag_says_so(tmp_path):
+def test_file_that_is_not_a_bag_is_refused(tmp_path):
     file = tmp_path / 'crank.csv'
     file.write_text('time, angle\n')
     for path, said in ((file, 'not an MCAP file'), (tmp_path / 'none', 'does not exist')):
@@ -299,7 +299,7 @@ def test_what_is_no_bag_says_so(tmp_path):
             BagDrive(str(path)).build(one_input())
 
 
-def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path):
+def test_truncated_bag_is_read_only_with_allow_truncated(tmp_path):
     samples = [sample(time, time * 0.001) for time in range(20_000)]
     folder = tmp_path / 'bag'
     write(folder, crank(*samples))
@@ -313,7 +313,7 @@ def test_the_part_of_a_killed_recording_is_taken_where_it_is_asked_for(tmp_path)
     assert 5000 < len(drive.samples) < 20_000
 
 
-def test_one_instant_cannot_repeat(tmp_path):
+def test_bag_of_one_instant_cannot_repeat(tmp_path):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5), sample(0, 0.6)))
     with pytest.raises(DefinitionError, match='have the same time; leave repeat out') as caught:
         BagDrive(file, repeat=True).build(one_input())
@@ -322,7 +322,7 @@ def test_one_instant_cannot_repeat(tmp_path):
     assert [fast.state(0).angles for _ in range(3)] == [(0.5,), (0.6,), (0.5,)]
 
 
-def test_in_a_scene_the_bag_lies_relative_to_it(tmp_path):
+def test_scene_resolves_the_bag_path_relative_to_itself(tmp_path):
     write(tmp_path / 'runs' / 'bag', THREE)
     (tmp_path / 'scene.yaml').write_text(
         'linkage: l.yaml\neffects: {velocity: {}}\ndrive: {bag: {file: runs/bag}}\n'
@@ -357,7 +357,7 @@ ORDERS = {
 
 @pytest.mark.parametrize('layout', LAYOUTS)
 @pytest.mark.parametrize('order', ORDERS)
-def test_the_order_is_that_of_log_times_whatever_that_of_the_file(tmp_path, order, layout):
+def test_bag_samples_are_sorted_by_log_time(tmp_path, order, layout):
     file = tmp_path / 'x.mcap'
     with file.open('wb') as stream:
         writer = Writer(stream, **LAYOUTS[layout])

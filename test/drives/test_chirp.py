@@ -95,7 +95,7 @@ def check(parameters, time):
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('part', [0.0, 1e-9, 0.123456789, 0.5, 0.987654321])
 @pytest.mark.parametrize('name', ALL)
-def test_position_rate_and_acceleration(name, part):
+def test_chirp_position_rate_and_acceleration_equal_the_definition(name, part):
     parameters = ALL[name]
     check(parameters, int(part * parameters.seconds * SECOND))
 
@@ -103,13 +103,13 @@ def test_position_rate_and_acceleration(name, part):
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('part', [1.25, 1.75, 2.3, 3.9, 7.1])
 @pytest.mark.parametrize('name', ['up', 'down', 'up, logarithmic', 'down, logarithmic'])
-def test_repeated_it_sweeps_back_and_there_again(name, part):
+def test_repeated_chirp_sweeps_back_and_forth(name, part):
     parameters = repeated(ALL[name])
     check(parameters, int(part * parameters.seconds * SECOND))
 
 
 @pytest.mark.parametrize('name', ALL)
-def test_at_the_end_it_rests_where_it_is(name):
+def test_chirp_rests_at_its_end(name):
     chirp = ALL[name].motion_curve()
     end = round(ALL[name].seconds * SECOND)
     before, rate, _ = chirp(end - 1)
@@ -121,7 +121,7 @@ def test_at_the_end_it_rests_where_it_is(name):
 
 @pytest.mark.parametrize('turn', [1, 2, 3, 10, 1001])
 @pytest.mark.parametrize('name', ALL)
-def test_where_it_turns_neither_position_nor_rate_jumps(name, turn):
+def test_chirp_reversal_keeps_position_and_rate_continuous(name, turn):
     parameters = repeated(ALL[name])
     chirp = parameters.motion_curve()
     end = turn * round(parameters.seconds * SECOND)
@@ -135,7 +135,7 @@ def test_where_it_turns_neither_position_nor_rate_jumps(name, turn):
 
 
 @pytest.mark.parametrize('name', ['up', 'up, logarithmic', 'down, logarithmic'])
-def test_it_sweeps_from_the_first_frequency_to_the_last(name):
+def test_chirp_sweeps_from_first_to_last_frequency(name):
     """Of a sine of frequency f, (θ − θ₀)² + (θ′/2πf)² is A²."""
     parameters = repeated(ALL[name])
     end = round(parameters.seconds * SECOND)
@@ -145,7 +145,7 @@ def test_it_sweeps_from_the_first_frequency_to_the_last(name):
         assert swing == pytest.approx(parameters.amplitude, rel=1e-12)
 
 
-def test_the_first_tick_is_time_zero_and_at_the_end_it_rests():
+def test_chirp_drive_starts_at_its_first_tick():
     drive = ChirpDrive(0.5, 2.0, 2.0, seconds=1.0, mean=0.1).build(one_input())
     assert (drive.stamp, drive.max_age) == (0, 0)
     begin = 1_700_000_000_000_000_000

@@ -31,13 +31,13 @@ def exact(start, rate, time):
 
 @given(st.floats(-1e3, 1e3), st.floats(-1e4, 1e4), st.integers(0, 1000 * DAY))
 @example(0.1, 0.3, 3 * SECOND)  # with the product rounded too: 0.9999999999999999
-def test_after_any_time_the_angle_is_rounded_once(start, rate, time):
+def test_constant_rate_angle_is_rounded_once(start, rate, time):
     angle, same_rate, acceleration = ConstantRate(rate, start).motion_curve()(time)
     assert abs(angle - exact(start, rate, time)) <= 0.500001 * mp.mpf(ulp(angle))
     assert (same_rate, acceleration) == (rate, 0.0)
 
 
-def test_the_first_tick_is_time_zero():
+def test_constant_rate_starts_at_the_first_tick():
     drive = ConstantRateDrive(rate=4.0, start=1.0).build(one_input())
     assert (drive.stamp, drive.max_age) == (0, 0)
     assert drive.state(BEGIN) == CrankState((1.0,), (4.0,), (0.0,), 0)
@@ -45,12 +45,12 @@ def test_the_first_tick_is_time_zero():
     assert drive.state(BEGIN + SECOND // 4) == CrankState((2.0,), (4.0,), (0.0,), 0), 'once more'
 
 
-def test_a_first_tick_at_zero_is_time_zero_too():
+def test_constant_rate_accepts_a_first_tick_at_zero():
     drive = ConstantRateDrive(rate=4.0).build(one_input())
     assert [drive.state(time).angles for time in (0, SECOND)] == [(0.0,), (4.0,)]
 
 
-def test_several_inputs_turn_alike_or_as_they_are_told():
+def test_constant_rate_drives_inputs_alike_or_individually():
     alike = ConstantRateDrive(rate=4.0, start=1.0).build(two_inputs())
     alike.state(BEGIN)
     assert alike.state(BEGIN + SECOND) == CrankState((5.0, 5.0), (4.0, 4.0), (0.0, 0.0), 0)
@@ -65,7 +65,7 @@ def test_several_inputs_turn_alike_or_as_they_are_told():
     [(one_input(), ('crank_joint',)), (two_inputs(), ('left_crank', 'right_crank'))],
     ids=['one input', 'two inputs'],
 )
-def test_a_rate_that_no_input_follows_is_refused(context, inputs):
+def test_unused_common_rate_is_refused(context, inputs):
     own = {name: ConstantRate(1.0) for name in inputs}
     with pytest.raises(DefinitionError, match=r'names every input') as caught:
         ConstantRateDrive(rate=4.0, inputs=own).build(context)
@@ -73,7 +73,7 @@ def test_a_rate_that_no_input_follows_is_refused(context, inputs):
     assert '\n' not in str(caught.value)
 
 
-def test_in_a_scene_the_input_is_published_as_it_is_driven():
+def test_scene_publishes_the_constant_rate_input():
     built = pipeline('constant_rate: {rate: 2.5, start: 0.5}')
     times = (BEGIN, BEGIN + SECOND // 2, BEGIN + SECOND // 2 + 40_000_000)
     assert readings(built, *times) == [(0.5, 2.5), (1.75, 2.5), (1.85, 2.5)]

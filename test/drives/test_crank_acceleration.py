@@ -38,7 +38,7 @@ def acceleration(drive, time):
 
 
 @given(st.lists(st.integers(1, 150), min_size=2, max_size=8), st.integers(0, 190))
-def test_a_crank_at_constant_acceleration_is_where_it_is_at_any_time(gaps, after):
+def test_differenced_acceleration_extrapolates_a_uniformly_accelerated_crank(gaps, after):
     # q = 0.3 + 2·t − 3·t²/2, at irregular samples, and between two of them.
     drive = SampledCrank(DIFFERENCED, needs_rate=False)
     time = 0
@@ -54,7 +54,7 @@ def test_a_crank_at_constant_acceleration_is_where_it_is_at_any_time(gaps, after
     assert state.accelerations[0] == pytest.approx(-3.0, abs=1e-9)
 
 
-def test_a_difference_lags_by_half_an_interval():
+def test_differenced_acceleration_lags_by_half_an_interval():
     # Of ω = sin(20·t), sampled each 5 ms: the mean of the acceleration over the last interval.
     drive = fed(DIFFERENCED, [(5 * n, sin(0.1 * n)) for n in range(1, 40)])
     middle = 20.0 * cos(0.1 * 38.5)
@@ -63,7 +63,7 @@ def test_a_difference_lags_by_half_an_interval():
     assert acceleration(drive, 5 * 39) == pytest.approx(middle, rel=0.1**2 / 20.0)
 
 
-def test_the_low_pass_answers_a_step_by_an_exponential():
+def test_acceleration_low_pass_answers_a_step_exponentially():
     # From 1 s on the crank accelerates by 4 rad/s²; samples come at irregular times.
     filtered = TopicDrive(acceleration='differenced', cutoff=7.0)
     times = [800, 900, 1000, 1007, 1019, 1020, 1051, 1113]
@@ -88,12 +88,12 @@ HISTORIES = {
 
 
 @pytest.mark.parametrize('name', HISTORIES)
-def test_what_samples_say_of_the_acceleration(name):
+def test_sample_histories_give_the_expected_acceleration(name):
     samples, expected = HISTORIES[name]
     assert acceleration(fed(DIFFERENCED, samples), samples[-1][0]) == pytest.approx(expected)
 
 
-def test_an_older_stamp_changes_nothing():
+def test_older_stamp_leaves_the_acceleration_unchanged():
     drive = fed(DIFFERENCED, [(1000, 5.0), (1010, 5.2)])
     older = CrankSample(1005 * MS, (0.0,), (50.0,))
     assert drive.offer(older, 1010 * MS) is Rejection.STAMP_OLD
@@ -110,7 +110,7 @@ loads: {gravity: [0, -9.81]}
 
 
 @pytest.mark.parametrize(('drive', 'counts'), [('acceleration: differenced', 1.0), ('', 0.0)])
-def test_the_effort_behind_a_topic_has_the_inertia_of_a_crank_that_accelerates(drive, counts):
+def test_topic_drive_effort_includes_the_differenced_acceleration(drive, counts):
     # A pendulum of 0.23 kg·m² about its pivot, 2 kg at 0.3 m; the crank at q = 1.5·t².
     pipeline = pipeline_of(SCENE.replace('DRIVE', drive), PENDULUM)
     for n in range(1, 8):
@@ -127,7 +127,7 @@ def test_the_effort_behind_a_topic_has_the_inertia_of_a_crank_that_accelerates(d
     assert state.effort[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_low_pass_of_nothing_is_refused():
+def test_cutoff_without_differenced_acceleration_is_refused():
     with pytest.raises(
         FileError, match='cutoff: has nothing to filter; add acceleration: differenced'
     ):

@@ -83,7 +83,7 @@ DRIVES = {
 
 
 @pytest.mark.parametrize('name', DRIVES)
-def test_what_is_refused_when_the_scene_is_built(name):
+def test_drives_beyond_joint_limits_are_refused(name):
     drive, limits, expected = DRIVES[name]
     if not expected:
         built = pipeline(drive, four_bar(limits))
@@ -103,7 +103,7 @@ def test_what_is_refused_when_the_scene_is_built(name):
     interpolation=st.sampled_from(['linear', 'cubic', 'minimum_jerk']),
     repeat=st.booleans(),
 )
-def test_between_which_values_a_table_stays(values, interpolation, repeat):
+def test_profile_value_range_bounds_the_curve(values, interpolation, repeat):
     table = tuple((float(2 * i), value) for i, value in enumerate(values))
     parameters = ProfileDrive(table, interpolation, repeat)
     low, high = parameters.value_range()
@@ -117,7 +117,7 @@ def test_between_which_values_a_table_stays(values, interpolation, repeat):
     assert max(seen) <= high + 1e-12
 
 
-def test_one_input_of_several_is_named():
+def test_drive_limit_error_names_the_input():
     linkage = symmetric_five_bar(', limits: [1, 2]')
     drive = 'sine: {amplitude: 0.2, mean: 1.5, frequency: 1, inputs: {left_joint: SAID}}'
     fine = '{amplitude: 0.5, mean: 1.5, frequency: 1}'
@@ -141,13 +141,13 @@ def pushed(limits, effort, rocker='', seconds=3.0, start=1.0, **more):
 
 
 @pytest.mark.parametrize(('effort', 'stop'), [(0.5, 1.5), (-0.5, 0.5)])
-def test_a_limit_is_a_stop_itself(effort, stop):
+def test_torque_drive_stops_at_the_input_limit(effort, stop):
     """Toggles have a margin, since nothing can be pushed there; limits need none."""
     _, value = pushed(', limits: [0.5, 1.5]', effort, stop_margin=0.1)
     assert value == stop
 
 
-def test_a_toggle_beside_a_limit_keeps_its_margin():
+def test_toggle_keeps_its_stop_margin_beside_a_limit():
     line, low = pushed(', limits: [0.5, 3]', -0.5, stop_margin=0.1)
     (one,) = line.closure.input_ranges
     _, high = pushed(', limits: [0.5, 3]', 0.5, stop_margin=0.1)
@@ -155,7 +155,7 @@ def test_a_toggle_beside_a_limit_keeps_its_margin():
     assert high == pytest.approx(one.highest - 0.1 * (one.highest - one.lowest), abs=1e-9)
 
 
-def test_a_limit_of_a_published_joint_stops_it_too():
+def test_published_joint_limit_stops_the_torque_drive():
     free, _ = pushed('', 0.0)
     low, high = sorted(free.closure.position(value).joints[-1] for value in (1.2, 1.4))
     line, value = pushed('', 0.5, f', limits: [{low!r}, {high!r}]', start=1.3)
@@ -163,7 +163,7 @@ def test_a_limit_of_a_published_joint_stops_it_too():
     assert line.closure.position(value).status is Status.CLOSED
 
 
-def test_an_effort_beyond_the_limit_is_cut_to_it_and_counted():
+def test_effort_beyond_its_limit_is_clipped_and_counted():
     least, most = pushed(', effort: 0.01', 0.01, seconds=0.05), pushed('', 0.01, seconds=0.05)
     cut = pushed(', effort: 0.01', 5.0, seconds=0.05)
     assert cut[1] == least[1] == most[1]

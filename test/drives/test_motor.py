@@ -108,7 +108,7 @@ RUN_UPS = {
 
 
 @pytest.mark.parametrize('name', RUN_UPS)
-def test_a_wheel_runs_up_in_closed_form(name):
+def test_motor_runs_up_a_wheel_in_closed_form(name):
     motor, command, rate, known = RUN_UPS[name]
     for t, *state, _ in under(drive(motor, rate=rate), command):
         assert state == pytest.approx(known(t), rel=1e-9, abs=1e-9)
@@ -123,21 +123,21 @@ def test_a_wheel_runs_up_in_closed_form(name):
         ({'command': 'effort', **LOSSES}, 1.6, lambda rate: 1.6 / (RATIO * 0.8)),
     ],
 )
-def test_the_motor_has_its_torque_before_the_gear(motor, command, known):
+def test_motor_torque_is_reported_before_the_gear(motor, command, known):
     built = drive(motor)
     for _, _, rate, _ in under(built, command, 200):
         *_, torque = built.motor
         assert torque == pytest.approx(known(rate), rel=1e-12)
 
 
-def test_stall_and_no_load():
+def test_motor_has_the_stall_torque_and_no_load_speed():
     first, *_, last = under(drive({}, step=0.01), 12.0, 20_000, 1000)
     assert first[3] * INERTIA == pytest.approx(RATIO * CONSTANT * 12.0 / RESISTANCE, rel=1e-9)
     assert last[2] == pytest.approx(12.0 / (CONSTANT * RATIO), rel=1e-12)
     assert last[3] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_faster_wheel_drives_the_motor_which_feeds_the_supply():
+def test_overdriven_motor_brakes_the_wheel():
     (_, _, rate, acceleration), *_ = under(
         drive({'command': 'current', 'voltage': 12.0}, rate=20.0), 0.0
     )
@@ -145,7 +145,7 @@ def test_a_faster_wheel_drives_the_motor_which_feeds_the_supply():
     assert acceleration * INERTIA == pytest.approx(CONSTANT * RATIO * current, rel=1e-9)
 
 
-def test_without_a_command_the_motor_is_switched_off():
+def test_motor_without_a_command_exerts_no_torque():
     built = drive({}, rate=5.0, timeout=0.1)
     *_, (_, _, rate, acceleration) = under(built, 0.0, 300)
     assert rate == pytest.approx(run_up(0.1, 0.0, 5.0)[1], rel=1e-9)
@@ -159,7 +159,7 @@ def with_effort_limit(most):
 
 
 @pytest.mark.parametrize(('command', 'value'), [('effort', 5.0), ('current', 9.0)])
-def test_the_effort_limit_of_the_input_is_kept_behind_the_gear(command, value):
+def test_input_effort_limit_applies_behind_the_gear(command, value):
     built = drive({'command': command, **LOSSES}, with_effort_limit(2.0))
     _, (_, _, _, acceleration), *_ = under(built, value)
     assert acceleration * INERTIA == pytest.approx(2.0, rel=1e-9)
@@ -170,7 +170,7 @@ def test_the_effort_limit_of_the_input_is_kept_behind_the_gear(command, value):
     ('current', 'rate', 'share'),
     [(3.0, 0.0, 0.8), (3.0, 2.0, 0.8), (-3.0, 20.0, 1 / 0.5), (3.0, -20.0, 1 / 0.5)],
 )
-def test_the_gear_takes_its_share_of_the_power(current, rate, share):
+def test_gear_efficiency_reduces_the_transmitted_power(current, rate, share):
     motor = {'command': 'current', **LOSSES}
     *_, (_, value, after, _) = under(drive(motor, rate=rate), current, 500)
     gained = 0.5 * INERTIA * (after**2 - rate**2)
@@ -182,7 +182,7 @@ HELD = {-0.7: 0.2, -0.79: 0.02, -0.81: 0.0, -1.0: 0.0, -1.99: 0.0, -2.01: -0.02,
 
 
 @pytest.mark.parametrize('load', HELD)
-def test_a_gear_with_losses_holds_at_rest(load):
+def test_lossy_gear_holds_a_load_at_rest(load):
     loads = Loads(
         drive_inertia=INERTIA, applied=AppliedLoads(efforts={'crank_joint': JointLoad(load)})
     )
@@ -193,7 +193,7 @@ def test_a_gear_with_losses_holds_at_rest(load):
     assert rate == pytest.approx(0.1 * HELD[load], rel=1e-9, abs=1e-12)
 
 
-def test_against_a_load_it_stops_and_is_held():
+def test_lossy_gear_stops_and_holds_against_a_load():
     loads = Loads(
         drive_inertia=INERTIA, applied=AppliedLoads(efforts={'crank_joint': JointLoad(-1.5)})
     )
@@ -240,7 +240,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_commands_act_as_the_timeline_says(name):
+def test_motor_commands_follow_delay_and_timeout(name):
     motor, timeout, timeline = TIMELINES[name]
     built = drive({'command': 'current', **motor}, timeout=timeout * 1e-3)
     built.state(BEGIN)
@@ -253,7 +253,7 @@ def test_commands_act_as_the_timeline_says(name):
             assert found == pytest.approx(acceleration, rel=1e-9, abs=1e-12), at
 
 
-def test_a_delay_is_counted_in_nanoseconds():
+def test_motor_delay_is_exact_to_the_nanosecond():
     built = drive({'command': 'current', 'delay': 0.000_700_001}, timeout=0.1)
     built.state(BEGIN)
     built.offer(EffortCommand(0, 1.0), BEGIN)
@@ -328,7 +328,7 @@ def four_bar_by_drive(method, step):
     return value, rate
 
 
-def test_a_four_bar_moves_as_by_scipy_and_the_methods_keep_their_order():
+def test_motor_driven_four_bar_follows_scipy():
     *known, count = four_bar_by_scipy()
     assert count == 6, 'the current is limited no longer, then the power turns four times'
     assert four_bar_by_drive('gauss_legendre', 1e-3) == pytest.approx(known, rel=1e-8)
@@ -361,7 +361,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize('name', WRONG)
-def test_what_is_wrong_has_its_line(name):
+def test_invalid_motor_is_refused_in_one_line(name):
     motor, line = WRONG[name]
     with pytest.raises(FileError, match=line) as raised:
         scene(f'{{motor: {{{motor}}}}}')
@@ -369,7 +369,7 @@ def test_what_is_wrong_has_its_line(name):
 
 
 @pytest.mark.parametrize(('method', 'carried'), [('rk4', 2.5), ('gauss_legendre', 1.5)])
-def test_the_longest_step_is_a_multiple_of_the_time_constant(method, carried):
+def test_longest_step_is_a_multiple_of_the_time_constant(method, carried):
     fast = {'resistance': RESISTANCE / 10, 'back_efficiency': 0.5}
     longest = carried * TIME_CONSTANT / 10 * 0.5
     drive(fast, method=method, step=0.999 * longest)
@@ -391,7 +391,7 @@ def positive(least, most):
     ),
     rate=st.floats(-1e4, 1e4),
 )  # fmt: skip
-def test_its_segments_follow_the_equation(command, value, parameters, rate):
+def test_motor_law_segments_equal_the_motor_equation(command, value, parameters, rate):
     k, resistance, ratio, forward, backward, most, supply = parameters
     motor = Motor(k, resistance, ratio, forward, backward, most, supply, command)
     law = motor.effort_law(value)

@@ -86,7 +86,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_a_profile_passes_as_the_timeline_says(name):
+def test_profile_follows_its_timeline(name):
     parameters, steps = TIMELINES[name]
     profile = parameters.motion_curve()
     for time, expected in steps:
@@ -103,14 +103,14 @@ def tables(draw):
 
 
 @given(tables(), st.sampled_from(['linear', 'cubic', 'minimum_jerk']), st.booleans())
-def test_it_passes_through_every_row(table, interpolation, repeat):
+def test_profile_passes_through_every_row(table, interpolation, repeat):
     profile = Profile(table, interpolation, repeat=repeat).motion_curve()
     for time, value in table:
         assert profile(round(time * SECOND))[0] == pytest.approx(value, abs=1e-13)
 
 
 @given(tables(), st.floats(0.0, 1.0))
-def test_a_cubic_is_the_clamped_spline(table, part):
+def test_cubic_profile_equals_the_clamped_spline(table, part):
     times, values = np.array(table).T
     spline = CubicSpline(times, values, bc_type='clamped')
     time = round((times[0] + part * (times[-1] - times[0])) * SECOND) - 1
@@ -118,7 +118,7 @@ def test_a_cubic_is_the_clamped_spline(table, part):
 
 
 @given(tables(), st.floats(0.0, 1.0), st.integers(0, 5))
-def test_a_cubic_that_repeats_is_the_periodic_spline(table, part, rounds):
+def test_repeating_cubic_profile_equals_the_periodic_spline(table, part, rounds):
     times, values = np.array(table).T
     length = times[-1] - times[0]
     trend = (values[-1] - values[0]) / length
@@ -147,7 +147,7 @@ def check_spline(profile, spline, time, trend):
 
 
 @pytest.mark.parametrize('x', ['0.0', '0.001', '0.2', '0.5', '0.7', '0.999', '0.999999999'])
-def test_minimum_jerk_is_that_of_flash_and_hogan(x):
+def test_minimum_jerk_profile_equals_flash_and_hogan(x):
     profile = Profile(((1.0, 0.3), (3.5, -1.4)), 'minimum_jerk').motion_curve()
     with mp.workdps(40):
         h, step = mp.mpf('2.5'), mp.mpf(-1.4) - mp.mpf(0.3)
@@ -162,7 +162,7 @@ def test_minimum_jerk_is_that_of_flash_and_hogan(x):
 
 
 @pytest.mark.parametrize('interpolation', ['cubic', 'minimum_jerk'])
-def test_where_the_rows_meet_nothing_jumps(interpolation):
+def test_profile_is_continuous_across_its_rows(interpolation):
     profile = Profile(ONCE_AROUND, interpolation, repeat=True).motion_curve()
     for row in range(1, 9):
         before, after = profile(row * SECOND - 1), profile(row * SECOND)
@@ -170,7 +170,7 @@ def test_where_the_rows_meet_nothing_jumps(interpolation):
         assert after == pytest.approx(before, abs=3.2e-7)
 
 
-def test_after_a_million_rounds_it_is_as_exact_as_the_angle_allows():
+def test_repeating_profile_stays_exact_after_a_million_rounds():
     profile = Profile(ONCE_AROUND, 'minimum_jerk', repeat=True).motion_curve()
     angle, rate, acceleration = profile(2_000_000 * SECOND + SECOND // 2)
     with mp.workdps(40):
@@ -179,7 +179,7 @@ def test_after_a_million_rounds_it_is_as_exact_as_the_angle_allows():
     assert (rate, acceleration) == (1.875, 0.0)
 
 
-def test_of_several_inputs_each_has_its_own():
+def test_profile_drives_each_input_by_its_own_table():
     own = {'left_crank': Profile(LATE, 'linear')}
     drive = ProfileDrive(THERE_AND_BACK, 'linear', inputs=own).build(two_inputs())
     assert (drive.stamp, drive.max_age) == (0, 0)
@@ -198,7 +198,7 @@ def test_of_several_inputs_each_has_its_own():
         (((0.0, 1.0), (1e-10, 1.0)), 'row 2 is at 1e-10 s, not after row 1 at 0.0 s'),
     ],
 )
-def test_a_table_that_is_none_is_refused(table, reason):
+def test_invalid_profile_table_is_refused(table, reason):
     with pytest.raises(DefinitionError) as caught:
         ProfileDrive(table).build(two_inputs())
     assert str(caught.value).startswith(f'drive.profile.table: {reason}')

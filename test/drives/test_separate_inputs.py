@@ -108,7 +108,7 @@ events = st.tuples(
 
 
 @given(st.lists(events, max_size=30), st.booleans())
-def test_the_state_is_that_of_the_newest_good_sample_of_each_input(offered, carried):
+def test_crank_state_uses_the_newest_sample_per_input(offered, carried):
     """The bookkeeping here is a dictionary; the tick is the compiled one and the interpreted."""
     pipeline = pipeline_of(FIVE_BAR_SCENE if carried else HELD, FIVE_BAR)
     (line,) = pipeline.linkages
@@ -138,7 +138,7 @@ def test_the_state_is_that_of_the_newest_good_sample_of_each_input(offered, carr
     assert state.reading == line.interpret(now).reading
 
 
-def test_of_one_tick_both_messages_are_used_and_only_repeats_are_superseded():
+def test_tick_uses_the_messages_of_both_inputs():
     pipeline = pipeline_of(FIVE_BAR_SCENE, FIVE_BAR)
     for which, stamp in (('left', 0), ('right', 1), ('left', 2)):
         assert pipeline.offer(message(which, stamp, 1.0), BEGIN + 2 * MS) is GOOD
@@ -149,7 +149,7 @@ def test_of_one_tick_both_messages_are_used_and_only_repeats_are_superseded():
 
 
 @pytest.mark.parametrize('pace', ['recorded', 'fast'])
-def test_a_bag_of_two_publishers_drives_the_linkage_again(tmp_path, pace):
+def test_bag_of_two_publishers_drives_a_five_bar(tmp_path, pace):
     topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', '', '')
     writer = BagWriter(tmp_path / 'bag', [topic], {})
     for index in range(20):

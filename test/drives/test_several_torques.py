@@ -59,7 +59,7 @@ def stepped(closure, loads, start, forces):
     return tuple(state.value), tuple(state.rate)
 
 
-def test_each_command_holds_for_its_own_time_and_the_others_go_on():
+def test_torque_commands_time_out_separately():
     crank = five_bar(timeout=0.03)
     crank.state(BEGIN)
     assert crank.offer(EffortsCommand(0, (0.4, None)), BEGIN) is None
@@ -71,7 +71,7 @@ def test_each_command_holds_for_its_own_time_and_the_others_go_on():
     assert (state.angles, state.rates) == expected
 
 
-def test_the_motion_does_not_depend_on_when_it_is_read():
+def test_torque_motion_does_not_depend_on_query_times():
     often, once = five_bar(), five_bar()
     for crank in (often, once):
         crank.state(BEGIN)
@@ -91,7 +91,7 @@ def test_a_command_that_is_no_number_changes_nothing():
     assert crank.state(BEGIN + 20 * MS) == other.state(BEGIN + 20 * MS)
 
 
-def test_motors_follow_their_voltages():
+def test_two_motors_follow_their_voltages():
     # Of a voltage U on the resistance R the torque is k·N·(U − k·N·q̇)/R.
     motor = MotorParameters(0.05, resistance=2.0, ratio=20.0, command='voltage')
     inputs = {name: replace(given, motor=motor) for name, given in START.items()}
@@ -111,7 +111,7 @@ def test_motors_follow_their_voltages():
     assert state.rates == pytest.approx(expected[1], rel=1e-7)
 
 
-def test_commands_come_in_one_message_or_in_one_for_each_motor():
+def test_commands_arrive_jointly_or_per_motor():
     reader = JointEffortsReader(['a', 'b', 'c'], {'d'})
     assert reader.read(serialized(['c', 'a'], efforts=[1.0, 2.0])).efforts == (2.0, None, 1.0)
     assert reader.read(serialized(['b'], efforts=[3.0])).efforts == (None, 3.0, None)
@@ -143,9 +143,7 @@ effects: {velocity: {}, effort: {}}
     ],
     ids=['ankle', 'five_bar'],
 )
-def test_a_scene_publishes_what_is_commanded_and_ticks_compiled_as_interpreted(
-    linkage, inputs, gravity
-):
+def test_scene_publishes_the_commanded_efforts_of_two_motors(linkage, inputs, gravity):
     pipelines = [pipeline_of(PUSHED % (inputs, gravity), linkage) for _ in range(2)]
     names = [*pipelines[0].linkages[0].scene_linkage.input_names]
     messages = [[], []]
@@ -168,7 +166,7 @@ def test_a_scene_publishes_what_is_commanded_and_ticks_compiled_as_interpreted(
     assert tuple(state.velocity) == last.rates
 
 
-def test_commands_of_one_motor_each_are_counted_for_their_motor():
+def test_commands_are_counted_for_their_motor():
     # Two controllers, a message of each between two ticks: none takes the place of the other.
     pipeline = pipeline_of(PUSHED % ('{m1: {start: 0.05}}', '[0, 0, -9.81]'), ANKLE)
     pipeline.tick(BEGIN)
@@ -185,7 +183,7 @@ def test_commands_of_one_motor_each_are_counted_for_their_motor():
     assert pipeline.silent_inputs(BEGIN + 120 * MS) == {'m1': BEGIN + MS}
 
 
-def test_an_input_at_its_stop_shows_its_command():
+def test_input_at_its_stop_publishes_the_commanded_effort():
     pipeline = pipeline_of(PUSHED % ('{m1: {start: 0.55}}', '[0, 0, 0]'), ANKLE)
     for time in range(400):
         now = BEGIN + time * MS
@@ -232,7 +230,7 @@ effects: {velocity: {}, effort: {}}
 """
 
 
-def test_brakes_hold_the_inputs_that_have_no_command():
+def test_brakes_hold_inputs_without_a_command():
     pipeline = pipeline_of(BRAKED, ANKLE)
     pipeline.tick(BEGIN)
     state = read_joint_state(pipeline.tick(BEGIN + 100 * MS).message)
@@ -262,7 +260,7 @@ def test_the_run_ends_where_motors_meet_their_inputs_too_often_and_the_scene_say
         pushed('end')
 
 
-def test_a_hard_stop_of_a_dependent_joint_holds_and_a_stiff_load_is_refused():
+def test_dependent_joint_limit_stops_the_torque_drive():
     closure = weighed('ankle_motors')
     hinges = dict(closure.linkage.hinges)
     hinges['pitch'] = replace(hinges['pitch'], limits=Limits(-0.5, 0.5))

@@ -49,21 +49,21 @@ def check(parameters, time):
     st.floats(-6.0, 6.0),
     st.sampled_from((0, 1, SECOND)) | st.integers(0, 3000 * DAY),
 )
-def test_position_rate_and_acceleration_however_late_it_is(
+def test_sine_position_rate_and_acceleration_equal_the_definition(
     amplitude, frequency, mean, phase, time
 ):
     check(Sine(amplitude, frequency, mean, phase), time)
 
 
 @pytest.mark.parametrize('periods', [1, 10**6, 10**12 + 1])
-def test_whole_periods_repeat_to_the_last_bit(periods):
+def test_sine_repeats_whole_periods_bit_for_bit(periods):
     # A period is 8 ms.
     sine = Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3).motion_curve()
     for time in range(0, 8_000_000, 999_983):
         assert sine(time + periods * 8_000_000) == sine(time)
 
 
-def test_of_several_inputs_each_has_its_own():
+def test_sine_drives_each_input_by_its_own_parameters():
     own = {'left_crank': Sine(amplitude=0.5, frequency=0.25, mean=2.0)}
     drive = SineDrive(amplitude=1.0, frequency=0.25, inputs=own).build(two_inputs())
     assert (drive.stamp, drive.max_age) == (0, 0)

@@ -63,7 +63,7 @@ RANGES = {
 
 @pytest.mark.parametrize('name', RANGES)
 @pytest.mark.parametrize('away', [0.0, 0.05])
-def test_a_spring_on_the_rocker_is_judged_by_its_longest_lever(name, away):
+def test_step_check_uses_the_longest_spring_lever(name, away):
     limits, (low, high) = RANGES[name]
     springs = 'loads: {{joint_springs: {{{}: {{stiffness: 1.0e4}}}}}}'
     start = DEAD_CENTRE + away
@@ -74,7 +74,7 @@ def test_a_spring_on_the_rocker_is_judged_by_its_longest_lever(name, away):
 
 
 @pytest.mark.parametrize('start', [DEAD_CENTRE, 0.0, -2.0])
-def test_a_motor_is_judged_by_the_least_inertia(start):
+def test_step_check_uses_the_least_inertia(start):
     """The rocker turns no inertia at the dead centre, wherever the crank starts."""
     motor = ', motor: {torque_constant: 1.0, command: voltage, resistance: 1.0}'
     alone = fastest(motor, '', start)

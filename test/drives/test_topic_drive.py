@@ -94,7 +94,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_samples_turn_the_crank_as_the_timeline_says(name):
+def test_topic_samples_drive_the_crank_on_time(name):
     parameters, steps = TIMELINES[name]
     drive = SampledCrank(parameters, needs_rate=False)
     for time, offered, expected in steps:
@@ -124,7 +124,7 @@ def test_samples_turn_the_crank_as_the_timeline_says(name):
         (CrankSample(1, (0.0,), (0.0,)), Rejection.STAMP_OLD),
     ],
 )
-def test_a_bad_sample_changes_nothing(bad, reason):
+def test_bad_sample_leaves_the_crank_unchanged(bad, reason):
     drive = SampledCrank(CARRIED, needs_rate=True)
     assert drive.offer(CrankSample(NOW - 10 * MS, (0.5,), (2.0,)), NOW) is GOOD
     before = drive.state(NOW)
@@ -136,7 +136,7 @@ def test_a_bad_sample_changes_nothing(bad, reason):
 
 
 @pytest.mark.parametrize('angle', [1e10, -1e10])
-def test_the_largest_numbers_are_good(angle):
+def test_largest_allowed_numbers_are_accepted(angle):
     drive = SampledCrank(CARRIED, needs_rate=True)
     assert drive.offer(CrankSample(NOW, (angle,), (angle,)), NOW) is GOOD
     assert drive.state(NOW) == CrankState((angle,), (angle,), (0.0,), 0)
@@ -148,7 +148,7 @@ ABSENT = {'no velocities': None, 'a velocity that is NaN': (nan,)}
 
 @pytest.mark.parametrize('rates', ABSENT.values(), ids=ABSENT)
 @pytest.mark.parametrize('needs_rate', [True, False])
-def test_where_nobody_needs_a_rate_an_absent_one_is_0(rates, needs_rate):
+def test_absent_rate_is_zero_without_a_user(rates, needs_rate):
     drive = SampledCrank(CARRIED if needs_rate else HELD, needs_rate=False)
     assert drive.offer(CrankSample(NOW, (0.5,), rates), NOW) is GOOD
     expected = None if needs_rate else CrankState((0.5,), (0.0,), (0.0,), 0)
@@ -174,7 +174,7 @@ ABSENT_RATES = {
 
 @pytest.mark.parametrize('as_nan', [False, True])
 @pytest.mark.parametrize('name', ABSENT_RATES)
-def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(name, as_nan):
+def test_absent_rate_is_differenced_from_the_angles(name, as_nan):
     steps, expected = ABSENT_RATES[name]
     drive = SampledCrank(CARRIED, needs_rate=True)
     for time, angle, rate in steps:
@@ -189,7 +189,7 @@ def test_where_a_rate_is_needed_an_absent_one_is_the_difference_of_the_angles(na
         assert carried == pytest.approx(angle + expected * 0.005, abs=1e-12)
 
 
-def test_of_several_inputs_only_the_absent_rate_is_differenced_and_a_slide_has_no_turns():
+def test_only_absent_rates_of_several_inputs_are_differenced():
     slide = (Input('crank', 'ground', 'crank'), Input('slide', slider='s'), Input('c', 'a', 'b'))
     drive = sample_inputs(CARRIED, True, slide)
     assert drive.offer(CrankSample(NOW, (3.1, 0.0, 1.0), (nan, nan, 9.0)), NOW) is GOOD
@@ -203,7 +203,7 @@ def test_of_several_inputs_only_the_absent_rate_is_differenced_and_a_slide_has_n
 @pytest.mark.parametrize('effects', ['{velocity: {}}', '{}'])
 @pytest.mark.parametrize('velocities', [[], [nan, nan], [9.0, nan]])
 @pytest.mark.parametrize('efforts', [[], [nan, nan]])
-def test_a_scene_takes_the_messages_of_a_broadcaster_without_velocities(
+def test_scene_accepts_broadcaster_messages_without_velocities(
     carry, effects, velocities, efforts
 ):
     scene = pipeline_of(
@@ -233,7 +233,7 @@ samples = st.builds(
 
 
 @given(st.lists(samples, max_size=20))
-def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
+def test_crank_state_equals_the_last_good_sample(offered):
     drive = SampledCrank(HELD, needs_rate=True)
     good = None
     for each in offered:
@@ -247,7 +247,7 @@ def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
         assert state == CrankState(good.angles, good.rates, (0.0,), NOW - good.stamp)
 
 
-def test_of_several_inputs_each_is_carried_by_its_own_rate():
+def test_each_input_is_carried_forward_by_its_own_rate():
     drive = sample_inputs(CARRIED, True, [Input(name, 'ground', name) for name in 'abc'])
     assert drive.offer(CrankSample(NOW, (1.0, -2.0, 0.5), (10.0, 0.0, -3.0)), NOW) is GOOD
     angles, rates, accelerations, age = drive.state(NOW + 100 * MS)
@@ -262,7 +262,7 @@ def test_of_several_inputs_each_is_carried_by_its_own_rate():
     [(nan, Rejection.NOT_FINITE), (-inf, Rejection.NOT_FINITE), (2e10, Rejection.TOO_LARGE)],
 )
 @pytest.mark.parametrize('place', range(4))
-def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place):
+def test_one_bad_input_rejects_the_whole_sample(bad, reason, place):
     if isnan(bad) and place > 1:
         bad = inf  # a rate that is NaN is absent
     drive = sample_inputs(CARRIED, True, [Input(name, 'ground', name) for name in 'ab'])
@@ -344,7 +344,7 @@ def pipeline():
 
 
 @pytest.mark.parametrize('version', ['1.0.0', '1.1.0'])
-def test_every_command_of_an_active_controller_is_taken(version):
+def test_commands_of_an_active_controller_are_accepted(version):
     """For 2 s at 500 Hz; the crank moves by it."""
     hardware, linkage = Hardware(SYSTEM, version), pipeline()
     hardware.read(linkage.tick(0).message)
@@ -358,7 +358,7 @@ def test_every_command_of_an_active_controller_is_taken(version):
 
 
 @pytest.mark.parametrize('version', ['1.0.0', '1.1.0'])
-def test_with_the_default_threshold_what_acts_already_is_not_sent(version):
+def test_default_threshold_suppresses_unchanged_commands(version):
     hardware = Hardware(SYSTEM.replace(ALWAYS, ''), version)
     assert hardware.write() is None or version == '1.1.0'
     hardware.states['crank_joint', 'effort'] = hardware.effort = 0.12
@@ -369,7 +369,7 @@ def test_with_the_default_threshold_what_acts_already_is_not_sent(version):
 
 
 @pytest.mark.parametrize('interface', INTERFACES)
-def test_all_that_the_scene_publishes_is_a_state(interface):
+def test_hardware_needs_every_published_state_interface(interface):
     without = SYSTEM.replace(f'<state_interface name="{interface}"/>', '')
     with pytest.raises(AssertionError, match='set_state'):
         Hardware(without, '1.1.0').read(pipeline().tick(0).message)
@@ -379,7 +379,7 @@ def test_all_that_the_scene_publishes_is_a_state(interface):
     ('angles', 'jump'),
     [([0.0, 0.1, 0.3], 0.2), ([3.1, -3.1], 6.2), ([179.0, -179.0, -178.0], 358.0), ([5.0], 0.0)],
 )
-def test_the_greatest_jump_between_samples_is_kept(angles, jump):
+def test_topic_drive_keeps_the_greatest_angle_jump(angles, jump):
     """A crank in degrees, when it is wrapped, jumps by 360 rad."""
     drive = SampledCrank(CARRIED, needs_rate=True)
     for index, angle in enumerate(angles):

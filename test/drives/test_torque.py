@@ -118,7 +118,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_commands_move_the_wheel_as_the_timeline_says(name):
+def test_torque_commands_move_the_wheel_on_time(name):
     parameters, steps = TIMELINES[name]
     turned = wheel(**parameters)
     for time, effort, expected in steps:
@@ -130,7 +130,7 @@ def test_commands_move_the_wheel_as_the_timeline_says(name):
             assert age == 0
 
 
-def test_a_command_repeated_is_no_other_command():
+def test_repeated_command_equals_a_lasting_one():
     once = drive(FOUR_BAR, GRAVITY, start=1.0, timeout=10.0)
     again = drive(FOUR_BAR, GRAVITY, start=1.0, timeout=0.01)
     assert once.state(BEGIN) == again.state(BEGIN)
@@ -163,14 +163,14 @@ def test_a_refused_command_changes_nothing(effort, reason):
     assert refused.state(BEGIN + SECOND).rates == pytest.approx((0.2,))
 
 
-def test_it_tells_when_a_command_came_and_how_long_one_holds():
+def test_torque_drive_reports_command_stamp_and_max_age():
     turned = wheel(timeout=0.25)
     assert (turned.stamp, turned.max_age) == (0, 250 * MS)
     turned.offer(EffortCommand(5, 1.0), BEGIN)
     assert turned.stamp == BEGIN, "not the message's, which may be 0"
 
 
-def test_it_tells_what_time_was_lost():
+def test_torque_drive_reports_the_lost_time():
     turned = wheel(rate=1.0)
     for time in (0, 900, 1900, 2901.3, 7901.3):
         turned.state(BEGIN + round(time * MS))
@@ -178,7 +178,7 @@ def test_it_tells_what_time_was_lost():
     assert turned.state(BEGIN + 7902 * MS).angles == pytest.approx((7.902 - 4.003,))
 
 
-def test_slow_ticks_lose_no_time():
+def test_slow_ticks_lose_no_simulated_time():
     context = Context(WHEEL, 0.25, True, 'seed', MOTOR, None)
     turned = TorqueDrive(rate=1.0, step=0.01).build(context)
     for second in range(0, 13, 4):
@@ -186,7 +186,7 @@ def test_slow_ticks_lose_no_time():
     assert turned.lost == 0
 
 
-def test_an_earlier_time_is_answered_by_the_last_state():
+def test_earlier_query_time_returns_the_last_state():
     turned = wheel(rate=1.0)
     turned.state(BEGIN)
     last = turned.state(BEGIN + 10 * MS)
@@ -224,7 +224,7 @@ def driven(when, method='rk4'):
 
 
 @pytest.mark.parametrize('method', ['semi_implicit_euler', 'rk4', 'gauss_legendre'])
-def test_the_motion_does_not_depend_on_when_it_is_looked_at(method):
+def test_torque_motion_does_not_depend_on_query_times(method):
     slow = driven(range(BEGIN, BEGIN + SECOND, 4 * MS), method)
     fast = driven(range(BEGIN, BEGIN + SECOND, 1 * MS), method)
     odd = driven([*range(BEGIN, BEGIN + SECOND, 777_777), *slow], method)
@@ -232,7 +232,7 @@ def test_the_motion_does_not_depend_on_when_it_is_looked_at(method):
     assert len(set(slow.values())) > 100
 
 
-def test_a_cylinder_gives_the_bucket_its_work():
+def test_cylinder_work_equals_the_bucket_energy():
     # Undamped: what force times way has given is in the bucket's weight and speed.
     built = drive(EXCAVATOR, GRAVITY, start=0.9, method='gauss_legendre', timeout=10.0)
     mechanics = Context(EXCAVATOR, 0.0, True, 'seed', GRAVITY, None).mechanics
@@ -253,7 +253,7 @@ def test_a_cylinder_gives_the_bucket_its_work():
 
 
 @pytest.mark.parametrize('direction', [1, -1])
-def test_the_cylinder_is_stopped_before_the_end_of_its_range(direction):
+def test_cylinder_is_stopped_before_its_range_end(direction):
     low, high = EXCAVATOR.input_ranges[0][:2]
     within = 0.01 * (high - low)
     built = drive(EXCAVATOR, GRAVITY, start=0.9, timeout=10.0, stop_margin=0.01)
@@ -273,7 +273,7 @@ efforts = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.sampled_from([1e10, -
     restitution=st.sampled_from([0.0, 0.4, 1.0]),
     rate=st.floats(-100.0, 100.0),
 )
-def test_it_never_leaves_its_range(commanded, method, restitution, rate):
+def test_torque_drive_never_leaves_its_range(commanded, method, restitution, rate):
     low, high = DOUBLE_ROCKER.input_ranges[0][:2]
     built = drive(
         DOUBLE_ROCKER,
@@ -296,7 +296,7 @@ def test_it_never_leaves_its_range(commanded, method, restitution, rate):
 
 
 @pytest.mark.parametrize('turns', [-2, 0, 3])
-def test_a_start_whole_turns_away_is_in_the_same_range(turns):
+def test_start_whole_turns_away_keeps_the_same_range(turns):
     away = turns * 6.283185307179586
     built = drive(DOUBLE_ROCKER, start=0.3 + away, rate=50.0)
     built.state(BEGIN)
@@ -338,7 +338,7 @@ UNBUILT = {
 
 
 @pytest.mark.parametrize(('context', 'parameters', 'line'), UNBUILT.values(), ids=UNBUILT)
-def test_what_cannot_be_built_is_said_in_one_line(context, parameters, line):
+def test_invalid_torque_drive_is_refused_in_one_line(context, parameters, line):
     if isinstance(context, PlanarClosure):
         context = Context(context, 1000.0, True, 'seed', None, None)
     with pytest.raises(DefinitionError) as raised:
@@ -346,7 +346,7 @@ def test_what_cannot_be_built_is_said_in_one_line(context, parameters, line):
     assert str(raised.value).startswith(line)
 
 
-def test_where_nothing_has_inertia_nothing_starts():
+def test_torque_drive_without_inertia_is_refused():
     still = Closure(
         replace(WHEEL.linkage, masses=dict.fromkeys(WHEEL.linkage.masses, Mass(5e-324, (0, 0), 0)))
     )
@@ -359,7 +359,7 @@ def scene(drive_text, effects=''):
     return pipeline_of(text, (FOLDER / 'four_bar.yaml').read_bytes())
 
 
-def test_a_scene_is_driven_by_commands():
+def test_scene_follows_effort_commands():
     pipeline = scene('{start: 0.5, rate: 0}')
     assert pipeline.topic == TorqueDrive.listens_to
     first = pipeline.tick(BEGIN).states[0].reading
@@ -374,14 +374,14 @@ def test_a_scene_is_driven_by_commands():
     assert pipeline.newest_stamp == BEGIN
 
 
-def test_it_reads_the_input_by_the_name_that_messages_have():
+def test_torque_drive_reads_inputs_by_their_prefixed_names():
     context = replace(two_inputs(), prefix='left/')
     read = TorqueDrive().reader(context)
     assert read(serialized(['left/left_crank'], efforts=[2.0])).efforts == (2.0, None)
 
 
 @pytest.mark.parametrize('start', [0.0, pi])
-def test_a_parallelogram_starts_on_its_change_point_and_passes_it(start):
+def test_torque_drive_passes_a_parallelogram_change_point(start):
     # The rod does not turn: I = (0.01 + 1·0.1²) of crank and of follower and 1·0.3² of the rod.
     inertia = 2 * (0.01 + 0.1**2) + 0.3**2
     pushed = drive(defect('par'), start=start - 0.02 * (start > 0))

@@ -54,7 +54,7 @@ def by_multipliers(closure, start, until, effort, loads):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'bennett'])
-def test_it_moves_as_bodies_in_absolute_coordinates_do(name):
+def test_spatial_torque_drive_follows_lagrange_multipliers(name):
     closure = weighed(name)
     joint = closure.joint_names[0]
     spring, load = JointSpring(2.0, 0.1, 0.05), JointLoad(0.2)
@@ -78,7 +78,7 @@ def test_it_moves_as_bodies_in_absolute_coordinates_do(name):
 
 
 @pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
-def test_without_losses_it_keeps_its_energy(method):
+def test_undamped_rssr_keeps_its_energy(method):
     closure = weighed('rssr')
     loads = Loads(GRAVITY, drive_inertia=0.01)
     mechanics, crank = Mechanics(closure, loads), drive(closure, loads, start=0.3, method=method)
@@ -98,7 +98,7 @@ def limited(closure, low, high):
     return SpaceClosure(replace(closure.linkage, hinges=hinges), closure.name)
 
 
-def test_it_bounces_at_a_hard_stop_and_rests_there():
+def test_rssr_bounces_at_a_hard_stop_and_rests():
     closure = limited(weighed('rssr'), -inf, 0.5)
     loads = Loads(GRAVITY, drive_inertia=0.01)
     crank = drive(closure, loads, start=0.3, restitution=0.5, timeout=3600.0)
@@ -110,7 +110,7 @@ def test_it_bounces_at_a_hard_stop_and_rests_there():
     assert (angles[-1], rates[-1]) == (0.5, 0.0)
 
 
-def test_it_is_pushed_back_by_a_stop_that_yields():
+def test_rssr_rests_on_a_soft_stop():
     closure = limited(weighed('rssr'), -inf, 0.5)
     stops = AppliedLoads(stops={'crank_joint': SoftStop(500.0, 5.0)})
     crank = drive(
@@ -126,7 +126,7 @@ def test_it_is_pushed_back_by_a_stop_that_yields():
 
 
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'hooke_joint'])
-def test_friction_in_its_joints_is_that_of_efforts_against_their_rates(name):
+def test_spatial_joint_friction_opposes_the_joint_rates(name):
     """Moments at hinges, a force at a slide: applied in absolute coordinates, by the signs."""
     closure = weighed(name)
     joints = dict.fromkeys((*closure.input_names, *closure.joint_names))
@@ -152,7 +152,7 @@ def test_friction_in_its_joints_is_that_of_efforts_against_their_rates(name):
     assert (*now.angles, *now.rates) == pytest.approx(tuple(expected), rel=1e-6)
 
 
-def test_friction_at_rest_holds_what_it_can():
+def test_coulomb_friction_holds_an_rssr_at_rest():
     closure = weighed('rssr')
     for coulomb, moves in ((5.0, False), (1e-4, True)):
         friction = Friction({'rocker_joint': JointFriction(coulomb=coulomb)})

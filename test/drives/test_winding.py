@@ -49,7 +49,9 @@ def by_exponential(t, voltage, inductance, inertia=INERTIA, rate=0.0):
         ({'command': 'effort', 'voltage': 9.0}, 1e3, 9.0, 0.0),
     ],
 )
-def test_a_wheel_runs_up_as_the_matrix_exponential_says(motor, inductance, command, voltage, rate):
+def test_inductive_motor_runs_up_as_the_matrix_exponential(
+    motor, inductance, command, voltage, rate
+):
     errors = []
     for step in (0.004, 0.002):
         built = drive({'inductance': inductance, **motor}, rate=rate, step=step)
@@ -63,7 +65,7 @@ def test_a_wheel_runs_up_as_the_matrix_exponential_says(motor, inductance, comma
     assert errors[1] < 2e-3 * abs(voltage) / RESISTANCE
 
 
-def test_a_current_rises_at_the_full_voltage_until_it_is_what_was_commanded():
+def test_winding_current_rises_at_full_voltage_to_the_command():
     # The wheel is so heavy that it hardly moves: 4 A of 15 are reached after L/R·ln(15/11).
     lag = LARGE / RESISTANCE
     arrives = lag * log(15.0 / 11.0)
@@ -75,13 +77,13 @@ def test_a_current_rises_at_the_full_voltage_until_it_is_what_was_commanded():
         assert current == pytest.approx(known, rel=1e-6, abs=1e-9)
 
 
-def test_a_limit_holds_the_current():
+def test_current_limit_holds_the_winding_current():
     built = drive({'current': 4.0, 'inductance': LARGE}, loads=Loads(drive_inertia=1e6), step=1e-4)
     *_, (_, _, _, pull) = under(built, 12.0, 100)
     assert pull * 1e6 / (CONSTANT * RATIO) == pytest.approx(4.0, rel=1e-12)
 
 
-def test_behind_play_the_motor_runs_up_alone():
+def test_inductive_motor_behind_play_runs_up_alone():
     built = drive({'inductance': LARGE}, play=PlayParameters(100.0, 0.1), step=1e-4)
     for t, *crank in under(built, 12.0, 100, 20):
         assert crank == [0.0, 0.0, 0.0]
@@ -91,7 +93,7 @@ def test_behind_play_the_motor_runs_up_alone():
         assert found == pytest.approx(known, rel=1e-4, abs=1e-6)
 
 
-def test_without_a_command_there_is_no_current():
+def test_command_timeout_switches_the_current_off():
     built = drive({'inductance': LARGE}, timeout=0.1)
     pulls = {round(t * 1e3): pull for t, _, _, pull in under(built, 12.0, 300)}
     assert pulls[50] > 1.0
@@ -105,6 +107,6 @@ def test_without_a_command_there_is_no_current():
     ({}, {'step': 0.01},
      r'inductance: the current changes within 0\.00125 s, and a step is 0\.01 s'),
 ])  # fmt: skip
-def test_refused(motor, more, told):
+def test_invalid_inductance_is_refused(motor, more, told):
     with pytest.raises(DefinitionError, match=told):
         drive({'inductance': 1e-3, **motor}, loads=Loads(drive_inertia=1e-4), **more)

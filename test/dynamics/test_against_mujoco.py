@@ -141,7 +141,7 @@ ANGLES = (0.3, 1.9, -2.0)
 
 
 @pytest.mark.parametrize('angle', ANGLES)
-def test_effort(case, angle):
+def test_drive_effort_equals_mujoco(case, angle):
     closure, _, _, model, order = case
     _, forces, ratios = engine(closure, model, order, angle)
     effort, _ = ours(closure, angle)
@@ -149,7 +149,7 @@ def test_effort(case, angle):
 
 
 @pytest.mark.parametrize('angle', ANGLES)
-def test_reactions(case, angle):
+def test_pin_reactions_equal_mujoco(case, angle):
     closure, bodies, cuts, model, order = case
     data, forces, _ = engine(closure, model, order, angle)
     jacobian = cut_jacobian(model, data, order, cuts)

@@ -80,14 +80,14 @@ CLOSED_FORMS = {
 
 @pytest.mark.parametrize('method', METHODS)
 @pytest.mark.parametrize('name', CLOSED_FORMS)
-def test_a_load_moves_a_crank_as_its_closed_form_says(name, method):
+def test_loaded_crank_follows_its_closed_form(name, method):
     applied, start, rate, expected = CLOSED_FORMS[name]
     after = swing(applied=applied, start=start, rate=rate, method=method)
     for seconds in (0.05, 0.1234567, 0.3331, 0.7):
         assert after(seconds)[0] == pytest.approx(expected(seconds), abs=2e-11)
 
 
-def test_a_force_in_the_frame_of_the_ground_is_a_weight():
+def test_constant_ground_force_equals_a_weight():
     # The weight 2·9.81 N at 0.3 m has the moment of 11.772 N at 0.5 m.
     pulled = swing(applied={'forces': {'crank.end': PointLoad((0.0, -1.0), constant=11.772)}})
     hung = swing(gravity=(0.0, -9.81))
@@ -95,7 +95,7 @@ def test_a_force_in_the_frame_of_the_ground_is_a_weight():
         assert pulled(seconds) == pytest.approx(hung(seconds), rel=1e-12)
 
 
-def test_a_table_over_the_position_gives_the_energy_of_its_area():
+def test_position_table_adds_the_energy_of_its_area():
     # Steps of 1 ms go across the rows at any place; the order of RK4 holds none the less.
     rows = ((-0.5, 1.0), (0.111, 3.0), (0.7777, -2.0), (1.5, 0.5))
     after = swing(applied={'efforts': {'crank_joint': JointLoad(over_position=rows)}}, rate=0.3)
@@ -121,7 +121,7 @@ def on_rows(rows, x):
 
 @pytest.mark.parametrize('damping', [0.0, 0.2, 3.0])
 @pytest.mark.parametrize('method', METHODS)
-def test_a_stop_that_yields_throws_a_crank_back(method, damping):
+def test_soft_stop_returns_the_crank_as_scipy_integrates(method, damping):
     # scipy integrates flight and contact, with an event at each end of the contact.
     stiffness = 60.0
     after = swing(
@@ -155,7 +155,7 @@ def test_a_stop_that_yields_throws_a_crank_back(method, damping):
     assert damping or rate == pytest.approx(-5.0, rel=1e-9)
 
 
-def test_between_two_stops_without_loss_the_energy_stays():
+def test_undamped_soft_stops_keep_the_energy():
     after = swing(
         LIMITED, rate=5.0, applied={'stops': {'drive_joint': SoftStop(200.0)}}, method='rk4'
     )
@@ -164,7 +164,7 @@ def test_between_two_stops_without_loss_the_energy_stays():
     assert min(rates) < 1.0  # it was in the stops, at both ends
 
 
-def test_a_stop_that_yields_is_not_hard_and_the_others_stay():
+def test_soft_stop_replaces_only_its_own_hard_stop():
     yields = {'stops': {'drive_joint': SoftStop(60.0)}}
     other = LIMITED.replace('child: crank}}', 'child: crank, limits: [-3, 1.1]}}')
     for linkage, applied, ends in (
@@ -176,7 +176,7 @@ def test_a_stop_that_yields_is_not_hard_and_the_others_stay():
         assert max(after(0.001 * n)[0] for n in range(500)) == ends
 
 
-def test_friction_holds_until_the_effort_has_grown():
+def test_friction_holds_until_the_effort_exceeds_it():
     # 0.4 N·m of friction; the effort is 1 N·m/s · t and beats it at 0.4 s, between two ticks.
     after = swing(
         friction=Friction({'O': JointFriction(coulomb=0.4)}),
@@ -193,7 +193,7 @@ def test_friction_holds_until_the_effort_has_grown():
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_the_work_of_a_load_is_force_times_way(name):
+def test_drive_effort_equals_the_virtual_work_of_loads(name):
     closure = closed(name)
     linkage, applied = closure.linkage, everywhere(closed(name))
     bare, loaded = Mechanics(closure), Mechanics(closure, Loads(applied=applied))
@@ -252,14 +252,14 @@ def test_the_work_of_a_load_is_force_times_way(name):
 
 
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
-def test_compiled_terms_equal_plain_ones_to_the_bit(name):
+def test_compiled_load_terms_equal_the_interpreted_ones(name):
     closure = closed(name)
     mechanics = Mechanics(closure, Loads(applied=everywhere(closure)))
     for (q,) in STATES[name]:
         assert mechanics.motion_equation(q) == mechanics.motion_terms(closure.position(q))
 
 
-def test_without_such_loads_nothing_of_them_is_built():
+def test_mechanics_without_loads_builds_no_load_terms():
     assert Mechanics(closed('four_bar')).applied is None
 
 
@@ -282,7 +282,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('load', REFUSED)
-def test_a_load_that_makes_no_sense_is_refused_in_a_line(load):
+def test_invalid_load_is_refused_in_one_line(load):
     with pytest.raises((FileError, DefinitionError)) as refused:
         pipeline_of(f'rate: 100\ndrive: {{torque: {{}}}}\nloads: {{{load}}}\n', PENDULUM)
     assert REFUSED[load] in str(refused.value)
@@ -291,7 +291,7 @@ def test_a_load_that_makes_no_sense_is_refused_in_a_line(load):
 
 @pytest.mark.parametrize('method', ['semi_implicit_euler', *METHODS])
 @pytest.mark.parametrize('spring', [(1e6, 0.0), (1e4, 300.0), (1e3, 2e3)])
-def test_the_step_that_is_said_to_carry_a_spring_does(method, spring):
+def test_recommended_step_keeps_a_stiff_spring_stable(method, spring):
     applied = {'joint_springs': {'crank_joint': JointSpring(spring[0], 0.0, spring[1])}}
     with pytest.raises(DefinitionError, match='too stiff') as refused:
         swing(applied=applied, start=0.1, method=method, step=0.05)
@@ -320,7 +320,7 @@ loads:
 
 
 @pytest.mark.parametrize(('method', 'step'), [('rk4', '1.0e-5'), ('gauss_legendre', '1.0e-4')])
-def test_the_squeezer_ends_where_the_test_set_says(method, step):
+def test_andrews_squeezer_equals_the_published_end_state(method, step):
     text = SQUEEZER.replace('METHOD', method).replace('STEP', step)
     linkage = (LINKAGES / 'andrews_squeezer.yaml').read_bytes()
     (line,) = pipeline_of(text, linkage).linkages

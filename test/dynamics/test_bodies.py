@@ -58,7 +58,7 @@ def planar(masses):
     return read_linkage(parse_yaml(f'{SLIDER}masses: {masses}\n'.encode(), 'linkage.yaml'))
 
 
-def test_a_mass_alone_is_that_of_a_thin_rod():
+def test_mass_without_inertia_becomes_a_thin_rod():
     found = spatial('{rod: {mass: 0.2}, crank: {mass: 0}}').masses
     assert found['crank'] == SpatialMass(0.0)
     one, other = np.array([0.04, 0, 0]), np.array([0.1, 0.02, 0.12])
@@ -103,7 +103,7 @@ def test_a_mass_alone_is_that_of_a_thin_rod():
         ),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused_in_one_line(read, masses, where, reason, remedy):
+def test_impossible_masses_are_refused_in_one_line(read, masses, where, reason, remedy):
     with pytest.raises(LinkageError) as refused:
         read(masses)
     line = str(refused.value)
@@ -113,12 +113,12 @@ def test_what_cannot_be_is_refused_in_one_line(read, masses, where, reason, reme
     assert '\n' not in line
 
 
-def test_rounded_moments_of_a_plate_are_those_of_a_body():
+def test_rounded_plate_inertia_is_accepted():
     # A plate has izz = ixx + iyy, which three digits round upwards.
     assert weighed('{mass: 1, center: [0, 0, 0], inertia: [1.23, 0, 0, 2.34, 0, 3.58]}')
 
 
-def test_links_that_a_file_does_not_name_are_massless():
+def test_unnamed_links_are_massless():
     ball = (
         'balls: {hip: {parent: ground, child: leg, at: [0, 0, 0]}}\ninput: [hip_x, hip_y, hip_z]\n'
     )
@@ -149,7 +149,7 @@ def roll_pitch_yaw(roll, pitch, yaw):
     return about(2, yaw) @ about(1, pitch) @ about(0, roll)
 
 
-def test_a_urdf_says_masses_of_what_is_fixed_to_a_link_too(tmp_path):
+def test_urdf_masses_of_fixed_links_are_added(tmp_path):
     bodies = {
         'base': ('0 0 0', '0 0 0', 5.0, (1, 0, 0, 1, 0, 1)),
         'crank': ('0.1 0.02 0.03', '0.3 -0.2 0.5', 2.0, (0.03, 0.001, 0.002, 0.04, -0.001, 0.05)),

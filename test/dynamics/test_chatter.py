@@ -47,7 +47,7 @@ CASES = {
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_a_step_costs_no_more_than_its_bound(name):
+def test_chattering_step_stays_within_its_evaluation_bound(name):
     force, rate, inertia, restitution, play, step, method = CASES[name]
     equation = Mechanics(Closure(shipped('four_bar')), Loads(drive_inertia=1e-3)).motion_equation
     asked = 0
@@ -70,7 +70,7 @@ def test_a_step_costs_no_more_than_its_bound(name):
 
 
 @pytest.mark.parametrize('force', [0.4, -0.4, 0.0])
-def test_steps_without_trials_keep_the_momentum_and_the_play(force):
+def test_coarse_steps_keep_momentum_and_play(force):
     # Two wheels: whatever the meetings, the momentum is the impulse of the drive.
     wheel = SingleDofMechanism(lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step)
     mechanism = TwoMasses.from_motor(wheel, 0.1, 0.02, 0.7)
@@ -86,7 +86,7 @@ def test_steps_without_trials_keep_the_momentum_and_the_play(force):
     assert motion.coarse > 0
 
 
-def test_a_crank_comes_to_its_stop_without_trials_too():
+def test_coarse_steps_keep_the_crank_within_its_stops():
     wheel = SingleDofMechanism(
         lambda _: Terms(0.23, 0.0, 0.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 1.0)
     )
@@ -128,20 +128,20 @@ def pushed(drive, every, until=1500):
     return state, drive.chatter_count
 
 
-def test_it_does_not_matter_when_it_is_looked_at():
+def test_chattering_motion_does_not_depend_on_query_times():
     seldom, often = pushed(drive_of(), 500), pushed(drive_of(), 1)
     assert seldom == often
     assert seldom[1] > 0
 
 
-def test_the_run_ends_where_the_scene_says_so():
+def test_chatter_ends_the_run_with_an_error():
     drive = drive_of(f'{LIGHT}, on_chatter: end')
     with pytest.raises(LinkageError, match=r'drive\.torque\.play: .* step of 0.001 s') as caught:
         pushed(drive, 10)
     assert '\n' not in str(caught.value)
 
 
-def test_a_late_tick_integrates_little_while_it_chatters():
+def test_late_ticks_skip_time_while_the_play_chatters():
     # A tick comes each 100 ms, where 10 ms are wanted: 20 ms of these are integrated.
     drive = drive_of(f'{LIGHT}, on_chatter: close')
     lost = []
@@ -156,7 +156,7 @@ def test_a_late_tick_integrates_little_while_it_chatters():
     assert skipped[-1] in {79, 80, 81}
 
 
-def test_bounces_that_end_are_no_chatter():
+def test_finite_bounces_do_not_count_as_chatter():
     drive = drive_of(f'{LIGHT}, on_chatter: end')
     for index in range(100):
         if not index % 10:

@@ -30,7 +30,7 @@ from .loaded import closed
 from .test_several_freedoms import FREE, GRAVITY, several
 
 
-def test_forces_of_joints_at_rest_are_complementary_to_their_slips():
+def test_friction_forces_at_rest_equal_a_scipy_solution():
     """The least acceleration in the metric of inertia, by scipy, and the law joint by joint."""
     random = np.random.default_rng(4)
     kinds = {'sticks': 0, 'slides': 0}
@@ -81,7 +81,7 @@ RUBBING = {
 @pytest.mark.parametrize(
     ('start', 'rate', 'push'), [(0.3, 4.0, 0.0), (1.0, 0.0, 0.07), (2.0, 0.0, 0.05)]
 )
-def test_one_input_moves_as_by_its_own_equation(start, rate, push):
+def test_single_input_friction_equals_its_own_equation(start, rate, push):
     """Slips that turn, sticking and breaking away: the other equation is of one input alone."""
     mechanics = Mechanics(closed('four_bar'), Loads((0.0, -0.05)), Friction(RUBBING))
     several = mechanism(mechanics)
@@ -99,7 +99,7 @@ def test_one_input_moves_as_by_its_own_equation(start, rate, push):
     assert rested or rate, 'it sticks'
 
 
-def test_friction_takes_what_the_joints_turn_times_its_moment():
+def test_friction_loss_equals_moment_times_joint_travel():
     closure, start = several('five_bar')
     names = [joint.name for joint in closure.structure.joints]
     moments = {name: 2e-4 * (1 + number) for number, name in enumerate(names)}
@@ -127,7 +127,7 @@ def test_friction_takes_what_the_joints_turn_times_its_moment():
     assert begin - energy(state) == pytest.approx(lost, rel=1e-4)
 
 
-def test_an_input_that_sticks_leaves_the_others_one_equation():
+def test_sticking_input_stays_while_the_others_move():
     closure, start = several('delta')
     names = closure.input_names
     frictions = Friction({names[0]: JointFriction(coulomb=3.0, breakaway=5.0)})
@@ -148,7 +148,7 @@ def test_an_input_that_sticks_leaves_the_others_one_equation():
     assert change == pytest.approx(tuple(np.array(state.terms.mobility) @ pushed), rel=1e-11)
 
 
-def test_steps_of_any_length_turn_slip_and_stick_at_the_same_instants():
+def test_step_length_does_not_change_slip_and_stick_instants():
     closure, start = several('five_bar')
     names = [joint.name for joint in closure.structure.joints]
     frictions = Friction({name: JointFriction(coulomb=2e-3) for name in names})
@@ -162,7 +162,7 @@ def test_steps_of_any_length_turn_slip_and_stick_at_the_same_instants():
     assert ends[0] == pytest.approx(ends[1], abs=1e-6)
 
 
-def test_brakes_hold_each_input_as_far_as_they_go():
+def test_brakes_hold_each_input_up_to_their_torque():
     closure, start = several('ankle')
     mechanics = Mechanics(closure, Loads(GRAVITY))
     moved = mechanism(mechanics)
@@ -181,7 +181,7 @@ def test_brakes_hold_each_input_as_far_as_they_go():
     assert change == pytest.approx(tuple(free + by_brake), rel=1e-9)
 
 
-def test_at_a_toggle_friction_ends_no_step_for_ever():
+def test_five_bar_with_friction_rests_at_a_toggle():
     closure, start = several('five_bar')
     names = [joint.name for joint in closure.structure.joints]
     frictions = Friction({name: JointFriction(coulomb=0.02, breakaway=0.03) for name in names})
@@ -251,7 +251,7 @@ def roll_levers(closure, values):
 
 
 @pytest.mark.parametrize('restitution', [1.0, 0.5, 0.0])
-def test_a_joint_that_is_no_input_meets_its_hard_stop(restitution):
+def test_dependent_joint_bounces_at_its_hard_stop(restitution):
     closure, start, moved = stopped_foot(restitution)
     ways = roll_levers(closure, start)
     state = moved.state_at(start, (-0.5 * ways / (ways @ ways)).tolist())
@@ -275,7 +275,7 @@ def test_a_joint_that_is_no_input_meets_its_hard_stop(restitution):
         assert energies[-1] < 0.99 * energies[0]
 
 
-def test_a_joint_leans_on_its_stop_while_it_is_pushed():
+def test_pushed_dependent_joint_rests_at_its_stop():
     closure, start, moved = stopped_foot(0.0)
     joint = closure.joint_names.index('roll')
     push = (-0.1 * roll_levers(closure, start)).tolist()

@@ -74,7 +74,7 @@ def check_forces(reactions, closure, state, given, wrenches):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_forces_are_the_multipliers_of_the_joints(name):
+def test_spatial_joint_forces_equal_lagrange_multipliers(name):
     closure, spring = spring_of(weighed(name), 3.0)
     reactions = Reactions(Mechanics(closure, Loads(GRAVITY, (spring,))))
     for inputs, slow, changes in states_of(closure, 2, 0.2):
@@ -91,7 +91,7 @@ def test_forces_are_the_multipliers_of_the_joints(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'ankle_motors', 'wishbone', 'hexapod', 'four_bar'])
-def test_loads_on_joints_points_and_links_press_on_joints(name):
+def test_applied_loads_enter_the_spatial_joint_forces(name):
     closure, random = weighed(name), Random(name)
     applied = everywhere(closure)
     mechanics = Mechanics(closure, Loads(GRAVITY, applied=applied))
@@ -107,7 +107,7 @@ def test_loads_on_joints_points_and_links_press_on_joints(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'bennett', 'ankle_motors'])
-def test_forces_are_traced_to_the_last_bit(name):
+def test_compiled_spatial_forces_equal_the_interpreted_ones(name):
     closure = weighed(name)
     reactions = Reactions(Mechanics(closure, Loads(GRAVITY)))
 
@@ -121,7 +121,7 @@ def test_forces_are_traced_to_the_last_bit(name):
         assert [*map(float.hex, fast)] == [*map(float.hex, slow)]
 
 
-def test_a_tilted_disc_presses_on_its_shaft_as_euler_says():
+def test_tilted_disc_moment_equals_eulers_equation():
     """A thin disc at an angle to its shaft (J. P. Den Hartog, Mechanics, 1948, ch. 15)."""
     tilt, mass, radius, rate = radians(12.0), 2.0, 0.1, 60.0
     across, along = 0.25 * mass * radius**2, 0.5 * mass * radius**2
@@ -143,7 +143,7 @@ def test_a_tilted_disc_presses_on_its_shaft_as_euler_says():
         assert found.mz == 0.0
 
 
-def test_a_slider_crank_to_forty_digits():
+def test_spatial_slider_crank_forces_equal_forty_digit_statics():
     """A slider with a mass, on a rod and a crank without: the rod bears a force along itself."""
     mass, gravity = 0.7, (0.3, -1.1, -9.81)
     closure = weighed('spatial_slider_crank')
@@ -215,7 +215,7 @@ RUBBING = {
 
 
 @pytest.mark.parametrize('name', RUBBING)
-def test_friction_by_the_force_in_hinges_and_slides(name):
+def test_load_dependent_friction_equals_a_fixed_point_iteration(name):
     closure = weighed(name)
     mechanics = Mechanics(closure, Loads(GRAVITY), Friction(RUBBING[name]))
     reactions = Reactions(mechanics)
@@ -228,7 +228,7 @@ def test_friction_by_the_force_in_hinges_and_slides(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank'])
-def test_by_torque_the_acceleration_is_that_whose_effort_is_the_command(name):
+def test_torque_command_equals_the_effort_of_its_acceleration(name):
     closure = weighed(name)
     mechanics = Mechanics(closure, Loads(GRAVITY), Friction(RUBBING[name]))
     reactions = Reactions(mechanics)
@@ -242,7 +242,7 @@ def test_by_torque_the_acceleration_is_that_whose_effort_is_the_command(name):
             assert efforts == pytest.approx((force,), abs=1e-8)
 
 
-def test_friction_by_a_force_that_is_not_certain_is_refused():
+def test_friction_by_an_indeterminate_joint_force_is_refused():
     friction = Friction({'h1': JointFriction(coefficient=0.1, radius=0.01)})
     with pytest.raises(DefinitionError) as caught:
         Reactions(Mechanics(weighed('bennett'), Loads(GRAVITY), friction))

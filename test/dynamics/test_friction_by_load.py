@@ -53,7 +53,7 @@ def moved(closure, value, rate=1.0, pull=0.0):
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
-def test_a_crank_alone_rubs_with_the_force_that_its_mass_needs(angle, rate, pull):
+def test_crank_friction_equals_its_pin_force_closed_form(angle, rate, pull):
     friction = Friction({'O': replace(RUBBING, coulomb=0.1)})
     reactions = Reactions(Mechanics(closure_of(PENDULUM), Loads((0.0, -9.81)), friction))
     motion = moved(closure_of(PENDULUM), angle, rate, pull)
@@ -68,7 +68,7 @@ def test_a_crank_alone_rubs_with_the_force_that_its_mass_needs(angle, rate, pull
 @pytest.mark.parametrize('rate', [1.0, -1.0])
 @pytest.mark.parametrize('load', [2.0, -2.0])
 @pytest.mark.parametrize('angle', [0.3, 1.1, 1.9, -2.0])
-def test_a_coupler_pushes_along_a_tangent_of_both_friction_circles(angle, load, rate):
+def test_coupler_force_is_tangent_to_both_friction_circles(angle, load, rate):
     # Links without weight: the coupler carries one force F on one line, at the distance µρ from
     # both of its pins (Norton, ch. 11), and the rocker bears the load.
     linkage = closed('four_bar').linkage
@@ -113,7 +113,7 @@ def rubbing_everywhere(name):
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_each_joint_rubs_by_the_force_that_it_then_has(name):
+def test_load_dependent_friction_equals_constant_friction_of_that_size(name):
     # With each friction written as a constant, the forces, and the work, are the same.
     closure, joints = rubbing_everywhere(name)
     loads = loads_of(closure.linkage)
@@ -148,7 +148,7 @@ def test_each_joint_rubs_by_the_force_that_it_then_has(name):
         )
 
 
-def test_a_linkage_that_jams_has_no_forces():
+def test_jammed_slider_crank_has_no_forces():
     # The piston is pushed out against 100 N by a rod at φ = asin((0.04·sin(0.9) − 0.01)/0.14) =
     # 0.153. It moves while µ·tan(φ) < 1, up to µ = 6.5; and it can always be let in.
     closure = closed('slider_crank')
@@ -170,7 +170,7 @@ loads: {gravity: [0, -9.81]}
 """
 
 
-def test_a_tick_publishes_the_effort_with_it():
+def test_joint_state_effort_includes_load_dependent_friction():
     scene = SCENE.replace('DRIVE', 'constant_rate: {rate: -2, start: 0.4}')
     pipeline = pipeline_of(scene.replace('HOLDS', 'false'), PENDULUM)
     published = read_joint_state(pipeline.tick(1_000_000_000).message)
@@ -179,7 +179,7 @@ def test_a_tick_publishes_the_effort_with_it():
     assert published.effort[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_it_holds_no_load_of_which_the_force_is_not_known():
+def test_holding_friction_by_an_indeterminate_force_is_refused():
     scene = SCENE.replace('DRIVE', 'constant_rate: {rate: 1}').replace('HOLDS', 'true')
     with pytest.raises(FileError, match="holds: at rest the force in 'O' has no certain"):
         pipeline_of(scene, PENDULUM)
@@ -200,7 +200,7 @@ def pendulum(angle, rate, torque, against):
 
 
 @pytest.mark.parametrize(('method', 'exact'), [('rk4', 1e-9), ('gauss_legendre', 1e-11)])
-def test_a_pendulum_swings_down_as_scipy_says(method, exact):
+def test_rubbing_pendulum_follows_scipy(method, exact):
     after = swing(friction=Friction({'O': RUBBING}), gravity=(0.0, -9.81), method=method)
     known = solve_ivp(
         lambda _, y: [y[1], pendulum(y[0], y[1], 0.0, -1.0)], (0.0, 0.4), [0.0, 0.0],
@@ -212,7 +212,7 @@ def test_a_pendulum_swings_down_as_scipy_says(method, exact):
         assert pull == pytest.approx(pendulum(value, rate, 0.0, -1.0), rel=1e-11)
 
 
-def test_a_pendulum_comes_to_rest_within_its_friction_circle():
+def test_rubbing_pendulum_rests_within_its_friction_circle():
     # It stays where its weight stands within µρ of the pin: |cos(q)|·0.3 m ≤ 3 mm.
     friction = Friction({'O': JointFriction(coefficient=0.3, radius=0.01, viscous=0.3)})
     after = swing(friction=friction, gravity=(0.0, -9.81), step=0.005)
@@ -223,7 +223,7 @@ def test_a_pendulum_comes_to_rest_within_its_friction_circle():
 
 
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
-def test_the_acceleration_is_that_whose_effort_is_the_command(name):
+def test_torque_command_equals_the_effort_of_its_acceleration(name):
     closure, joints = rubbing_everywhere(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage), Friction(joints))
     reactions = Reactions(mechanics)
@@ -304,7 +304,7 @@ def test_several_inputs_at_rest_are_held_up_to_the_effort_that_moves_them(name):
         assert np.dot(change, ways[:count]) > 0.0
 
 
-def test_a_linkage_that_jams_stands_under_any_command():
+def test_jammed_slider_crank_stands_under_any_command():
     # As above: the piston, pushed out against 100 N, jams from µ = 6.5 on.
     closure = closed('slider_crank')
     loads = Loads(applied=AppliedLoads(efforts={'piston_slide': JointLoad(-100.0)}))
@@ -319,7 +319,7 @@ def test_a_linkage_that_jams_stands_under_any_command():
         assert (state.angles[0] < 0.89) != stands
 
 
-def test_loads_over_time_press_too():
+def test_time_table_loads_enter_the_friction():
     # A force on the crank's end beside its weight, which grows with the time: at rest the pin
     # carries both, and the drive sticks up to µρ of it.
     linkage = closure_of(PENDULUM).linkage
@@ -333,7 +333,7 @@ def test_loads_over_time_press_too():
             assert resisted == pytest.approx(RADIUS * load, rel=1e-12)
 
 
-def test_wrenches_press_too():
+def test_wrench_loads_enter_the_friction():
     loads = Loads((0.0, -9.81), applied=AppliedLoads(wrenches={'crank': WrenchLoad('', 'end')}))
     mechanics = Mechanics(closure_of(PENDULUM), loads, Friction({'O': RUBBING}))
     held, reactions = mechanics.applied.wrenches['crank'], Reactions(mechanics)

@@ -41,7 +41,7 @@ def resisting(rate):
 
 
 @given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
-def test_the_effort_of_a_drive_follows_the_curve(rate, pull):
+def test_drive_effort_follows_the_friction_curve(rate, pull):
     mechanics = Mechanics(closure_of(PENDULUM), friction=Friction({'O': CURVE}))
     position = mechanics.closure.position(0.3)
     velocity = mechanics.closure.velocity(position, rate)
@@ -51,7 +51,7 @@ def test_the_effort_of_a_drive_follows_the_curve(rate, pull):
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_a_crank_slows_down_to_rest_as_scipy_says(method):
+def test_crank_with_friction_curve_stops_as_scipy_integrates(method):
     after = swing(friction=Friction({'O': CURVE}), rate=4.0, method=method)
     rest = lambda _, state: state[1]  # noqa: E731
     rest.terminal = True
@@ -67,7 +67,7 @@ def test_a_crank_slows_down_to_rest_as_scipy_says(method):
 
 @pytest.mark.parametrize('method', METHODS)
 @pytest.mark.parametrize('stribeck', [0.0, 2.0])
-def test_a_rising_effort_breaks_it_loose(method, stribeck):
+def test_rising_effort_overcomes_the_breakaway_friction(method, stribeck):
     # The effort t [N·m] beats the breakaway friction at 0.6 s.
     joint = JointFriction(0.0, 0.4, 0.6, stribeck)
     after = swing(friction=Friction({'O': joint}), applied=RISING, method=method, step=0.007)
@@ -87,7 +87,7 @@ def test_a_rising_effort_breaks_it_loose(method, stribeck):
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.4, 1.2, 1.5, 2.8])
-def test_at_rest_friction_carries_what_it_can(angle):
+def test_holding_friction_reduces_the_effort_at_rest(angle):
     weight = 2.0 * 9.81 * 0.3 * cos(angle)
     for holds, rate, expected in (
         (False, 0.0, weight),
@@ -104,7 +104,7 @@ def test_at_rest_friction_carries_what_it_can(angle):
 
 
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
-def test_compiled_terms_equal_plain_ones_to_the_bit(name):
+def test_compiled_friction_curve_equals_the_interpreted_one(name):
     closure = closed(name)
     joints = {joint.name: CURVE for joint in closure.structure.joints}
     mechanics = Mechanics(closure, friction=Friction(joints))

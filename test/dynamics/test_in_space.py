@@ -113,7 +113,7 @@ def motion_of(closure, inputs, rates, changes):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_efforts_are_the_multipliers_of_the_driven_joints(name):
+def test_spatial_drive_efforts_equal_lagrange_multipliers(name):
     closure, spring = spring_of(weighed(name), 3.0)
     mechanics = Mechanics(closure, Loads(GRAVITY, (spring,)))
     for inputs, slow, changes in states_of(closure, 4, 0.2):
@@ -125,7 +125,7 @@ def test_efforts_are_the_multipliers_of_the_driven_joints(name):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_the_work_of_the_drives_is_the_change_of_energy(name):
+def test_spatial_drive_power_equals_the_energy_rate(name):
     closure, spring = spring_of(weighed(name))
     mechanics = Mechanics(closure, Loads(GRAVITY, (spring,), 0.02))
     for inputs, rates, changes in states_of(closure, 2, 0.1):
@@ -141,7 +141,7 @@ def test_the_work_of_the_drives_is_the_change_of_energy(name):
 
 
 @pytest.mark.parametrize('name', ONE_INPUT)
-def test_the_equation_of_motion_has_the_efforts_and_is_traced_to_the_last_bit(name):
+def test_spatial_equation_of_motion_equals_the_drive_efforts(name):
     closure, spring = spring_of(weighed(name), 3.0)
     mechanics = Mechanics(closure, Loads(GRAVITY, (spring,), 0.02))
     for (q,), (w,), (a,) in states_of(closure, 4, 0.2):
@@ -153,7 +153,7 @@ def test_the_equation_of_motion_has_the_efforts_and_is_traced_to_the_last_bit(na
 
 
 @pytest.mark.parametrize('name', ['rssr', 'delta', 'ankle_motors'])
-def test_efforts_are_traced_to_the_last_bit(name):
+def test_compiled_spatial_efforts_equal_the_interpreted_ones(name):
     closure, spring = spring_of(weighed(name), 3.0)
     mechanics = Mechanics(closure, Loads(GRAVITY, (spring,), 0.02))
     compiled = Compiled(closure, 2, lambda motion: [mechanics.drive_efforts(*motion)])
@@ -229,7 +229,7 @@ def applied_by_hand(motion, closure, position, applied, wrenches, seconds):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_loads_on_joints_points_and_links(name):
+def test_spatial_loads_enter_the_drive_efforts(name):
     closure, random = weighed(name), Random(name)
     applied = everywhere(closure)
     mechanics = Mechanics(closure, Loads(GRAVITY, applied=applied))
@@ -247,7 +247,7 @@ def test_loads_on_joints_points_and_links(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'spatial_slider_crank', 'bennett'])
-def test_loads_by_laws_are_traced_to_the_last_bit(name):
+def test_compiled_spatial_loads_equal_the_interpreted_ones(name):
     closure = weighed(name)
     mechanics = Mechanics(closure, Loads(GRAVITY, applied=everywhere(closure)))
     for (q,), _, _ in states_of(closure, 4, 0.2):
@@ -258,7 +258,7 @@ def test_loads_by_laws_are_traced_to_the_last_bit(name):
         assert _bits(fast[:5]) == _bits(slow[:5])
 
 
-def test_rods_that_may_spin_bear_no_load_that_turns_with_them():
+def test_link_frame_loads_on_idle_rods_are_refused():
     force = AppliedLoads(forces={'rod.B': PointLoad((1.0, 0.0, 0.0), 'link', 1.0)})
     assert refusal('rssr', Loads(applied=force)).startswith('loads.forces.rod.B.frame: the rod')
     wrench = AppliedLoads(wrenches={'rod': WrenchLoad()})
@@ -296,7 +296,7 @@ effects: {velocity: {}, acceleration: {}, effort: {}}
 """
 
 
-def test_a_scene_publishes_the_efforts_of_its_motors():
+def test_scene_publishes_the_motor_efforts_of_an_ankle():
     pipeline = pipeline_of(SWINGING, ANKLE)
     closure, begin = pipeline.linkages[0].closure, 1_700_000_000_000_000_000
     pipeline.tick(begin)
@@ -328,7 +328,7 @@ def robot_scene(folder, robot):
     return load_scene(folder / 'scene.yaml')
 
 
-def test_a_robot_has_the_masses_of_its_urdf(tmp_path):
+def test_robot_efforts_use_the_masses_of_its_urdf(tmp_path):
     count = iter(range(1, 20))
 
     def weigh(link):
@@ -352,7 +352,7 @@ def test_a_robot_has_the_masses_of_its_urdf(tmp_path):
         assert read_joint_state(tick.message).effort[:2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_robot_without_masses_is_told_where_they_belong(tmp_path):
+def test_urdf_without_masses_error_names_the_inertial_element(tmp_path):
     with pytest.raises(FileError, match=r'urdf: no link of its loops has a mass.*<inertial>'):
         Pipeline(robot_scene(tmp_path, ROBOT.read_text('utf-8')))
 
@@ -369,7 +369,7 @@ def refusal(name, loads=None, **masses):
     return str(caught.value)
 
 
-def test_a_rod_that_may_spin_is_round_about_its_axis():
+def test_idle_rod_with_asymmetric_mass_is_refused():
     rod = weighed('rssr').linkage.masses['rod']
     x, y, z = rod.center
     line = refusal('rssr', rod=replace(rod, center=(x, y + 0.01, z)))
@@ -381,11 +381,11 @@ def test_a_rod_that_may_spin_is_round_about_its_axis():
     assert 'universal joint' in line
 
 
-def test_bodies_that_cannot_be_are_refused():
+def test_impossible_principal_moments_are_refused():
     crank = SpatialMass(1.0, (0.0, 0.0, 0.0), (1e-3, 0.0, 0.0, 1e-3, 0.0, 5e-3))
     assert refusal('rssr', crank=crank).startswith('masses.crank.inertia: its principal moments')
 
 
-def test_gravity_has_as_many_numbers_as_the_linkage_has_directions():
+def test_planar_gravity_on_a_spatial_linkage_is_refused():
     line = refusal('rssr', Loads((0.0, -9.81)))
     assert line == 'loads.gravity: [0, -9.81], and the linkage is spatial; write [x, y, z]'

@@ -39,7 +39,7 @@ def slopes(errors):
     return [log2(before / after) for before, after in pairwise(errors)]
 
 
-def test_the_methods_say_their_order():
+def test_integration_methods_declare_their_order():
     assert {name: method.order for name, method in METHODS.items()} == ORDER
 
 
@@ -80,7 +80,7 @@ STEPS = {
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_a_pendulum_errs_by_the_order(method):
+def test_pendulum_error_falls_with_the_method_order(method):
     angle, rate = swung_exactly(2.5)
     errors = []
     for steps in STEPS[method]:
@@ -137,7 +137,7 @@ def time_to(loaded, end):
         ('gauss_legendre', (160, 320, 640)),
     ],
 )
-def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
+def test_four_bar_error_falls_with_the_method_order(four_bar, method, steps):
     seconds = 0.4
     errors, drifts = [], []
     energy = four_bar.total_energy(four_bar.closure.position(BEGIN), SPEED)
@@ -160,7 +160,7 @@ def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('steps', [2000, pytest.param(50_000, marks=pytest.mark.slow)])
-def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
+def test_gauss_legendre_keeps_the_energy_of_a_four_bar(four_bar, steps):
     motions = turned(four_bar, 'gauss_legendre', steps * 5e-4, steps)
     position = four_bar.closure.position
     whole = four_bar.total_energy(position(BEGIN), SPEED)
@@ -171,7 +171,7 @@ def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
     assert motions[-1].value > steps * 5e-4 * 20.0, 'it has gone round all the time'
 
 
-def test_the_coefficients_of_gauss_integrate_polynomials():
+def test_gauss_coefficients_integrate_polynomials_exactly():
     # Collocation: Σ a_ij·c_jᵏ⁻¹ = c_iᵏ/k for k ≤ 3, Σ b_j·c_jᵏ⁻¹ = 1/k for k ≤ 6.
     nodes, weights = GAUSS_NODES, GAUSS_WEIGHTS
     for k in (1, 2, 3):
@@ -183,20 +183,20 @@ def test_the_coefficients_of_gauss_integrate_polynomials():
         assert total == pytest.approx(1 / k, abs=1e-16)
 
 
-def test_gauss_goes_back_the_way_it_came():
+def test_gauss_step_is_reversible():
     there = gauss_legendre(weight, 1.0, 2.0, weight(1.0, 2.0), 0.05)
     back = gauss_legendre(weight, *there, weight(*there), -0.05)
     assert back == pytest.approx((1.0, 2.0), abs=1e-15)
 
 
-def test_gauss_does_not_answer_where_it_does_not_converge():
+def test_gauss_step_returns_none_without_convergence():
     stiff = lambda value, _rate, _time: -1e9 * value  # noqa: E731
     assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-2) is None
     assert gauss_legendre(stiff, 1.0, 0.0, -1e9, 1e-6) is not None
 
 
 @pytest.mark.parametrize('method', [rk4, gauss_legendre])
-def test_where_a_stage_has_no_motion_there_is_no_step(method):
+def test_integrator_returns_none_beyond_the_end_of_motion(method):
     def ends(value, _rate, _time):
         return 0.0 if value < 1.0 else None
 
@@ -236,25 +236,25 @@ def found(function, end, *, exists=lambda _t: True):
         (lambda t: t * (1e-9 - t), 1.0, 1e-9),
     ],
 )
-def test_the_zero_is_found(function, end, zero):
+def test_event_search_finds_the_zero(function, end, zero):
     at, known, looks = found(function, end)
     assert known
     assert at == pytest.approx(zero, abs=1e-5 if function(0.0) == 0.7**3 else 1e-13)
     assert looks <= 80
 
 
-def test_a_smooth_one_is_found_soon():
+def test_event_search_of_smooth_functions_converges_quickly():
     for function, end in ((cos, 3.0), (lambda t: 2.0 - t * t, 2.0)):
         assert found(function, end)[2] < 20
 
 
-def test_where_there_is_no_state_it_ends_before_that():
+def test_event_search_ends_before_missing_states():
     at, known, _ = found(lambda t: 1.0 - t, 2.0, exists=lambda t: t < 0.25 or t == 2.0)
     assert not known
     assert at == pytest.approx(0.25, abs=1e-13)
 
 
-def test_beyond_a_gap_it_is_still_looked_for_in_front_of_it():
+def test_event_search_finds_a_zero_before_a_gap():
     at, known, _ = found(lambda t: 0.125 - t, 2.0, exists=lambda t: not 0.5 < t < 1.5)
     assert known
     assert at == pytest.approx(0.125, abs=1e-13)

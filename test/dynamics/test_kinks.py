@@ -161,7 +161,7 @@ def turned(mechanics, method, steps):
         ('gauss_legendre', (60, 120, 240)),
     ],
 )
-def test_the_order_holds_where_slips_turn(method, steps):
+def test_method_order_holds_across_friction_kinks(method, steps):
     # Stepped across the kinks, rk4 erred by 3e-8 s with 800 steps, and gauss_legendre, whose error
     # did not fall at all from 60 steps to 480, by up to 4e-8 s.
     mechanics, by_hand = loaded(COULOMB), ByHand(MASSES, COULOMB)
@@ -177,7 +177,7 @@ def test_the_order_holds_where_slips_turn(method, steps):
 @pytest.mark.parametrize(
     'name', ['four_bar', 'slider_crank', 'scotch_yoke', 'watt_1', 'reversed_yoke']
 )
-def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
+def test_gallery_linkages_with_friction_keep_the_highest_order(name):
     # Against the same motion in steps an eighth as long.
     closure = closed(name)
     friction = Friction({j.name: JointFriction(0.01, 0.05) for j in closure.structure.joints})
@@ -200,7 +200,7 @@ def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
     assert kinks >= 5
 
 
-def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
+def test_step_without_a_kink_equals_a_plain_step():
     # The friction of this motion has the sign that it has at the start, as it had without kinks.
     mechanics = loaded(COULOMB)
     position, terms = mechanics.closure.position, mechanics.motion_terms
@@ -219,7 +219,7 @@ def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_without_coulomb_friction_no_slip_is_looked_at(method):
+def test_mechanics_without_coulomb_friction_evaluates_no_slips(method):
     mechanics = loaded(dict.fromkeys(COULOMB, 0.0))
     position, terms = mechanics.closure.position, mechanics.motion_terms
     asked = []
@@ -249,7 +249,7 @@ def spun(mechanics, method, rate, seconds, steps):
 
 
 @pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
-def test_however_many_kinks_a_step_has_it_goes_on(method):
+def test_step_with_many_kinks_completes(method):
     # A heavy crank whose yoke, of no mass, rubs along its guide: twelve turns in one step.
     yoke = scotch_yoke(Mass(1.0, (0.0, 0.0), 0.5), Mass(1e-9, (0.0, 0.0), 0.0))
     friction = Friction({'guide': JointFriction(coulomb=0.5), 'slot': JointFriction(coulomb=0.2)})
@@ -263,7 +263,7 @@ def test_however_many_kinks_a_step_has_it_goes_on(method):
     assert once.rate == pytest.approx(finely.rate, rel=1e-3)
 
 
-def test_a_slip_that_is_zero_but_for_rounding_has_no_kinks():
+def test_parallelogram_slips_at_rounding_level_have_no_kinks():
     # The coupler of a parallelogram does not turn: in its pins it slips as crank and rocker do. A
     # pin between coupler and a second rocker as long has that slip too.
     masses = {link: Mass(0.2, (0.02, 0.01), 1e-4) for link in ('crank', 'coupler', 'rocker')}
@@ -276,7 +276,7 @@ def test_a_slip_that_is_zero_but_for_rounding_has_no_kinks():
     assert motion.rate == pytest.approx(max(20.0 - 0.04 / inertia * 0.5, 0.0), abs=1e-9)
 
 
-def test_a_kink_and_a_stop_and_a_turn_in_one_step():
+def test_one_step_handles_kink_stop_and_reversal():
     # A mass on a line whose friction is |x − 1|: it turns at 1, is stopped at 2, comes back and
     # sticks.
     def terms(x):

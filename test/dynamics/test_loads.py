@@ -74,20 +74,20 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('kind', REFUSED)
-def test_refused(kind):
+def test_loads_on_unknown_parts_are_refused(kind):
     name, loads, friction, expected = REFUSED[kind]
     with pytest.raises(DefinitionError) as caught:
         check_loads(shipped(name), loads, Friction(friction))
     assert str(caught.value).startswith(expected)
 
 
-def test_refused_as_the_mechanics_are_built():
+def test_mechanics_refuses_friction_of_an_unknown_joint():
     closure = Closure(shipped('four_bar'))
     with pytest.raises(DefinitionError, match=r'^effects\.friction\.joints\.X: '):
         Mechanics(closure, Loads(), Friction({'X': RUBBING}))
 
 
-def test_a_name_that_means_two_joints():
+def test_friction_of_an_ambiguous_joint_name_is_refused():
     linkage = shipped('slider_crank')
     linkage = replace(linkage, sliders={'B': linkage.sliders['cylinder']})
     with pytest.raises(DefinitionError) as caught:
@@ -98,7 +98,7 @@ def test_a_name_that_means_two_joints():
 
 
 @pytest.mark.parametrize('joint', ['O2', 'A', 'B', 'cylinder'])
-def test_friction_in_every_pin_and_slider(joint):
+def test_friction_is_accepted_in_every_pin_and_slider(joint):
     # B is the pin between the rod and the block of the slot, which is no link of the file's.
     check_loads(shipped('slider_crank'), Loads(), Friction({joint: RUBBING}))
 
@@ -107,5 +107,5 @@ def test_friction_in_every_pin_and_slider(joint):
     ('length', 'growth', 'pull'),
     [(0.3, 0.0, 20.0), (0.1, 0.0, 0.0), (0.05, 0.0, -5.0), (0.1, 2.0, 6.0), (0.05, -1.0, -8.0)],
 )
-def test_a_spring_pulls_as_it_is_stretched_and_as_it_grows(length, growth, pull):
+def test_spring_tension_equals_stiffness_and_damping_terms(length, growth, pull):
     assert SPRING.tension(length, growth) == pytest.approx(pull)

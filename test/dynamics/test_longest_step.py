@@ -61,7 +61,7 @@ def after_a_blow(damping):
 
 @pytest.mark.parametrize('method', EXACT)
 @pytest.mark.parametrize('damping', [0.0, 0.05, 0.3, 0.7, 1.0, 1.5, 5.0])
-def test_a_blow_on_a_stop_gives_back_its_rate(method, damping):
+def test_longest_step_reproduces_the_rebound_rate(method, damping):
     fastest = damping + sqrt(damping**2 - 1.0) if damping > 1.0 else 1.0
     step, drawn = EXACT[method] / fastest, random.Random(f'{method} {damping}')
     stop = Contact(-inf, 0.0, 1.0, 2.0 * damping)
@@ -103,7 +103,7 @@ effects: {velocity: {}}
 
 @pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
 @pytest.mark.parametrize('stiffness', ['5.0e+4', '1.0e+6'])
-def test_a_rocker_leaves_its_stop_as_scipy_says(method, stiffness):
+def test_recommended_step_reproduces_a_rocker_impact(method, stiffness):
     scene = BLOW.replace('K}', f'{stiffness}}}').replace('METHOD', method)
     step = recommended(scene, STOPPED)
     (linkage,) = pipeline_of(scene.replace('STEP', repr(step)), STOPPED).linkages
@@ -186,7 +186,7 @@ def rubbed_by_scipy(rate, count):
 
 @pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
 @pytest.mark.parametrize('rate', [0.1, 0.01])
-def test_friction_that_falls_with_the_rate_is_followed_as_scipy_says(method, rate):
+def test_recommended_step_reproduces_stribeck_friction(method, rate):
     scene = CURVED.replace('METHOD', method).replace('RATE', repr(rate))
     step = recommended(scene)
     (linkage,) = pipeline_of(scene.replace('STEP', repr(step)), FOUR_BAR).linkages
@@ -200,7 +200,7 @@ def test_friction_that_falls_with_the_rate_is_followed_as_scipy_says(method, rat
     assert found == pytest.approx(expected, abs=0.1 * SHARES[method])
 
 
-def test_a_curve_too_narrow_for_any_step_has_its_remedy():
+def test_too_narrow_stribeck_rate_is_refused_with_a_remedy():
     scene = CURVED.replace('METHOD', 'rk4').replace('RATE', '1.0e-5').replace('STEP', '1.0e-5')
     with pytest.raises(FileError, match=r'O2\.stribeck: .*; write 0: breakaway') as refused:
         pipeline_of(scene, FOUR_BAR)
@@ -217,7 +217,7 @@ GIVEN = {
 
 
 @pytest.mark.parametrize('name', GIVEN)
-def test_a_given_motion_goes_into_a_stop_that_yields(name):
+def test_given_motion_into_a_soft_stop_adds_its_effort(name):
     scene = f"""
 rate: 1000
 drive: {{{GIVEN[name]}}}

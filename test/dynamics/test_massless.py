@@ -68,7 +68,7 @@ def statics(angle, torque, force, at):
 
 @pytest.mark.parametrize('masses', ['', MASSLESS], ids=['no masses', 'mass: 0'])
 @pytest.mark.parametrize('angle', [0.3, 1.0, 2.4, -1.2])
-def test_a_torque_on_the_rocker_and_a_force_on_the_coupler(angle, masses):
+def test_massless_four_bar_efforts_equal_textbook_statics(angle, masses):
     linkage = four_bar_text(A, B, C, D)
     linkage = linkage.replace(f'B: [{B}, 0]', f'B: [{B}, 0], P: [0.06, 0.03]')
     pipeline = pipeline_of(
@@ -89,7 +89,7 @@ def test_a_torque_on_the_rocker_and_a_force_on_the_coupler(angle, masses):
         assert hypot(*reaction[:2]) == pytest.approx(hypot(*pins[joint.name]), rel=1e-12)
 
 
-def test_the_drive_moves_its_own_inertia_and_nothing_else():
+def test_torque_drive_accelerates_only_its_own_inertia():
     pipeline = pipeline_of(
         'rate: 1000\ndrive: {torque: {start: 0.5}}\nloads: {drive_inertia: 0.02}\n'
         'effects: {velocity: {}}',
@@ -115,14 +115,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('kind', REFUSED)
-def test_without_any_load_or_with_a_weight_masses_are_asked_for(kind):
+def test_missing_masses_are_refused_without_loads(kind):
     with pytest.raises(
         FileError, match=r"link 'crank' has no mass, .*for a massless link write \{mass: 0\}"
     ):
         Pipeline(scene_of(REFUSED[kind], FOUR_BAR))
 
 
-def test_one_link_with_a_mass_asks_for_those_of_the_others():
+def test_partly_given_masses_are_refused():
     masses = 'masses: {rocker: {mass: 1, center: [0, 0], inertia: 0}}'
     with pytest.raises(FileError, match="link 'crank' has no mass"):
         pipeline_of(
@@ -131,7 +131,7 @@ def test_one_link_with_a_mass_asks_for_those_of_the_others():
         )
 
 
-def test_arrows_of_forces_have_a_length_without_any_weight():
+def test_massless_linkage_publishes_force_markers():
     pipeline = pipeline_of(
         'drive: {constant_rate: {start: 1, rate: 3}}\n'
         'effects: {pin_forces: {}, markers: {rate: 1000}}\n'
@@ -141,7 +141,7 @@ def test_arrows_of_forces_have_a_length_without_any_weight():
     assert all(pipeline.tick(SECOND).extras)
 
 
-def test_of_a_massless_link_a_robot_model_says_that_or_refuses_it(tmp_path, capsys):
+def test_urdf_omits_massless_inertials_and_mjcf_refuses_them(tmp_path, capsys):
     file = tmp_path / 'light.yaml'
     text = four_bar_text(A, B, C, D).replace(
         'joints: {', 'joints: {coupler_joint: {parent: crank, child: coupler}, '

@@ -49,7 +49,7 @@ def assert_terms(found, expected, tolerance=0.0):
 
 
 @pytest.mark.parametrize('angle', [0.0, 0.4, 2.0, -1.5])
-def test_pendulum(angle):
+def test_pendulum_terms_equal_the_closed_form(angle):
     mechanics = Mechanics(arm(Mass(2.0, (0.3, 0.4), 0.1)), Loads((0.0, -GRAVITY), (), 0.07))
     # The centre is 0.5 m from O, at atan2(0.4, 0.3) from the arm's axis.
     height = 0.3 * sin(angle) + 0.4 * cos(angle)
@@ -71,7 +71,7 @@ def test_pendulum(angle):
 
 
 @pytest.mark.parametrize('angle', [0.3, 1.2, 2.8, -0.7])
-def test_scotch_yoke_with_spring_damper_and_friction(angle):
+def test_scotch_yoke_terms_equal_the_closed_form(angle):
     a, m, k, free, c = 0.05, 1.5, 400.0, 0.1, 8.0
     spring = Spring('ground', 'W', 'yoke', 'Y', k, free, c)
     friction = Friction(
@@ -100,7 +100,7 @@ def test_scotch_yoke_with_spring_damper_and_friction(angle):
     )
 
 
-def test_a_parallelogram_has_one_inertia():
+def test_parallelogram_inertia_is_constant():
     # Crank and rocker swing alike, and the coupler goes round with them without turning.
     masses = {
         'crank': Mass(0.2, (0.03, 0.04), 1e-3),
@@ -115,7 +115,7 @@ def test_a_parallelogram_has_one_inertia():
 
 
 @pytest.mark.parametrize('name', ONE_INPUT)
-def test_slopes_are_those_of_inertia_and_potential(name):
+def test_term_slopes_equal_numerical_derivatives(name):
     closure = closed(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage))
     for (q,) in STATES[name]:
@@ -155,7 +155,7 @@ def lagrange(mechanics, q, rates, pulls):
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_efforts_are_those_of_lagrange(name):
+def test_drive_efforts_equal_lagranges_equations(name):
     closure = closed(name)
     mechanics = Mechanics(closure, loads_of(closure.linkage))
     for q in STATES[name]:
@@ -168,7 +168,7 @@ def test_efforts_are_those_of_lagrange(name):
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_what_drives_put_in_is_stored_or_rubbed_away(name):
+def test_drive_power_equals_energy_rate_plus_losses(name):
     # Power balance, with the rates in pins, sliders and dampers by differences of the position.
     closure = closed(name)
     linkage = closure.linkage
@@ -221,7 +221,7 @@ def test_what_drives_put_in_is_stored_or_rubbed_away(name):
 
 @given(st.floats(-3.0, 3.0), st.floats(-20.0, 20.0), st.floats(-100.0, 100.0))
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1'])
-def test_terms_and_effort_are_one_equation(name, q, rate, pull):
+def test_drive_effort_equals_the_equation_of_motion(name, q, rate, pull):
     closure = CLOSED[name]
     friction = Friction({'A': JointFriction(0.2, 0.3), 'B': JointFriction(0.1, 0.0)})
     mechanics = Mechanics(closure, loads_of(closure.linkage, damping=2.0), friction)
@@ -240,7 +240,7 @@ def test_terms_and_effort_are_one_equation(name, q, rate, pull):
 CLOSED = {name: closed(name) for name in ('four_bar', 'slider_crank', 'watt_1')}
 
 
-def test_no_equation_where_no_rates_exist():
+def test_toggled_and_open_states_have_no_motion_terms():
     masses = {name: Mass(1.0, (0.0, 0.0), 1.0) for name in ('crank', 'coupler', 'rocker')}
     closure = four_bar(masses, 1.0, 1.0, 1.0, 3.0)
     mechanics = Mechanics(closure, Loads((0.0, -GRAVITY)))
@@ -252,14 +252,14 @@ def test_no_equation_where_no_rates_exist():
     assert mechanics.potential_energy(stretched) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_no_equation_where_terms_are_beyond_a_double():
+def test_overflowing_masses_give_no_motion_terms():
     linkage = CLOSED['four_bar'].linkage
     masses = {**linkage.masses, 'rocker': Mass(1e308, (1e3, 0.0), 1.0)}
     mechanics = Mechanics(Closure(replace(linkage, masses=masses)))
     assert mechanics.motion_terms(mechanics.closure.position(1.0)) is None
 
 
-def test_a_spring_whose_ends_meet_pulls_nothing():
+def test_spring_with_coincident_ends_exerts_no_force():
     spring = Spring('ground', 'O', 'arm', 'O', 100.0, 0.1, 5.0)
     mechanics = Mechanics(arm(Mass(2.0, (0.3, 0.4), 0.1)), Loads(springs=(spring,)))
     position = mechanics.closure.position(1.0)
@@ -267,7 +267,7 @@ def test_a_spring_whose_ends_meet_pulls_nothing():
     assert mechanics.potential_energy(position) == pytest.approx(0.5 * 100.0 * 0.01)
 
 
-def test_units_of_a_sliding_input():
+def test_sliding_input_terms_equal_the_ladder_closed_form():
     # A ladder of length ℓ on X = (x, 0), Y = (0, y): its centre at (x, y)/2, its angle from x/ℓ.
     closure = closed('elliptic_trammel')
     linkage = replace(closure.linkage, masses={'bar': Mass(2.0, (0.06, 0.0), 3e-3)})

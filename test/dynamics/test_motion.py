@@ -48,7 +48,7 @@ def run(mass, motion, steps, force=0.0, brake=0.0, step=MS):
 @pytest.mark.parametrize('method', EXACT)
 @pytest.mark.parametrize(('friction', 'brake'), [(2.0, 0.0), (0.0, 2.0), (0.5, 1.5)])
 @pytest.mark.parametrize('rate', [3.0, -3.0])
-def test_it_slides_as_far_as_its_energy_lasts(method, friction, brake, rate):
+def test_sliding_mass_stops_after_its_kinetic_energy(method, friction, brake, rate):
     mass = SingleDofMechanism(sliding(friction=friction), STEP[method])
     last = run(mass, mass.state_at(0.1, rate), 1600, brake=brake)[-1]
     assert last.rate == 0.0
@@ -61,7 +61,7 @@ def test_it_slides_as_far_as_its_energy_lasts(method, friction, brake, rate):
     ('force', 'moves'),
     [(1.5, 0), (-1.0, 0), (1.5 + 0.3, 0), (-1.5 + 0.3, 0), (1.81, 1), (-1.21, -1)],
 )
-def test_it_sticks_up_to_the_limit_of_friction(method, force, moves):
+def test_mass_sticks_up_to_the_friction_limit(method, force, moves):
     mass = SingleDofMechanism(sliding(slope=0.3, friction=1.5), STEP[method])
     last = run(mass, mass.state_at(0.0, 0.0), 100, force)[-1]
     net = force - 0.3 - moves * 1.5
@@ -71,7 +71,7 @@ def test_it_sticks_up_to_the_limit_of_friction(method, force, moves):
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_a_brake_holds_it_and_lets_it_go(method):
+def test_brake_holds_and_releases_a_mass(method):
     mass = SingleDofMechanism(sliding(slope=2.0), STEP[method])
     held = run(mass, mass.state_at(0.0, 0.0), 50, brake=2.5)[-1]
     assert (held.value, held.rate) == (0.0, 0.0)
@@ -81,7 +81,7 @@ def test_a_brake_holds_it_and_lets_it_go(method):
 
 
 @pytest.mark.parametrize('method', EXACT)
-def test_a_viscous_one_slows_down_exponentially(method):
+def test_viscous_friction_slows_a_mass_exponentially(method):
     mass = SingleDofMechanism(sliding(viscous=4.0), STEP[method])
     for k, motion in enumerate(run(mass, mass.state_at(0.0, 2.0), 500)):
         lasting = exp(-4.0 * k * MS)
@@ -91,7 +91,7 @@ def test_a_viscous_one_slows_down_exponentially(method):
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_without_friction_a_step_in_which_it_turns_is_one_step(method):
+def test_frictionless_reversal_takes_one_plain_step(method):
     mass = SingleDofMechanism(on_spring(100.0, 0.0), STEP[method])
     motion = mass.advance(mass.state_at(0.2, 0.01), 5 * MS, 0.0)
     assert motion.rate < 0.0
@@ -99,7 +99,7 @@ def test_without_friction_a_step_in_which_it_turns_is_one_step(method):
 
 
 @pytest.mark.parametrize('method', EXACT)
-def test_up_a_slope_and_down_again(method):
+def test_mass_slides_up_and_down_a_slope(method):
     # Up it is held back by weight and friction, down it is drawn by their difference.
     up, down, rate = 5.0 + 1.0, 5.0 - 1.0, 3.0
     mass = SingleDofMechanism(sliding(slope=5.0, friction=1.0), STEP[method])
@@ -114,7 +114,7 @@ def test_up_a_slope_and_down_again(method):
         assert (motion.value, motion.rate) == pytest.approx(expected, abs=1e-12)
 
 
-def test_on_a_spring_with_friction_each_half_swing_is_shorter_by_the_same():
+def test_spring_swings_shorten_equally_under_dry_friction():
     # Each half swing is a cosine about ±F/k, shorter by 2·F/k, and it rests within F/k.
     stiffness, friction = 100.0, 3.0
     centre, omega = friction / stiffness, sqrt(stiffness)
@@ -139,7 +139,7 @@ def test_on_a_spring_with_friction_each_half_swing_is_shorter_by_the_same():
 @pytest.mark.parametrize('method', EXACT)
 @pytest.mark.parametrize('restitution', [0.5, 0.8, 1.0])
 @pytest.mark.parametrize('upwards', [False, True])
-def test_each_bounce_is_as_high_as_the_restitution_squared(method, restitution, upwards):
+def test_bounce_height_falls_with_the_restitution_squared(method, restitution, upwards):
     side = -1.0 if upwards else 1.0
     stops = (-inf, 0.0) if upwards else (0.0, inf)
     weight, height = 10.0, 0.8
@@ -156,7 +156,7 @@ def test_each_bounce_is_as_high_as_the_restitution_squared(method, restitution, 
         motion = ball.advance(motion, impact / weight + 2e-12, 0.0)
 
 
-def test_steps_do_not_matter_to_bounces():
+def test_bounces_do_not_depend_on_the_step():
     ball = SingleDofMechanism(sliding(slope=10.0), STEP['rk4'], (0.0, inf), 0.7)
     fine = run(ball, ball.state_at(0.8, 0.0), 2000, step=MS)[-1]
     coarse = run(ball, ball.state_at(0.8, 0.0), 50, step=40 * MS)[-1]
@@ -166,7 +166,7 @@ def test_steps_do_not_matter_to_bounces():
 
 @pytest.mark.parametrize('method', METHODS)
 @pytest.mark.parametrize('restitution', [0.0, 0.5, 0.9])
-def test_in_the_end_it_rests_at_the_stop_until_it_is_drawn_away(method, restitution):
+def test_bouncing_mass_finally_rests_at_the_stop(method, restitution):
     ball = SingleDofMechanism(sliding(slope=10.0), STEP[method], (0.25, inf), restitution)
     bounce = sqrt(2 * 0.01 / 10.0)  # all flights together last (1 + e)/(1 − e) as long
     lasts = bounce * (1 + restitution) / (1 - restitution)
@@ -178,14 +178,14 @@ def test_in_the_end_it_rests_at_the_stop_until_it_is_drawn_away(method, restitut
     assert run(ball, rest, 100, force=11.0)[-1].rate == pytest.approx(0.1)
 
 
-def test_without_restitution_it_stops_dead():
+def test_zero_restitution_stops_the_mass_at_once():
     ball = SingleDofMechanism(sliding(), STEP['rk4'], (-1.0, 1.0))
     motions = run(ball, ball.state_at(0.0, 50.0), 40)
     assert (motions[19].value, motions[19].rate) == pytest.approx((0.95, 50.0))
     assert {(m.value, m.rate) for m in motions[21:]} == {(1.0, 0.0)}
 
 
-def test_in_one_step_the_stop_comes_before_the_turn_that_it_prevents():
+def test_stop_precedes_a_later_reversal_within_one_step():
     # Friction alone would let it turn at 2.25 m, after 1.5 s.
     mass = SingleDofMechanism(sliding(slope=1.0, friction=1.0), STEP['rk4'], (-inf, 2.0), 0.5)
     motion = mass.advance(mass.state_at(0.0, 3.0), 1.0 + 1e-9, 0.0)
@@ -196,7 +196,7 @@ def test_in_one_step_the_stop_comes_before_the_turn_that_it_prevents():
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_bounces_without_number_come_to_their_end(method):
+def test_infinite_bounces_within_a_step_end_at_rest(method):
     # All flights together last 1.9 ms, or without loss for ever.
     for restitution in (0.9, 1.0):
         ball = SingleDofMechanism(sliding(slope=10.0), STEP[method], (0.0, inf), restitution)
@@ -205,7 +205,7 @@ def test_bounces_without_number_come_to_their_end(method):
 
 
 @pytest.mark.parametrize('method', METHODS)
-def test_nothing_is_asked_for_beyond_what_is_a_motion(method):
+def test_integrator_asks_no_terms_beyond_the_largest_value(method):
     def terms(value):
         assert abs(value) <= LARGEST
         return Terms(1e-90, 1.0, 0.0, 0.0, 0.0)
@@ -227,7 +227,7 @@ def weighs_nothing_at_1(value):
 
 @pytest.mark.parametrize('terms', [ends_at_1, weighs_nothing_at_1])
 @pytest.mark.parametrize('method', METHODS)
-def test_where_there_is_no_more_motion_it_is_held(method, terms):
+def test_mass_is_held_at_the_end_of_motion(method, terms):
     mass = SingleDofMechanism(terms, STEP[method])
     motions = run(mass, mass.state_at(0.5, 10.0), 80, force=3.0)
     assert all(motion.value < 1.0 for motion in motions)
@@ -236,7 +236,7 @@ def test_where_there_is_no_more_motion_it_is_held(method, terms):
     assert run(mass, motions[-1], 100, force=-3.0)[-1].rate == pytest.approx(-0.3)
 
 
-def test_where_nothing_is_to_be_moved_there_is_no_state():
+def test_massless_or_out_of_range_states_are_none():
     for inertia in (0.0, 1e-101):
         massless = SingleDofMechanism(lambda _value, i=inertia: Terms(i, 0, 0, 0, 0), STEP['rk4'])
         assert massless.state_at(0.0, 0.0) is None
@@ -245,7 +245,7 @@ def test_where_nothing_is_to_be_moved_there_is_no_state():
     assert SingleDofMechanism(sliding(), STEP['rk4']).state_at(0.0, 2 * LARGEST) is None
 
 
-def test_a_step_too_long_to_converge_is_cut():
+def test_step_without_convergence_is_subdivided():
     omega = 1e3
     mass = SingleDofMechanism(on_spring(omega * omega, 0.0), STEP['gauss_legendre'])
     seconds = 8 * MS
@@ -260,7 +260,7 @@ def test_a_step_too_long_to_converge_is_cut():
     brake=st.just(0.0) | st.floats(0.0, 1e3),
     restitution=st.floats(0.0, 1.0),
 )
-def test_whatever_the_force_it_stays_between_its_stops(
+def test_mass_stays_between_its_stops_under_any_force(
     method, forces, friction, brake, restitution
 ):
     mass = SingleDofMechanism(on_spring(30.0, friction), STEP[method], (-0.5, 0.75), restitution)
@@ -291,7 +291,7 @@ def pushed(rows, friction=0.0, slope=0.0, calls=None):
 @pytest.mark.parametrize('slope', [0.0, 3.0])
 @pytest.mark.parametrize('friction', [0.0, 2.0])
 @pytest.mark.parametrize('side', [1.0, -1.0], ids=['upper stop', 'lower stop'])
-def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, slope, steps):
+def test_load_over_time_pulls_a_mass_off_its_stop(side, friction, slope, steps):
     # 5 N into the stop until 0.05 s, then 100 N/s away from it, beside a weight.
     rows = [(0.05, slope + 5.0 * side), (0.15, slope - 5.0 * side)]
     terms, laws = pushed(rows, friction, slope)
@@ -307,7 +307,7 @@ def test_it_rests_at_a_stop_until_the_load_draws_it_away(side, friction, slope, 
 
 @pytest.mark.parametrize('start', [0.0, 7.0])
 @pytest.mark.parametrize('kink', [0.01, 0.05, 0.09])
-def test_a_step_across_a_row_of_a_table_is_exact(kink, start):
+def test_step_across_a_table_row_is_exact(kink, start):
     # 0 N until the kink, then 40 N/s: rk4 is exact on both sides of it.
     terms, laws = pushed([(start + kink, 0.0), (start + 1.0, 40.0 * (1.0 - kink))])
     mass = SingleDofMechanism(terms, STEP['rk4'], laws=laws)
@@ -343,7 +343,7 @@ def rising(rows, end):
 )  # fmt: skip
 @example([(1.0, [(0.0, 0.0), (0.1, 20.0)]), (1.0, [(0.05, 0.0), (0.15, 40.0)])])
 @example([(1.0, [(0.05, 0.0), (0.15, 40.0)]), (1.0, [(0.0, 0.0), (1.0, 0.0)])])
-def test_a_step_stops_at_the_rows_of_each_of_several_tables(loads):
+def test_step_across_rows_of_several_tables_is_exact(loads):
     # The force is linear between the rows of all tables: rk4 is exact from one to the next.
     tables = [TorqueTable('time', tuple(sorted(rows))) for _, rows in loads]
     given_by = tuple(LawTerm(lever, 0.0, 0.0) for lever, _ in loads)
@@ -357,7 +357,7 @@ def test_a_step_stops_at_the_rows_of_each_of_several_tables(loads):
     assert motion.value == pytest.approx(sum(x * way for x, _, way in each), abs=1e-12)
 
 
-def test_a_step_across_many_rows_goes_on_at_a_bounded_cost():
+def test_step_across_many_table_rows_has_bounded_cost():
     costs = []
     for count in (1000, 2000):
         # A force of 10 N all the time, in many rows.

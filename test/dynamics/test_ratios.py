@@ -66,7 +66,7 @@ def turned(angle: float) -> float:
 
 
 @pytest.mark.parametrize(('rate', 'change'), [(0.0, 1.0), (3.0, -2.0), (-7.0, 0.5)])
-def test_effort_of_a_rack_and_pinion(rate: float, change: float) -> None:
+def test_rack_and_pinion_effort_equals_virtual_work(rate: float, change: float) -> None:
     """By virtual work: masses, weights, friction and a load on the rack, times the radius."""
     rubbing = Friction({'way': JointFriction(viscous=4.0), 'O': JointFriction(viscous=0.002)})
     loads = Loads(gravity=(-9.81, 0.0), drive_inertia=3e-5)
@@ -80,7 +80,7 @@ def test_effort_of_a_rack_and_pinion(rate: float, change: float) -> None:
     assert efforts == pytest.approx((right,), rel=1e-12)
 
 
-def test_effort_of_geared_pendulums() -> None:
+def test_geared_pendulum_effort_equals_the_closed_form() -> None:
     """The inertia of the second counts by the square of the ratio."""
     mechanics = Mechanics(geared_pendulums(), Loads(gravity=(0.0, -9.81)))
     for k in range(12):
@@ -94,7 +94,7 @@ def test_effort_of_geared_pendulums() -> None:
 
 
 @pytest.mark.parametrize('method', ['rk4', 'gauss_legendre'])
-def test_torque_swings_geared_pendulums(method: str) -> None:
+def test_geared_pendulums_under_torque_follow_scipy(method: str) -> None:
     """Under their weights and viscous friction, and an effort on the second one."""
     rubbing = Friction({'P': JointFriction(viscous=0.003)})
     applied = AppliedLoads(efforts={'second_joint': JointLoad(constant=0.05)})
@@ -115,7 +115,7 @@ def test_torque_swings_geared_pendulums(method: str) -> None:
         assert state.rates[0] == pytest.approx(rate, abs=1e-5)
 
 
-def test_what_teeth_press_on_bearings_is_not_certain() -> None:
+def test_bearing_forces_of_gears_are_not_published() -> None:
     """No file says the radii of the wheels; what they need of the drive is certain."""
     mechanics = Mechanics(pinion_and_rack(), Loads(gravity=(-9.81, 0.0)))
     reactions = Reactions(mechanics)
@@ -132,7 +132,7 @@ def motion_of(closure: Closure, angle: float, rate: float, change: float) -> tup
     return position, velocity, closure.acceleration(position, velocity, change)
 
 
-def test_forces_behind_a_gear_are_those_without_it() -> None:
+def test_joint_forces_behind_a_gear_equal_the_plain_linkage() -> None:
     """A wheel that turns a crank by −1/2: all joints but the bearings of both bear the same."""
     linkage = shipped('four_bar')
     (given,) = linkage.inputs

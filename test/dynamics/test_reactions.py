@@ -58,7 +58,7 @@ def moving(mechanics, position, velocity, acceleration):
 
 
 @pytest.mark.parametrize('angle', [0.5, 1.2, 2.2])
-def test_a_weight_on_two_bars(angle):
+def test_two_bar_reactions_equal_the_method_of_joints(angle):
     # Coupler and rocker are two bars that meet at B, where all the weight hangs; A is held by the
     # crank. Method of joints: each bar is in line with its force, and both carry the weight.
     none = Mass(WEIGHTLESS, (0.0, 0.0), 0.0)
@@ -80,7 +80,7 @@ def test_a_weight_on_two_bars(angle):
 
 
 @pytest.mark.parametrize('angle', [0.4, 1.5, 2.7, -1.0])
-def test_side_force_of_a_slider_crank(angle):
+def test_slider_crank_side_force_equals_the_textbook(angle):
     # A spring far behind pushes on the piston along its line: N = F·tan φ, and the crank takes
     # M = F·r·sin(θ + φ)/cos φ (R. L. Norton, Design of Machinery, ch. 13).
     r, rod, force = 0.04, 0.14, 50.0
@@ -109,7 +109,7 @@ def test_side_force_of_a_slider_crank(angle):
 
 
 @pytest.mark.parametrize('angle', [0.3, 1.2, 2.8, -0.7])
-def test_scotch_yoke(angle):
+def test_scotch_yoke_reactions_equal_the_closed_form(angle):
     # x = a·cos θ: the slot pushes the yoke with m·ẍ at the height a·sin θ of the crank pin, and
     # rubs along the slot; the guide bears the rest of the weight and both moments about Y.
     a, m, rate, pull = 0.05, 1.5, 3.0, 7.0
@@ -135,7 +135,7 @@ def test_scotch_yoke(angle):
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_both_ways_to_the_effort(name):
+def test_reaction_effort_equals_the_energy_effort(name):
     closure = closed(name)
     friction = Friction(
         {joint.name: JointFriction(0.1, 0.3) for joint in closure.structure.joints}
@@ -152,7 +152,7 @@ def test_both_ways_to_the_effort(name):
         ) == pytest.approx(mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10)
 
 
-def test_moments_of_pins_are_friction_alone():
+def test_pin_moments_equal_the_friction_moments():
     closure = Closure(shipped('four_bar'))
     mechanics = Mechanics(closure, Loads(), Friction({'B': JointFriction(0.5, 0.25)}))
     position = closure.position(1.0)
@@ -174,11 +174,11 @@ NAMES = {
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_names(name):
+def test_reactions_list_the_pin_and_slider_names(name):
     assert Reactions(Mechanics(Closure(shipped(name)))).names == NAMES[name]
 
 
-def test_a_slider_named_as_its_pin():
+def test_slider_named_as_its_pin_gets_a_suffix():
     linkage = shipped('slider_crank')
     cylinder = linkage.sliders['cylinder']
     renamed = replace(
@@ -193,7 +193,7 @@ def test_a_slider_named_as_its_pin():
 
 @pytest.mark.parametrize('angle', [0.5, 1.2, 2.2])
 @pytest.mark.parametrize('far', [1.0, 1e4, 1e6])
-def test_a_weight_far_from_its_link(far, angle):
+def test_distant_centre_of_mass_keeps_reactions_exact(far, angle):
     # The coupler is a bar without weight: its tension holds the rocker about O4.
     none = Mass(WEIGHTLESS, (0.0, 0.0), 0.0)
     masses = {'crank': none, 'coupler': none, 'rocker': Mass(3.0, (far, 0.3 * far), 0.0)}
@@ -208,7 +208,7 @@ def test_a_weight_far_from_its_link(far, angle):
     assert abs(complex(*found['O4'][:2]) - 30j + pull * along) < 1e-15 * abs(pull)
 
 
-def test_no_library_solves_for_the_forces(monkeypatch):
+def test_reactions_are_solved_without_numpy(monkeypatch):
     # Its last digits differ from machine to machine.
     closure = Closure(shipped('excavator_bucket'))
     reactions = Reactions(Mechanics(closure, loads_of(closure.linkage)))
@@ -219,7 +219,7 @@ def test_no_library_solves_for_the_forces(monkeypatch):
     assert reactions.joint_deflections(position, [1e-4j] * len(reactions.joints))
 
 
-def test_nothing_where_no_rates_exist():
+def test_toggled_and_open_states_have_no_reactions():
     masses = {name: Mass(1.0, (0.0, 0.0), 1.0) for name in ('crank', 'coupler', 'rocker')}
     closure = four_bar(masses, 1.0, 1.0, 1.0, 3.0)
     reactions = Reactions(Mechanics(closure))

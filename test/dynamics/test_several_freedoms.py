@@ -60,7 +60,7 @@ def loaded(closure):
 
 
 @pytest.mark.parametrize('name', SEVERAL)
-def test_the_equation_of_motion_has_the_efforts_and_is_traced_to_the_last_bit(name):
+def test_input_equation_equals_the_drive_efforts(name):
     closure, start = several(name)
     mechanics = loaded(closure)
     random = np.random.default_rng(7)
@@ -109,7 +109,7 @@ def by_multipliers(closure, start, until, efforts, loads=lambda _: ()):
         ('ankle_motors', [0.06, -0.05]),
     ],
 )
-def test_it_moves_as_bodies_in_absolute_coordinates_do(name, efforts):
+def test_several_inputs_move_as_in_absolute_coordinates(name, efforts):
     closure, start = several(name)
     joint = closure.joint_names[0]
     applied = AppliedLoads({joint: JointSpring(0.2, 0.1, 0.02)}, {}, {})
@@ -134,7 +134,7 @@ def test_it_moves_as_bodies_in_absolute_coordinates_do(name, efforts):
 
 @pytest.mark.parametrize(('method', 'within'), [('rk4', 1e-7), ('gauss_legendre', 1e-11)])
 @pytest.mark.parametrize('name', ['five_bar', 'delta', 'ankle'])
-def test_without_losses_it_keeps_its_energy(name, method, within):
+def test_undamped_linkage_of_several_inputs_keeps_energy(name, method, within):
     closure, start = several(name)
     inputs = zip(closure.input_names, start, strict=True)
     springs = {joint: JointSpring(3.0, value) for joint, value in inputs}
@@ -153,7 +153,7 @@ def test_without_losses_it_keeps_its_energy(name, method, within):
 
 
 @pytest.mark.parametrize('restitution', [1.0, 0.4, 0.0])
-def test_an_impact_changes_the_momentum_of_the_stopped_input_alone(restitution):
+def test_stop_impact_changes_only_the_stopped_input_momentum(restitution):
     closure, start = several('delta')
     mechanics = Mechanics(closure, Loads())
     end = start[0] + 0.02
@@ -179,7 +179,7 @@ def test_an_impact_changes_the_momentum_of_the_stopped_input_alone(restitution):
         assert energies[1] < energies[0]
 
 
-def test_an_input_that_is_pushed_against_its_stop_stays_and_leaves_when_it_is_pulled():
+def test_pushed_input_rests_at_its_stop_until_pulled():
     closure, start = several('delta')
     mechanics = Mechanics(closure, Loads(GRAVITY))
     end = start[0] + 0.01
@@ -200,7 +200,7 @@ def test_an_input_that_is_pushed_against_its_stop_stays_and_leaves_when_it_is_pu
     assert state.rate[0] < -0.1, 'it leaves'
 
 
-def test_a_stop_lets_go_at_the_instant_at_which_it_would_pull():
+def test_stop_contact_ends_at_the_zero_of_its_force():
     # The push falls in time by a table, so that steps of any length let go at the same instant.
     closure, start = several('ankle')
     fall = JointLoad(over_time=((0.0, 0.5), (0.1, -0.5)))
@@ -216,7 +216,7 @@ def test_a_stop_lets_go_at_the_instant_at_which_it_would_pull():
     assert ends[0] == pytest.approx(ends[1], rel=1e-5)
 
 
-def test_a_stop_that_yields_gives_back_the_energy():
+def test_undamped_soft_stop_returns_the_energy():
     closure, start = several('ankle_motors')
     limits = Limits(-inf, start[0] + 0.02)
     hinges = dict(closure.linkage.hinges)
@@ -243,7 +243,7 @@ def test_a_stop_that_yields_gives_back_the_energy():
 
 
 @pytest.mark.parametrize('restitution', [0.0, 0.5])
-def test_at_a_toggle_it_is_held_as_by_a_stop(restitution):
+def test_five_bar_is_stopped_at_its_toggle(restitution):
     # Springs pull the cranks apart until the forearms are stretched.
     closure, start = several('five_bar')
     ends = zip(closure.input_names, (2.8, 0.3), strict=True)

@@ -40,7 +40,7 @@ def assert_quarters(errors, moved):
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_all_joints_off_at_once(name):
+def test_joint_offsets_shift_joints_to_first_order(name):
     closure = closed(name)
     reactions = Reactions(Mechanics(closure))
     rng = random.Random(f'shift of {name}')
@@ -58,7 +58,7 @@ def test_all_joints_off_at_once(name):
 
 
 @pytest.mark.parametrize('joint', range(4))
-def test_each_joint_of_a_four_bar(joint):
+def test_single_joint_offset_shifts_a_four_bar(joint):
     closure = closed('four_bar')
     reactions = Reactions(Mechanics(closure))
     (q,) = STATES['four_bar'][0]
@@ -88,7 +88,7 @@ STRETCHED = [
 
 
 @pytest.mark.parametrize(('name', 'link', 'pin', 'sign'), STRETCHED)
-def test_a_link_that_is_longer(name, link, pin, sign):
+def test_longer_link_shifts_joints_as_an_offset(name, link, pin, sign):
     linkage = weighed(name)
     closure = Closure(linkage)
     reactions = Reactions(Mechanics(closure))
@@ -112,7 +112,7 @@ def test_a_link_that_is_longer(name, link, pin, sign):
     assert_quarters(errors, np.abs(moved).max())
 
 
-def test_a_slider_moves_only_across():
+def test_slider_offset_counts_only_across_its_line():
     closure = closed('slider_crank')
     reactions = Reactions(Mechanics(closure))
     position = closure.position(1.0)
@@ -125,7 +125,7 @@ def test_a_slider_moves_only_across():
     assert max(map(abs, across)) > 1e-5
 
 
-def test_no_offset_no_shift():
+def test_zero_offsets_shift_no_joint():
     closure = closed('watt_1')
     reactions = Reactions(Mechanics(closure))
     assert reactions.joint_deflections(closure.position(1.0), [0j] * 7) == (0.0, 0.0, 0.0, 0.0)

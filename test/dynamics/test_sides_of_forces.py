@@ -119,7 +119,7 @@ def twice(function):
 
 
 @pytest.mark.parametrize(('linkage', 'name'), CASES)
-def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
+def test_published_pin_forces_balance_every_link(linkage, name):
     pins = {
         p for points in linkage.links.values() for p in points if len(carriers(linkage, p)) > 1
     }
@@ -189,7 +189,7 @@ def test_each_link_that_is_cut_free_obeys_newton(linkage, name):
 
 
 @pytest.mark.parametrize(('linkage', 'name'), CASES)
-def test_along_a_slider_and_about_a_pin_there_is_friction_alone(linkage, name):
+def test_slider_and_pin_friction_opposes_the_slip(linkage, name):
     # A joint resists: on the link that the wrench acts on, against its motion from the other.
     start = STATES[name][0]
     rates, still = [1.3, -0.8][: len(start)], [0.0] * len(start)

@@ -47,7 +47,7 @@ def run(mechanism, seconds, force, *, step=1e-3, rate=0.0, brake=0.0, motion=Non
 
 
 @pytest.mark.parametrize('method', EXACT)
-def test_the_motor_crosses_the_play_and_takes_the_crank_along(method):
+def test_motor_crosses_the_play_and_drives_the_crank(method):
     # The motor alone over half the play, p/2 = τ·t²/(2·J); then both as one.
     meets = sqrt(PLAY * MOTOR / TORQUE)
     rate = TORQUE / MOTOR * meets * MOTOR / (CRANK + MOTOR)
@@ -64,7 +64,7 @@ def test_the_motor_crosses_the_play_and_takes_the_crank_along(method):
 
 
 @pytest.mark.parametrize('restitution', [0.3, 0.7])
-def test_they_bounce_as_a_ball_on_a_table(restitution):
+def test_motor_bounces_on_the_crank_by_restitution(restitution):
     # The distance to the crank falls with a = τ/J. It bounces with e·r, e²·r, …: after
     # t₀·(1 + 2·e/(1 − e)) they stay together, with the momentum of the whole impulse.
     first = sqrt(PLAY * MOTOR / TORQUE)
@@ -87,7 +87,7 @@ def test_they_bounce_as_a_ball_on_a_table(restitution):
     assert PLAY / 2.0 - (state.motor.value - state.crank.value) == pytest.approx(gap, abs=1e-9)
 
 
-def test_a_meeting_loses_the_energy_of_the_relative_rate():
+def test_play_impact_loses_the_relative_kinetic_energy():
     mechanism = wheels(0.6)
     begin = mechanism.state_at(0.0, 0.0)
     begin = begin._replace(motor=begin.motor._replace(rate=3.0))
@@ -98,7 +98,7 @@ def test_a_meeting_loses_the_energy_of_the_relative_rate():
     assert end.motor.rate - end.crank.rate == pytest.approx(-0.6 * 3.0, rel=1e-12)
 
 
-def test_a_torque_that_turns_carries_the_motor_through_the_play_to_the_other_side():
+def test_reversed_torque_moves_the_motor_across_the_play():
     mechanism = wheels()
     driven = run(mechanism, 0.2, TORQUE)[-1]
     assert driven.side == 1
@@ -116,7 +116,7 @@ def test_a_torque_that_turns_carries_the_motor_through_the_play_to_the_other_sid
     assert last.crank.rate == pytest.approx(momentum / (CRANK + MOTOR), rel=1e-12)
 
 
-def test_a_crank_that_is_drawn_away_leaves_a_braked_motor_and_hangs_at_the_other_end():
+def test_weighted_crank_hangs_on_a_braked_motor():
     # A weight of 0.5 N·m draws it backward; the motor's brake holds 2 N·m.
     states = run(wheels(slope=0.5), 0.3, 0.0, brake=2.0)
     falls = sqrt(PLAY * CRANK / 0.5)
@@ -130,7 +130,7 @@ def test_a_crank_that_is_drawn_away_leaves_a_braked_motor_and_hangs_at_the_other
     assert states[-1].motor.value - states[-1].crank.value == pytest.approx(PLAY / 2.0)
 
 
-def test_friction_holds_a_crank_until_the_motor_comes():
+def test_friction_holds_the_crank_until_the_motor_meets():
     states = run(wheels(friction=0.3), 0.2, TORQUE)
     assert states[40].crank.value == 0.0
     meets = sqrt(PLAY * MOTOR / TORQUE)
@@ -140,7 +140,7 @@ def test_friction_holds_a_crank_until_the_motor_comes():
     assert states[-1].crank.value == pytest.approx(expected, rel=1e-10)
 
 
-def test_bounces_without_number_come_to_their_end():
+def test_infinite_play_bounces_keep_the_momentum():
     for restitution in (0.9, 0.99, 1.0):
         states = run(wheels(restitution), 3.0, TORQUE, step=0.01)
         momentum = MOTOR * states[-1].motor.rate + CRANK * states[-1].crank.rate
@@ -174,7 +174,7 @@ AT_A_STOP = {
 
 @pytest.mark.parametrize('name', AT_A_STOP)
 @pytest.mark.parametrize('end', [1.0, -1.0])
-def test_a_stop_bears_the_crank_and_not_the_motor(name, end):
+def test_stop_holds_the_crank_but_not_the_motor(name, end):
     of_stop, of_play, side, timeline = AT_A_STOP[name]
     mechanism = wheels(of_play)
     stopped = {'stops': (-1.0, 1.0), 'restitution': of_stop}
@@ -191,7 +191,7 @@ def test_a_stop_bears_the_crank_and_not_the_motor(name, end):
         assert found == pytest.approx(tuple(rates), abs=1e-9), seconds
 
 
-def test_a_motor_meets_a_crank_that_is_held_at_its_stop():
+def test_motor_bounces_on_a_crank_at_its_stop():
     crank = SingleDofMechanism(
         lambda _: Terms(CRANK, 0.0, -5.0, 0.0, 0.0), METHODS['rk4'].step, (-1.0, 0.0)
     )
@@ -261,7 +261,7 @@ def by_scipy(mechanics, restitution, times, force):
 @pytest.mark.parametrize(
     ('restitution', 'method'), [(0.0, 'rk4'), (0.0, 'gauss_legendre'), (0.5, 'rk4')]
 )
-def test_a_four_bar_behind_play_moves_as_scipy_says(restitution, method):
+def test_four_bar_behind_play_follows_scipy(restitution, method):
     closure = Closure(shipped('four_bar'))
     mechanics = Mechanics(closure, Loads((0.0, -9.81), drive_inertia=0.02))
     crank = SingleDofMechanism(mechanics.motion_equation, METHODS[method].step)
@@ -309,7 +309,7 @@ def read(drive, commands=(), ticks=200, loads=''):
     return found
 
 
-def test_a_scene_has_play_under_torque():
+def test_scene_with_play_delays_the_crank():
     # 0.4 N·m on the motor for a tick of 2 ms, then none: it drifts, and takes the crank along.
     drive = f'play: {{width: {PLAY}, inertia: {MOTOR}}}, timeout: 0.002'
     found = read(drive, [(0, TORQUE)])
@@ -325,7 +325,7 @@ def test_a_scene_has_play_under_torque():
             assert motor - crank == pytest.approx(PLAY / 2.0, rel=1e-9)
 
 
-def test_a_motor_behind_play_runs_up_alone_and_slows_down_as_it_meets():
+def test_motor_within_its_play_accelerates_without_the_crank():
     # k = 0.1, R = 1: alone its time constant is J·R/(k·N)² = 25 ms, and it ends at V/(k·N).
     motor = 'motor: {torque_constant: 0.1, resistance: 1, ratio: 2, command: voltage}'
     drive = f'{motor}, play: {{width: 10, inertia: 0.001}}, timeout: 10'
@@ -347,13 +347,13 @@ def test_a_motor_behind_play_runs_up_alone_and_slows_down_as_it_meets():
         ('{width: 0.01, inertia: 1, restitution: 2}', 'restitution: 2 is out of bounds'),
     ],
 )
-def test_play_that_is_none_is_refused(play, line):
+def test_invalid_play_is_refused(play, line):
     with pytest.raises(FileError, match=line):
         read(f'play: {play}')
 
 
 @pytest.mark.parametrize('counts', [0, 100])
-def test_the_motor_is_published_beside_the_load(counts):
+def test_motor_joint_state_is_published_behind_play(counts):
     drive = f'play: {{width: 1, inertia: 0.1}}, rate: 2, motor_encoder: {{counts: {counts}}}'
     motor = 'motor: {torque_constant: 0.1, ratio: 50}'
     scene = SCENE.replace('DRIVE', f'{drive}, {motor}').replace('LOADS', '')

@@ -75,7 +75,7 @@ DRIVES = {
 
 @pytest.mark.parametrize('drive', DRIVES)
 @pytest.mark.parametrize('name', TIMELINES)
-def test_a_wrench_moves_a_crank_from_the_time_at_which_it_is_taken(name, drive):
+def test_wrench_message_moves_a_crank_until_max_age(name, drive):
     messages, pieces = TIMELINES[name]
     assert sum(duration for duration, _ in pieces) == 100
     pipeline = pipeline_of(
@@ -90,7 +90,7 @@ def test_a_wrench_moves_a_crank_from_the_time_at_which_it_is_taken(name, drive):
     assert crank_after(pipeline, messages, 100) == pytest.approx((q, w), abs=1e-11)
 
 
-def test_a_wrench_without_a_point_acts_at_the_origin_of_the_link():
+def test_wrench_without_a_point_acts_at_link_origin():
     # There the crank has its pivot: the force does nothing.
     pipeline = pipeline_of('drive: {torque: {rate: 1}}\nloads: {wrenches: {crank: {}}}', PENDULUM)
     moved = crank_after(pipeline, [(0, (50.0, 30.0, 0.0))], 80)
@@ -173,7 +173,7 @@ def held(closure, frame):
 
 @pytest.mark.parametrize('frame', ['ground', 'link'])
 @pytest.mark.parametrize('name', STATES)
-def test_the_effort_is_the_work_over_the_ways_of_points_and_links(name, frame):
+def test_wrench_effort_equals_its_virtual_work(name, frame):
     closure = closed(name)
     mechanics, wrenches = held(closure, frame)
     linkage, bare = closure.linkage, Mechanics(closure)
@@ -205,7 +205,7 @@ def test_the_effort_is_the_work_over_the_ways_of_points_and_links(name, frame):
 
 @pytest.mark.parametrize('frame', ['ground', 'link'])
 @pytest.mark.parametrize('name', STATES)
-def test_forces_in_pins_balance_it_on_every_link(name, frame):
+def test_pin_forces_balance_the_wrench_on_every_link(name, frame):
     # The equations of Newton and Euler of each link, which know nothing of levers.
     closure = closed(name)
     mechanics, _ = held(closure, frame)
@@ -220,14 +220,14 @@ def test_forces_in_pins_balance_it_on_every_link(name, frame):
 
 
 @pytest.mark.parametrize('name', [name for name in STATES if name != 'five_bar'])
-def test_compiled_terms_equal_plain_ones_to_the_bit(name):
+def test_compiled_wrench_terms_equal_the_interpreted_ones(name):
     closure = closed(name)
     mechanics, _ = held(closure, 'link')
     for (q,) in STATES[name]:
         assert mechanics.motion_equation(q) == mechanics.motion_terms(closure.position(q))
 
 
-def test_the_effort_of_a_crank_that_is_held_contains_a_wrench_until_it_is_too_old():
+def test_holding_effort_includes_a_wrench_until_max_age():
     # At 0.3 rad 2 N at 0.5 m across the crank, and 0.5 N·m: the drive holds the opposite.
     pipeline = pipeline_of(
         'drive: {constant_rate: {start: 0.3, rate: 0}}\neffects: {effort: {}}\n'
@@ -253,7 +253,7 @@ MESSAGES = {
 
 
 @pytest.mark.parametrize('name', MESSAGES)
-def test_of_a_message_three_numbers_count(name):
+def test_planar_wrench_uses_three_numbers_of_the_message(name):
     given, expected = MESSAGES[name]
     numbers = read_wrench(wrench_stamped(1.0, 2.0, 3.0, **given))
     # Of force.x, y, z and torque.x, y, z.
@@ -273,7 +273,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('name', BAD)
-def test_a_message_that_is_rejected_changes_nothing(name):
+def test_rejected_wrench_message_changes_nothing(name):
     message, reason = BAD[name]
     scene = 'drive: {torque: {}}\nloads: {wrenches: {crank: {}}}\n'
     one, other = pipeline_of(scene, PENDULUM), pipeline_of(scene, PENDULUM)
@@ -305,14 +305,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('wrenches', REFUSED)
-def test_a_wrench_that_makes_no_sense_is_refused_in_a_line(wrenches):
+def test_invalid_wrench_is_refused_in_one_line(wrenches):
     with pytest.raises(FileError) as refused:
         pipeline_of(f'drive: {{torque: {{}}}}\nloads: {{wrenches: {wrenches}}}\n', PENDULUM)
     assert REFUSED[wrenches] in str(refused.value)
     assert '\n' not in str(refused.value)
 
 
-def test_two_wrenches_do_not_share_a_topic():
+def test_two_wrenches_on_one_topic_are_refused():
     with pytest.raises(FileError) as refused:
         pipeline_of(
             'drive: {torque: {}}\n'
@@ -343,14 +343,14 @@ def together(tmp_path):
     return build
 
 
-def test_linkages_with_the_same_loads_have_topics_of_their_own(together):
+def test_wrench_topics_of_several_linkages_carry_their_names(together):
     assert [wrench.topic for wrench in together(2).wrenches] == [
         *('wrenches/bar0_crank', 'wrenches/bar0_coupler', 'wrenches/bar0_rocker'),
         *('wrenches/bar1_crank', 'wrenches/bar1_coupler', 'wrenches/bar1_rocker'),
     ]
 
 
-def test_there_are_32_wrenches_at_most(together):
+def test_scene_with_33_wrenches_is_refused(together):
     with pytest.raises(FileError) as refused:
         together(11)
     assert 'loads.wrenches.rocker.topic: is one of 33, more than 32; leave some' in str(
@@ -358,7 +358,7 @@ def test_there_are_32_wrenches_at_most(together):
     )
 
 
-def test_a_name_that_passes_is_one_of_ros():
+def test_accepted_wrench_topics_are_valid_ros_names():
     validate = pytest.importorskip('rclpy.validate_topic_name').validate_topic_name
     for name in ('push', 'a/b_2/C', '/push', '~/push', '_a', 'a__b', 'wrenches/coupler'):
         pipeline = pipeline_of(

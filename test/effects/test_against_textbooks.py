@@ -79,7 +79,7 @@ def doubles(values):
 
 
 @pytest.mark.parametrize('name', TEXTBOOKS)
-def test_rates_and_accelerations_are_derivatives_of_the_textbooks_pose(name):
+def test_scene_publishes_derivatives_of_the_textbook_pose(name):
     effects = 'effects: {velocity: {}, acceleration: {}}'
     built = pipeline(name, f'publish_input: false\n{DRIVE}{effects}')
     solved = TEXTBOOKS[name]
@@ -102,7 +102,7 @@ def test_rates_and_accelerations_are_derivatives_of_the_textbooks_pose(name):
         assert list(point.accelerations) == pytest.approx(pulls, rel=1e-11, abs=1e-10)
 
 
-def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
+def test_friction_effort_equals_the_dissipated_power():
     # What the drive gives for it times the crank's rate is Σ (c·v² + T·|v|).
     rubbing = {
         'O2': (0.01, 0.05),
@@ -125,7 +125,7 @@ def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
 
 
 @pytest.mark.parametrize('link', ['coupler', 'rocker'])
-def test_a_link_that_stretches_makes_the_four_bar_of_the_longer_link(link):
+def test_stretched_link_gives_the_four_bar_with_longer_link(link):
     # The tension is that of the balance by hand, the pose that of the textbook with another
     # length. The effect is right to first order: its error falls with the square of the stretch.
     drawn = shipped('four_bar')

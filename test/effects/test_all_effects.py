@@ -68,14 +68,14 @@ def run(text, ticks=200, first=0):
 
 
 @pytest.mark.parametrize('effect', EFFECTS)
-def test_the_same_seed_gives_the_same_bytes_and_another_one_others_where_it_draws(effect):
+def test_seed_determines_the_bytes_of_every_effect(effect):
     found = run(scene_text(effect))
     assert run(scene_text(effect)) == found
     assert (run(scene_text(effect, seed=2)) == found) == (effect not in RANDOM)
 
 
 @pytest.mark.parametrize('effect', sorted(RANDOM - {'tolerance'}))
-def test_it_draws_as_often_whatever_a_reading_holds(effect, monkeypatch):
+def test_effects_draw_equally_often_for_any_reading(effect, monkeypatch):
     def states(rates):
         drawn = {}
         plain = Context.generator
@@ -98,7 +98,7 @@ def test_it_draws_as_often_whatever_a_reading_holds(effect, monkeypatch):
 
 
 @pytest.mark.parametrize('effect', EFFECTS)
-def test_it_leaves_messages_out_only_where_it_says_so(effect):
+def test_only_declared_effects_suppress_messages(effect):
     silent = [tick for tick, (message, *_) in enumerate(run(scene_text(effect))) if not message]
     assert not silent or effect_class(effect).suppresses_ticks
     pipeline = pipeline_of(scene_text(effect).replace(MOVES, 'publish_input: true\n'), FOUR_BAR)
@@ -107,7 +107,7 @@ def test_it_leaves_messages_out_only_where_it_says_so(effect):
 
 
 @pytest.mark.parametrize('effect', EFFECTS)
-def test_a_run_from_its_middle_on_comes_to_the_same_where_it_says_so(effect):
+def test_recoverable_effects_converge_after_a_late_start(effect):
     text = scene_text(effect).replace(MOVES, 'publish_input: true\n')
     write = JointStateWriter(['crank_joint']).write
 
@@ -126,12 +126,12 @@ def test_a_run_from_its_middle_on_comes_to_the_same_where_it_says_so(effect):
 
 
 @pytest.mark.parametrize('effects', [*combinations(EFFECTS, 2)], ids='-'.join)
-def test_each_works_beside_each_other(effects):
+def test_effects_work_in_pairs(effects):
     assert any(message for message, *_ in run(scene_text(*effects), 5))
 
 
 @pytest.mark.parametrize('effect', NEW_FIELDS)
-def test_the_rest_of_a_motion_is_passed_on(effect):
+def test_mechanism_effects_change_only_their_own_fields(effect):
     assert issubclass(effect_class(effect), MechanismEffect)
     within = context(shipped('four_bar'))
     needs = dict.fromkeys(effect_class(effect).needs, ())
@@ -147,7 +147,7 @@ def test_the_rest_of_a_motion_is_passed_on(effect):
 
 
 @pytest.mark.parametrize('effect', READ_FIELDS)
-def test_the_rest_of_a_reading_is_passed_on(effect):
+def test_sensor_effects_change_only_their_own_fields(effect):
     assert issubclass(effect_class(effect), SensorEffect)
     given = scene_of(scene_text(effect), FOUR_BAR).linkages[0].effects[effect]
     sensor = given.sensor(sensor_context())
@@ -159,7 +159,7 @@ def test_the_rest_of_a_reading_is_passed_on(effect):
         assert all(len(getattr(found, n)) == len(getattr(before, n)) for n in rest)
 
 
-def test_at_a_toggle_no_mechanism_effect_has_anything_to_say():
+def test_mechanism_effects_add_nothing_at_a_toggle():
     within = context(linkage_of(SINGULAR))
     yielding = {'clearance': ({'A': 1e-5},), 'compliance': ({'coupler': 1e4},)}
     motion = moved(within, (0.0, 1.0, 0.0), {'effort': (), 'pin_forces': (), **yielding})

@@ -49,12 +49,12 @@ def followed(stage, motor):
     return [stage(crank(angle)).angles[0] for angle in motor]
 
 
-def test_within_the_play_the_crank_is_still_to_the_last_bit():
+def test_crank_stands_still_within_the_play():
     motor = [1.0 + 0.1 * sin(0.1 * i) for i in range(1000)]
     assert set(followed(stage(0.2000001), motor)) == {1.0}
 
 
-def test_a_timeline_of_rates_and_accelerations():
+def test_backlash_passes_rates_only_while_the_motor_pushes():
     held = stage(0.2)
     timeline = [
         # motor: place, rate, acceleration → crank
@@ -88,7 +88,7 @@ steps = st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=30)
 
 
 @given(steps, st.floats(0.0, 2.0))
-def test_it_follows_the_path_and_not_the_clock(motor, play):
+def test_backlash_is_independent_of_the_tick_rate(motor, play):
     # A play operator is rate-independent: places in between, on the way, change nothing.
     finer = [motor[0]]
     for place in motor[1:]:
@@ -98,7 +98,7 @@ def test_it_follows_the_path_and_not_the_clock(motor, play):
 
 
 @given(steps)
-def test_two_plays_one_after_the_other_are_one_of_their_sum(motor):
+def test_two_plays_in_series_equal_their_sum(motor):
     first, second = stage(0.3, CYLINDER), stage(0.5, CYLINDER)
     behind = followed(second, followed(first, motor))
     assert behind == pytest.approx(followed(stage(0.8, CYLINDER), motor), abs=1e-13)
@@ -108,7 +108,7 @@ numbers = st.floats(-1e6, 1e6)
 
 
 @given(st.lists(st.tuples(numbers, numbers, numbers, st.integers(0, 10**9)), min_size=1))
-def test_without_play_the_crank_is_the_motor(motor):
+def test_zero_play_leaves_the_crank_unchanged(motor):
     tight = stage(0.0, CYLINDER)
     for place, rate, acceleration, age in motor:
         state = crank(place, rate, acceleration, age)
@@ -116,7 +116,7 @@ def test_without_play_the_crank_is_the_motor(motor):
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=30))
-def test_a_motor_that_comes_wrapped_is_followed_as_one_that_does_not(turned):
+def test_backlash_follows_wrapped_motor_angles(turned):
     place, motor = 0.0, []
     for step in turned:
         place += step
@@ -136,7 +136,7 @@ def test_each_input_has_its_own_play():
     assert found[1:] == ((3.0, 0.0), (5.0, 0.0), 8)
 
 
-def test_a_scene_publishes_the_crank_behind_its_motor():
+def test_scene_publishes_the_crank_behind_the_backlash():
     pipeline = pipeline_of(
         'drive: {sine: {mean: 1, amplitude: 0.5, frequency: 1}}\n'
         'effects: {backlash: {play: 0.2}, velocity: {}}'

@@ -25,13 +25,13 @@ from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE
         ({'rocker_joint': -3.0, 'coupler_joint': 0.5}, (1.5, -1.0)),
     ],
 )
-def test_it_is_added_to_the_position_of_the_joint_that_it_names(biases, expected):
+def test_bias_shifts_only_the_named_joint_position(biases, expected):
     sensor = BiasEffect(biases).sensor(context())
     for ms in range(3):
         assert sensor(BEGIN + ms * MS, reading(BEGIN, 1.0, 2.0)).joints == expected
 
 
-def test_that_of_a_slide_is_in_metres():
+def test_slide_bias_is_in_metres():
     sensor = BiasEffect({'rod_slide': 0.001}).sensor(context(SLIDE))
     assert sensor(BEGIN, reading(BEGIN, 1.0, 0.125)).joints == (1.0, 0.126)
 
@@ -43,7 +43,7 @@ def test_a_scene_publishes_biased_joints_and_true_rates():
         assert off.rates == i.rates
 
 
-def test_the_zero_is_drawn_once_from_the_seed():
+def test_bias_deviation_is_drawn_once_per_seed():
     # Over seeds it spreads by its deviation; in a run it stays.
     drawn = []
     for seed in range(2000):
@@ -61,7 +61,7 @@ def test_the_zero_is_drawn_once_from_the_seed():
     ('kind', 'field', 'expected'),
     [('rates', 'rates', (3.0, 4.5)), ('efforts', 'efforts', (5.0, 6.5))],
 )
-def test_rates_and_efforts_have_a_bias_of_their_own(kind, field, expected):
+def test_rates_and_efforts_have_their_own_bias(kind, field, expected):
     sensor = BiasEffect(**{kind: {'rocker_joint': 0.5}}).sensor(context())
     rest = {'rates': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     found = sensor(BEGIN, reading(BEGIN, 1.0, 2.0, **rest))
@@ -70,7 +70,7 @@ def test_rates_and_efforts_have_a_bias_of_their_own(kind, field, expected):
 
 
 @given(st.floats(-20.0, 20.0), st.floats(-9.0, 9.0), st.floats(-0.1, 0.1), st.floats(-4.0, 4.0))
-def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, scale, phase):
+def test_scale_and_eccentricity_change_angle_and_rate_consistently(angle, rate, scale, phase):
     # The rate that is read is the slope of what is read, by mpmath.
     parameters = BiasEffect(
         scales={'rocker_joint': scale},
@@ -96,6 +96,6 @@ def test_scale_and_disc_change_the_rate_as_they_change_the_angle(angle, rate, sc
         (EncoderEffect, {'joints': {'rod_slide': JointEncoder(8, multi_turn=True)}}, 'a slide'),
     ],
 )
-def test_what_a_slide_cannot_have_is_refused(sensor, parameters, line):
+def test_rotary_sensor_errors_on_a_slide_are_refused(sensor, parameters, line):
     with pytest.raises(DefinitionError, match=f'rod_slide.*{line}'):
         sensor(**parameters).sensor(context(SLIDE))

@@ -35,7 +35,7 @@ def shift(within, motion, pins):
     ids=['A', 'B', 'O4', 'O2', 'all'],
 )
 @pytest.mark.parametrize('motion', MOTIONS)
-def test_the_exact_model_differs_by_the_square_of_the_play(motion, plays):
+def test_clearance_error_falls_with_the_square_of_play(motion, plays):
     # Exact: pose and forces of the leaning linkage, in balance with each other.
     by_hand = FourBar(FOUR_BAR, motion, GRAVITY)
     _, *ideal = by_hand.angles(0)
@@ -50,7 +50,7 @@ def test_the_exact_model_differs_by_the_square_of_the_play(motion, plays):
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_a_link_that_hangs_in_its_pins_hangs_lower():
+def test_hanging_link_sinks_by_its_pin_clearance():
     # A swing, its ropes straight down: with play at both ends of the seat that comes down, and
     # nothing turns. With play at one end only it tilts, by that over its length.
     swing = linkage_of("""
@@ -76,7 +76,7 @@ masses:
         assert rope == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_slide_moves_as_a_pin_of_its_rod_leans():
+def test_pin_clearance_moves_the_piston_slide():
     # The piston's pin lies where a circle about A meets its line: in closed form, with A beside
     # where it was by the play, against the force.
     within, motion = context(SLIDER_CRANK), (1.0, 20.0, 0.0)
@@ -99,7 +99,7 @@ def test_a_slide_moves_as_a_pin_of_its_rod_leans():
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
-def test_a_pin_in_a_slot_has_its_play_too():
+def test_slider_pin_clearance_moves_the_piston_slide():
     # The block has no mass, so that its pin carries what the cylinder's wall presses it with.
     within, motion, play = context(SLIDER_CRANK), (1.0, 20.0, 0.0), 1e-6
     index = within.reactions.names.index('B')
@@ -114,12 +114,12 @@ def test_a_pin_in_a_slot_has_its_play_too():
     assert slid == pytest.approx(exact, rel=1e-4)
 
 
-def test_without_a_force_nothing_leans():
+def test_clearance_without_force_shifts_nothing():
     weightless = context(FOUR_BAR, gravity=(0.0, 0.0))
     assert shift(weightless, (1.0, 0.0, 0.0), dict.fromkeys(PINS, 1e-5)) == (0.0, 0.0)
 
 
-def test_a_force_that_is_rounding_leans_nothing():
+def test_clearance_ignores_forces_at_rounding_level():
     # Forces of 1e-13 of the largest have no direction that means anything.
     within = context(FOUR_BAR)
     before = moved(within, (1.0, 0.0, 0.0), {'pin_forces': ()})
@@ -134,7 +134,7 @@ def test_a_force_that_is_rounding_leans_nothing():
     assert stage(before).deflection != (0.0, 0.0)
 
 
-def test_of_a_pin_of_three_links_two_lean_against_the_third():
+def test_three_link_pin_has_clearance_in_two_holes():
     # Rocker and lever have the pin D of the ground, each its own hole.
     pair = linkage_of("""
 links:
@@ -167,7 +167,7 @@ masses:
     assert shift(within, motion, {'D': play}) == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_slider_is_refused():
+def test_clearance_of_a_slider_is_refused():
     line = (
         r"^effects\.clearance\.pins\.cylinder: 'cylinder' is a slider, and clearance is a "
         'property of pins; name pins: A, B, O2$'
@@ -176,7 +176,7 @@ def test_a_slider_is_refused():
         ClearanceEffect({'cylinder': 1e-5}).stage(context(SLIDER_CRANK))
 
 
-def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
+def test_scene_publishes_joints_shifted_by_clearance():
     def tick(effects):
         scene = b'drive: {constant_rate: {rate: -6, start: 2.5}}\n' + effects
         built = pipeline_of(scene, (LINKAGES / 'four_bar.yaml').read_bytes())

@@ -68,7 +68,7 @@ def lengthened(of, link, pin, stretch):
 
 @pytest.mark.parametrize('link', ['coupler', 'rocker'])
 @pytest.mark.parametrize('motion', MOTIONS)
-def test_the_joints_are_those_of_the_longer_link_and_the_error_falls_with_the_square(motion, link):
+def test_compliance_error_falls_with_the_square_of_stretch(motion, link):
     within, tension = context(FOUR_BAR), tensions_by_hand(motion)[link]
     rigid = within.closure.position(motion[0]).joints
     errors = []
@@ -108,7 +108,7 @@ def pulled(within, motion, link, pins):
     ],
     ids=['crank', 'rod of a slider', 'six-bar', 'first of a shared pin', 'last of a shared pin'],
 )
-def test_any_bar_between_two_pins_may_stretch(of, link, pins):
+def test_compliance_stretches_any_bar_between_two_pins(of, link, pins):
     within, motion, stretch = context(of), (1.0, 5.0, 3.0), 1e-6
     tension = pulled(within, motion, link, pins)
     longer = Closure(lengthened(of, link, pins[1], stretch)).position(motion[0]).joints
@@ -120,7 +120,7 @@ def test_any_bar_between_two_pins_may_stretch(of, link, pins):
     )
 
 
-def test_two_links_stretch_as_each_of_them_does():
+def test_stretches_of_two_links_add_up():
     within, motion = context(FOUR_BAR), MOTIONS[2]
     one, other = ({'coupler': 2e4}, {'rocker': 1e4})
     alone = [shift(within, motion, links) for links in (one, other)]
@@ -136,12 +136,12 @@ def test_two_links_stretch_as_each_of_them_does():
         (shipped('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', so it is not"),
     ],
 )
-def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
+def test_compliance_of_other_links_is_refused(of, link, reason):
     with pytest.raises(DefinitionError, match=f'^effects.compliance.links.{link}: .*{reason}'):
         ComplianceEffect({link: 1e4}).stage(context(of))
 
 
-def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():
+def test_scene_with_compliance_publishes_only_shifted_joints():
     def tick(effects):
         scene = b'drive: {constant_rate: {rate: -6, start: 2.5}}\n' + effects
         return pipeline_of(scene, (LINKAGES / 'four_bar.yaml').read_bytes()).tick(10**9)

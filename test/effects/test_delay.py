@@ -41,9 +41,7 @@ def shown(found):
     st.sampled_from(('interpolated', 'sampled')),
     st.sampled_from(('measured', 'arrival')),
 )
-def test_a_motion_at_a_constant_rate_is_late_by_exactly_the_delay(
-    a, b, ns, gaps, with_rates, between, stamp
-):
+def test_delay_is_exact_for_a_constant_rate(a, b, ns, gaps, with_rates, between, stamp):
     def value(time):
         return Fraction(a) + Fraction(b) * Fraction(time - BEGIN, 10**9)
 
@@ -67,14 +65,14 @@ def test_a_motion_at_a_constant_rate_is_late_by_exactly_the_delay(
 
 
 @pytest.mark.parametrize('ns', [15, 63, 1000, 1_000_015])
-def test_seconds_as_written_are_the_nearest_nanosecond(ns):
+def test_delay_rounds_seconds_to_the_nearest_nanosecond(ns):
     # 15e-9·1e9 is 14.999999999999998 in doubles.
     sensor = delayed(float(f'{ns}e-9'), stamp='measured')
     sensor(BEGIN, reading(BEGIN, 1.0))
     assert sensor(BEGIN + ns + 5, reading(BEGIN + ns + 5, 2.0)).stamp == BEGIN + 5
 
 
-def test_at_a_toggle_there_are_no_rates_a_delay_later():
+def test_missing_rates_at_a_toggle_arrive_delayed():
     sensor = delayed(0.001, between='sampled')
     found = []
     for ms in range(4):
@@ -92,7 +90,7 @@ def test_at_a_toggle_there_are_no_rates_a_delay_later():
         (0.0025, [None, None, None, 0.0, None, None, 3.0]),
     ],
 )
-def test_silence_takes_as_long_as_a_reading(between, seconds, expected):
+def test_silence_is_delayed_like_a_reading(between, seconds, expected):
     sensor = delayed(seconds, between=between)
     found = []
     for ms in range(7):
@@ -108,9 +106,7 @@ def test_silence_takes_as_long_as_a_reading(between, seconds, expected):
     lost=st.lists(st.booleans(), min_size=200, max_size=200),
     ns=st.integers(0, 20 * MS),
 )
-def test_behind_a_silent_sensor_each_reading_arrives_once_however_the_ticks_fall(
-    between, gaps, lost, ns
-):
+def test_delayed_readings_of_a_silent_sensor_arrive_once(between, gaps, lost, ns):
     # A silence first, so that it is a line of messages from the beginning.
     sensor, now, sent, heard = delayed(ns * 1e-9, between=between), BEGIN, [], []
     assert sensor(now, None) is None
@@ -130,7 +126,7 @@ def test_behind_a_silent_sensor_each_reading_arrives_once_however_the_ticks_fall
 
 
 @pytest.mark.parametrize('between', ['interpolated', 'sampled'])
-def test_while_time_stands_the_newest_reading_counts(between):
+def test_delay_uses_the_newest_reading_of_an_instant(between):
     sensor = delayed(0.001, between=between)
     times = [0, 0, 0, 1, 1, 2, 2]
     found = [
@@ -141,7 +137,7 @@ def test_while_time_stands_the_newest_reading_counts(between):
 
 
 @pytest.mark.parametrize('between', ['interpolated', 'sampled'])
-def test_no_more_is_kept_than_the_delay_takes(between):
+def test_delay_history_is_bounded_by_the_delay(between):
     sensor = delayed(0.0205, between=between)
     for index in range(20_000):
         now = BEGIN + index * MS
@@ -149,7 +145,7 @@ def test_no_more_is_kept_than_the_delay_takes(between):
         assert len(sensor._history) <= 23
 
 
-def test_a_scene_is_late_by_the_delay():
+def test_scene_publishes_readings_late_by_the_delay():
     ideal = published('')
     for between in ('interpolated', 'sampled'):
         late = published(f'delay: {{seconds: 0.007, between: {between}, stamp: measured}}')
@@ -157,7 +153,7 @@ def test_a_scene_is_late_by_the_delay():
         assert late[7:] == ideal[:-7]
 
 
-def test_between_ticks_a_scene_is_where_the_crank_then_was():
+def test_delay_between_ticks_interpolates_the_crank_motion():
     # Of this motion the third derivatives are below 2.3e3 rad/s³, the fourth below 3.1e4 rad/s⁴.
     for number, found in enumerate(published('delay: {seconds: 0.0005}')[1:], 1):
         position = ANGLES.position(0.5 + 0.01 * (number - 0.5))
@@ -195,7 +191,7 @@ def cubic(coefficients):
 
 # At rest; one that turns back at 33 ms; a cubic.
 @pytest.mark.parametrize('coefficients', [(1, 0, 0, 0), (1, 2, -30, 0), (1, -2, 10, 50)])
-def test_between_readings_with_rates_is_the_cubic_itself(coefficients):
+def test_interpolation_with_rates_reproduces_a_cubic(coefficients):
     signal = cubic(coefficients)
     # At 10 ms the way is more than the cubic part, as it is of a motion that ticks resolve.
     history = remembered(signal, range(BEGIN, BEGIN + 100 * MS, 10 * MS))
@@ -214,7 +210,7 @@ def test_between_readings_with_rates_is_the_cubic_itself(coefficients):
         pytest.param(False, lambda h: h**2 / 8, id='without'),
     ],
 )
-def test_the_error_is_what_it_says_and_no_less(rates, law):
+def test_interpolation_error_equals_the_documented_bound(rates, law):
     # All derivatives of sin are at most 1, and at its top the even ones are.
     def signal(time):
         t = (time - BEGIN) * 1e-9
@@ -232,7 +228,7 @@ def test_the_error_is_what_it_says_and_no_less(rates, law):
 @given(
     st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-1e300, 1e300), st.floats(-10.0, 10.0)
 )
-def test_a_rate_that_does_not_fit_the_values_is_not_believed(first, last, absurd, rate):
+def test_interpolation_ignores_rates_inconsistent_with_the_values(first, last, absurd, rate):
     # As next to a toggle, where one tick's rate may be any number. What it makes of a tick is more
     # than 5 ways and 3 times what the other rate makes: then 2·|c| is more than it may be.
     assume(abs(absurd) > 5.01 * abs(last - first) + 3.01 * 0.001 * abs(rate))
@@ -254,14 +250,14 @@ def test_a_rate_that_does_not_fit_the_values_is_not_believed(first, last, absurd
         pytest.param(-0.01, 0.5, id='less than fits by more'),
     ],
 )
-def test_where_belief_ends(way, expected):
+def test_interpolation_drops_rates_beyond_the_threshold(way, expected):
     history = History(10**10)
     history.add(BEGIN, reading(BEGIN, 0.0, rates=(way,)))
     history.add(BEGIN + 1000 * MS, reading(BEGIN, 1.0, rates=(1.0,)))
     assert history.interpolate(BEGIN + 500 * MS).joints == pytest.approx((expected,))
 
 
-def test_what_one_of_the_two_does_not_have_is_left_out():
+def test_interpolation_omits_fields_missing_in_one_reading():
     history = History(10**9)
     history.add(BEGIN, reading(BEGIN, 1.0, rates=(9.0,), efforts=(2.0,)))
     history.add(BEGIN + 4 * MS, reading(BEGIN + 4 * MS, 3.0, efforts=(4.0,)))
@@ -270,7 +266,7 @@ def test_what_one_of_the_two_does_not_have_is_left_out():
     assert history.interpolate(BEGIN) == reading(BEGIN, 1.0, rates=(9.0,), efforts=(2.0,))
 
 
-def test_outside_of_what_was_read_nothing_is_invented():
+def test_history_extrapolates_nothing_outside_its_readings():
     history = remembered(cubic((1.0, 2.0, 3.0, 4.0)), (BEGIN, BEGIN + MS))
     first, last = (cubic((1.0, 2.0, 3.0, 4.0))(time) for time in (BEGIN, BEGIN + MS))
     for look in (history.interpolate, partial(history.newest_reading, since=-1)):
@@ -280,7 +276,7 @@ def test_outside_of_what_was_read_nothing_is_invented():
     assert history.newest_reading(BEGIN + MS - 1, -1) == first
 
 
-def test_what_came_after_a_time_is_known_with_its_own():
+def test_history_lists_readings_after_a_time():
     history = History(10**9)
     read = [(BEGIN + ms * MS, reading(BEGIN + ms * MS, float(ms))) for ms in range(4)]
     for now, one in read:
@@ -290,7 +286,7 @@ def test_what_came_after_a_time_is_known_with_its_own():
 
 
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=50), st.integers(0, 40))
-def test_it_reaches_back_over_its_span_and_forgets_the_rest(gaps, span):
+def test_history_keeps_only_its_span(gaps, span):
     history, all_of_them, now = History(span), {}, 0
     for index, gap in enumerate(gaps):
         now += gap
@@ -307,7 +303,7 @@ def test_it_reaches_back_over_its_span_and_forgets_the_rest(gaps, span):
         assert len(history) <= len(within) + 1
 
 
-def test_while_time_stands_the_last_reading_counts_and_none_pile_up():
+def test_history_keeps_one_reading_per_instant():
     history = History(10**9)
     history.add(BEGIN, reading(BEGIN, 0.0))
     for index in range(1000):
@@ -342,7 +338,7 @@ def arrivals(count, *, every=1000, seed='seed', **parameters):
 @pytest.mark.parametrize(
     ('distribution', 'expected'), [('uniform', uniform), ('exponential', expon)]
 )
-def test_latencies_are_distributed_as_they_are_said_to_be(distribution, expected):
+def test_latencies_follow_the_declared_distribution(distribution, expected):
     sent, arrived = arrivals(
         500, every=50, seconds=0.002, spread=0.004, distribution=distribution, reorder=True
     )
@@ -354,7 +350,7 @@ def test_latencies_are_distributed_as_they_are_said_to_be(distribution, expected
 
 @given(st.booleans(), st.floats(0.0001, 0.003), st.integers(1, 30), st.integers(0, 99))
 @settings(max_examples=25)
-def test_each_tick_has_the_last_that_arrived_before_it(reorder, spread, every, seed):
+def test_tick_publishes_the_last_arrived_message(reorder, spread, every, seed):
     # By hand, with the same draws: when each arrives, and of each tick the last.
     sent, arrived = arrivals(
         40, every=every, seed=f'{seed}', seconds=0.0005, spread=spread, reorder=reorder
@@ -372,7 +368,7 @@ def test_each_tick_has_the_last_that_arrived_before_it(reorder, spread, every, s
         assert [message for message, _ in arrived] == sorted(message for message, _ in arrived)
 
 
-def test_with_reordering_messages_overtake_and_tell_when_they_were_measured():
+def test_reordered_messages_keep_their_measured_stamps():
     _, arrived = arrivals(200, every=10, seconds=0.0, spread=0.002, reorder=True)
     messages = [message for message, _ in arrived]
     assert messages != sorted(messages)
@@ -381,7 +377,7 @@ def test_with_reordering_messages_overtake_and_tell_when_they_were_measured():
     assert sensor.silence(BEGIN + MS, False).stamp == BEGIN
 
 
-def test_duplicates_come_as_often_as_they_are_said_to():
+def test_duplicates_arrive_with_the_declared_probability():
     # Latencies of up to 20 ticks, a message every 50: both of a pair arrive, if not in one tick.
     sent, arrived = arrivals(
         2000, every=50, seconds=0.0, spread=20 * TICK * 1e-9, duplicates=0.3, reorder=True

@@ -42,7 +42,7 @@ def moved(loop, angle, rate, alpha=0.0):
 
 @given(angles, rates, rates)
 @loops
-def test_they_are_the_slopes_of_position_and_rates(loop, angle, rate, alpha):
+def test_velocity_and_acceleration_equal_numerical_derivatives(loop, angle, rate, alpha):
     # The crank's own motion: θ(t) = angle + rate·t + alpha·t²/2.
     step = 1e-5
     before, after = (
@@ -60,20 +60,20 @@ def test_they_are_the_slopes_of_position_and_rates(loop, angle, rate, alpha):
 
 
 @given(angles)
-def test_a_crank_at_rest_has_joints_at_rest(angle):
+def test_resting_crank_has_resting_joints(angle):
     found = moved(ANGLES, angle, 0.0)
     assert not any((*found.velocity.joints, *found.acceleration.joints))
 
 
 @given(angles, rates)
-def test_a_crank_at_a_constant_rate_still_has_an_acceleration(angle, rate):
+def test_constant_crank_rate_still_gives_joint_accelerations(angle, rate):
     # What the topic drive gives: the unknown acceleration of the crank is 0, not the joints'.
     one, two = (moved(SLIDE, angle, r).acceleration.joints for r in (rate, 2.0 * rate))
     assert list(two) == pytest.approx([4.0 * value for value in one], rel=1e-12, abs=1e-300)
 
 
 @given(st.floats(-17.0, -1.0))
-def test_next_to_a_toggle_they_are_finite_or_none(exponent):
+def test_derivatives_near_a_toggle_are_finite_or_missing(exponent):
     angle = EVERY_OTHER.input_ranges[0].highest - 10.0**exponent
     if EVERY_OTHER.position(angle).joints:
         found = moved(EVERY_OTHER, angle, 1e10, 1e10)
@@ -82,7 +82,7 @@ def test_next_to_a_toggle_they_are_finite_or_none(exponent):
 
 
 @pytest.mark.parametrize('value', [inf, -inf, nan])
-def test_what_is_no_number_is_left_out(value):
+def test_overflowing_acceleration_is_omitted(value):
     class Overflowing:
         def acceleration(self, *_):
             found = ANGLES.acceleration(POSITION, VELOCITY, 0.0)
@@ -94,7 +94,7 @@ def test_what_is_no_number_is_left_out(value):
     assert stage(motion) == motion
 
 
-def test_the_message_is_the_motion_at_one_point():
+def test_acceleration_message_holds_one_trajectory_point():
     motion = moved(ANGLES, 1.0, 2.0)
     rates, accelerations = motion.velocity.joints, motion.acceleration.joints
     # Turns added, and whatever else sensors do: what is written is what is read.

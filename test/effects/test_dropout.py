@@ -49,7 +49,7 @@ CHAINS = [
 
 
 @pytest.mark.parametrize(('probability', 'burst'), CHAINS)
-def test_in_the_long_run_as_much_is_lost(probability, burst):
+def test_dropout_loses_the_declared_share(probability, burst):
     # The variance of a mean over a chain of two states whose correlation falls by ρ each step.
     stay = burst or 1.0 / (1.0 - probability)
     rho = 1.0 - 1.0 / stay - probability / (stay * (1.0 - probability))
@@ -63,7 +63,7 @@ def test_in_the_long_run_as_much_is_lost(probability, burst):
 
 @pytest.mark.parametrize(('probability', 'burst'), CHAINS)
 @pytest.mark.parametrize('state', [True, False], ids=['lost', 'arriving'])
-def test_bursts_and_the_runs_between_have_their_lengths(probability, burst, state):
+def test_dropout_bursts_have_the_declared_lengths(probability, burst, state):
     # What goes on with the same chance q each time is longer than k with the chance q^k.
     stay = burst or 1.0 / (1.0 - probability)
     mean = stay if state else stay * (1.0 - probability) / probability
@@ -83,12 +83,12 @@ def test_bursts_and_the_runs_between_have_their_lengths(probability, burst, stat
     assert UNLIKELY < chi_square(total, len(classes) - 1) < 1.0 - UNLIKELY
 
 
-def test_all_samples_are_alike_the_first_too():
+def test_first_sample_is_lost_as_often_as_others():
     first = [losses(0.25, 10.0, 1, seed=str(seed))[0] for seed in range(4000)]
     assert likely((sum(first) - 1000) ** 2 / (4000 * 0.25 * 0.75), 1)
 
 
-def test_without_bursts_losses_are_independent():
+def test_dropout_without_bursts_loses_samples_independently():
     lost = losses(0.3)
     twice = sum(a and b for a, b in pairwise(lost)) / (N - 1)
     # Products of neighbours: 0.09 of them, and each shares one factor with the next.
@@ -97,7 +97,7 @@ def test_without_bursts_losses_are_independent():
 
 
 @pytest.mark.parametrize(('probability', 'burst'), [(0.0, 0.0), (0.0, 7.0), (1.0, 0.0)])
-def test_probabilities_of_zero_and_one_lose_none_and_all(probability, burst):
+def test_dropout_probabilities_zero_and_one_are_exact(probability, burst):
     assert set(losses(probability, burst, 1000)) == {probability == 1.0}
 
 
@@ -107,7 +107,7 @@ def timeline(sensor, n=200):
     return [0 if read is None else int(read.joints[0]) for read in found], found
 
 
-def test_a_lost_sample_is_missing_or_the_last_one_is_repeated():
+def test_dropout_omits_or_repeats_lost_samples():
     silent, _ = timeline(line(0.6, 3.0))
     repeated, found = timeline(line(0.6, 3.0, 'repeat'))
     last = 0
@@ -120,7 +120,7 @@ def test_a_lost_sample_is_missing_or_the_last_one_is_repeated():
     assert all(read is None or read.stamp == BEGIN + i * MS for i, read in enumerate(found))
 
 
-def test_what_is_repeated_is_all_of_the_last_one():
+def test_dropout_repeats_the_whole_last_reading():
     sensor = line(0.5, 0.0, 'repeat')
     arrived = None
     for i in range(100):
@@ -132,7 +132,7 @@ def test_what_is_repeated_is_all_of_the_last_one():
         assert found == (arrived and arrived._replace(stamp=now))
 
 
-def test_where_a_slower_sensor_is_silent_there_is_no_sample_to_lose():
+def test_dropout_draws_only_for_new_samples():
     # Of the same draws each decides over one sample: at every tick, or at every tenth.
     every = published('dropout: {probability: 0.4, burst: 2}', 20)
     some = published(
@@ -145,7 +145,7 @@ def test_where_a_slower_sensor_is_silent_there_is_no_sample_to_lose():
     assert all(found is None for n, found in enumerate(some) if n % 10)
 
 
-def test_a_scene_loses_some_readings_and_alters_none():
+def test_scene_with_dropout_loses_but_never_alters_readings():
     ideal, text = published('', 150), 'dropout: {probability: 0.3, burst: 4}'
     lossy = published(text, 150)
     assert all(found in {None, read} for found, read in zip(lossy, ideal, strict=True))
@@ -153,7 +153,7 @@ def test_a_scene_loses_some_readings_and_alters_none():
 
 
 @pytest.mark.parametrize('hundredths', range(51, 100))
-def test_the_burst_that_is_advised_is_taken(hundredths):
+def test_advised_burst_length_is_accepted(hundredths):
     with pytest.raises(DefinitionError) as raised:
         line(hundredths / 100, 1.0)
     advised = float(raised.value.remedy.split()[1])

@@ -35,7 +35,7 @@ angles, rates = st.floats(-10.0, 10.0), st.floats(-30.0, 30.0)
 
 
 @given(angles, rates, rates)
-def test_a_crank_that_turns_takes_its_inertia_and_its_friction_too(angle, rate, acceleration):
+def test_crank_effort_includes_inertia_and_friction(angle, rate, acceleration):
     friction = Friction({'O': JointFriction(viscous=0.02, coulomb=0.3)})
     inertia = 0.05 + 2.0 * 0.3**2 + 0.01
     dry = 0.3 * ((rate > 0.0) - (rate < 0.0))
@@ -47,7 +47,7 @@ def test_a_crank_that_turns_takes_its_inertia_and_its_friction_too(angle, rate, 
 @pytest.mark.parametrize(
     'motion', [(0.4, 0.0, 20.0), (1.0, 9.0, 0.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
 )
-def test_its_work_is_the_change_of_energy(motion):
+def test_effort_power_equals_the_energy_rate(motion):
     # τ·ω = dE/dt, the energy as worked out by hand. At rest: of both the change by time.
     by_hand = FourBar(FOUR_BAR, motion, GRAVITY)
     later = mp.mpf('1e-3')
@@ -58,13 +58,13 @@ def test_its_work_is_the_change_of_energy(motion):
     assert found == pytest.approx(float(power / rate), rel=1e-10)
 
 
-def test_what_is_no_number_is_left_out():
+def test_overflowing_effort_is_omitted():
     within = context(FOUR_BAR)
     vars(within)['mechanics'] = type('Overflowing', (), {'drive_efforts': lambda *_: (1e400,)})()
     assert moved(within, (1.0, 1.0, 1.0), {'effort': ()}).efforts == ()
 
 
-def test_it_is_published_as_that_of_the_input_joint():
+def test_effort_is_published_for_the_input_joint():
     pipeline = pipeline_of(
         b'drive: {sine: {mean: 1, amplitude: 0.5, frequency: 2}}\n'
         b'effects: {effort: {}}\nloads: {gravity: [0, -9.81]}',
@@ -122,7 +122,7 @@ RUBBING = '{joints: {O: {viscous: 0.1, coulomb: 1.5}}}'
     [(PENDULUM, -1.2, 9.0, RUBBING), (FOUR_BAR_FILE, 1.0, 1.0, '')],
     ids=['a crank that rubs', 'a four-bar'],
 )
-def test_where_it_moves_freely_it_is_what_is_commanded(linkage, start, torque, friction):
+def test_effort_under_torque_equals_the_command(linkage, start, torque, friction):
     # Whatever weight, inertia and friction do: they are what the command works against.
     commands = {time: torque if time < 250 else 0.9 * torque for time in range(0, 600, 50)}
     found = timeline(linkage, f'{{start: {start}}}', commands, 500, friction)
@@ -131,14 +131,14 @@ def test_where_it_moves_freely_it_is_what_is_commanded(linkage, start, torque, f
         assert found[time][2] == pytest.approx(commands[time // 50 * 50], abs=1e-10)
 
 
-def test_where_no_command_holds_it_is_none():
+def test_effort_without_a_command_is_zero():
     found = timeline(PENDULUM, '{start: 1.0}', {}, 300, RUBBING)
     assert found[299][1] < -1.0, 'it falls'
     for time in range(1, 300):
         assert found[time][2] == pytest.approx(0.0, abs=1e-10)
 
 
-def test_while_the_brake_slips_it_is_the_brakes():
+def test_effort_of_a_slipping_brake_equals_its_torque():
     # It turns forward, and the brake exerts −2 on it; friction of the pin is no part of that.
     torque = '{start: 0.2, rate: 6.0, on_timeout: brake, brake: 2.0}'
     found = timeline(PENDULUM, torque, {}, 60, RUBBING)

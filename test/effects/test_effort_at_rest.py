@@ -143,7 +143,7 @@ CASES = [(name, command) for name, state in STATES.items() for command in state.
 
 
 @pytest.mark.parametrize(('name', 'command'), CASES)
-def test_the_drive_exerts_its_command_whatever_bears_the_load(name, command):
+def test_effort_at_rest_equals_the_command(name, command):
     state = STATES[name]
     at, rate, effort, torque = rested(state, command)
     # Behind play the motor comes with a little blow.
@@ -166,7 +166,7 @@ def test_the_drive_exerts_its_command_whatever_bears_the_load(name, command):
 
 @pytest.mark.parametrize('command', [0.5, 5.0])
 @pytest.mark.parametrize('damping', [2.0, 5.0])
-def test_a_stop_that_yields_is_a_load_that_the_command_bears(command, damping):
+def test_effort_on_a_soft_stop_equals_the_command(command, damping):
     stops = f', stops: {{drive_joint: {{stiffness: 100, damping: {damping}}}}}'
     state = Rest(1.5, linkage=LIMITED, loads=stops)
     at, rate, effort, _ = rested(state, command, 6000)
@@ -175,7 +175,7 @@ def test_a_stop_that_yields_is_a_load_that_the_command_bears(command, damping):
     assert 100.0 * (at - 1.5) == pytest.approx(command - WEIGHT * cos(at), abs=1e-5)
 
 
-def test_a_linkage_that_jams_is_pushed_by_its_command():
+def test_effort_of_a_jammed_linkage_equals_the_command():
     # The piston is pushed out against 100 N, and jams from µ = 6.5 on.
     text = (
         'drive: {torque: {start: 0.9, rate: -0.1, timeout: 9}}\n'
@@ -195,7 +195,7 @@ def test_a_linkage_that_jams_is_pushed_by_its_command():
         assert (rate, effort) == (0.0, command)
 
 
-def test_at_breakaway_it_does_not_jump():
+def test_effort_is_continuous_at_breakaway():
     # 1 N·m more a second, until friction of 1.5 N·m gives way.
     state = STATES['friction holds']
     text = (

@@ -86,7 +86,7 @@ def behind(motors, play):
     return found
 
 
-def test_within_the_play_a_drive_bears_its_own_inertia_alone():
+def test_effort_within_the_play_is_the_drive_inertia():
     # On a shaft that is loaded by weight and friction, a motor to and fro, with 0.2 rad of play.
     times = [5 * i * MS for i in range(240)]
     found = published(
@@ -114,7 +114,7 @@ def test_within_the_play_a_drive_bears_its_own_inertia_alone():
     assert min(alone, pushed) > 50, 'both happen'
 
 
-def test_a_timeline_of_a_motor_that_turns_back():
+def test_effort_behind_play_follows_a_reversing_motor():
     # Rows at which a linear profile stands, moves, turns back: play 0.2, so 0.1 to either side.
     times = [0, 50, 150, 950, 1050, 1150, 1250, 1850, 2100]
     found = published(
@@ -145,7 +145,7 @@ def test_a_timeline_of_a_motor_that_turns_back():
         assert efforts[1:] == [0.0]
 
 
-def test_a_play_of_zero_is_none():
+def test_zero_play_leaves_the_effort_unchanged():
     # A motor that stands bears the weight then, as it does without backlash.
     times = [100 * i * MS for i in range(12)]
     drive = 'drive: {profile: {table: [[0, 0], [0.5, 1]], interpolation: minimum_jerk}}\n'
@@ -174,7 +174,7 @@ def arm(upper, fore):
     )
 
 
-def test_of_several_inputs_each_bears_what_it_pushes():
+def test_each_input_effort_depends_on_its_own_play():
     # Shoulder and elbow swing at 1 Hz and at 0.7 Hz, with plays of 0.1 and 0.3.
     times = [7 * i * MS for i in range(400)]
     found = published(
@@ -208,7 +208,7 @@ def test_of_several_inputs_each_bears_what_it_pushes():
     assert len(happened) == 4, 'each alone, both, and neither'
 
 
-def test_of_a_slide_it_is_a_force():
+def test_slide_effort_behind_play_is_a_force():
     linkage = """
 links:
   ground: {G: [0, 0], X: [1, 0]}
@@ -235,7 +235,7 @@ masses: {ram: {mass: 4, center: [0, 0], inertia: 0.001}}
     assert len(kinds) == 2
 
 
-def test_of_several_linkages_that_with_torque_may_have_none():
+def test_backlash_beside_a_torque_drive_is_refused():
     def scene(first, second):
         files = {
             'scene.yaml': (

@@ -45,7 +45,7 @@ def read(sensor, values, period=MS):
 @pytest.mark.parametrize(
     ('slide', 'expected'), [(0.0, 0.0), (0.0124, 0.012), (-0.0001, -0.001), (0.9999, 0.999)]
 )
-def test_a_thousand_counts_a_metre(slide, expected):
+def test_slide_encoder_reads_a_thousand_counts_per_metre(slide, expected):
     assert read(slide_encoder(counts=1000), [slide]) == pytest.approx([expected], abs=1e-15)
 
 
@@ -53,7 +53,7 @@ counts = st.one_of(st.integers(1, 2**32), st.sampled_from([1, 1000, 4096, 2**23,
 
 
 @given(counts, st.floats(-10.0, 10.0), st.floats(-1e4, 1e4))
-def test_what_is_read_is_a_whole_count_and_less_than_one_below_the_angle(n, offset, angle):
+def test_encoder_reads_the_whole_count_below_the_angle(n, offset, angle):
     (found,) = read(angle_encoder(counts=n, offset=offset), [angle])
     resolution = EXACT_TAU / n
     rounding = 4 * Fraction(ulp(abs(angle) + abs(offset) + tau / n))
@@ -64,7 +64,7 @@ def test_what_is_read_is_a_whole_count_and_less_than_one_below_the_angle(n, offs
 
 
 @given(st.integers(-(10**6), 10**6), st.floats(0.0, tau), counts)
-def test_over_a_million_turns_no_error_adds_up(turns, rest, n):
+def test_encoder_stays_exact_over_a_million_turns(turns, rest, n):
     angle = turns * tau + rest
     exact = Fraction(angle) / EXACT_TAU * n
     # Where the angle's own last digit makes the count, either is right.
@@ -73,7 +73,7 @@ def test_over_a_million_turns_no_error_adds_up(turns, rest, n):
     assert abs(Fraction(found) - floor(exact) * EXACT_TAU / n) <= 3 * Fraction(ulp(angle))
 
 
-def test_after_a_million_turns_it_reads_what_it_read_before():
+def test_encoder_reads_the_same_after_a_million_turns():
     sensor = angle_encoder(counts=5000, incremental=True)
     out_and_back = [0.3, 0.9, *(0.9 + 3.0 * i for i in range(100_000)), 1e6 * tau, 0.9, 0.3]
     found = read(sensor, out_and_back)
@@ -98,15 +98,13 @@ INCREMENTAL = [
 
 
 @pytest.mark.parametrize(('parameters', 'eighths', 'expected'), INCREMENTAL)
-def test_until_its_index_mark_an_incremental_encoder_knows_the_way_only(
-    parameters, eighths, expected
-):
+def test_incremental_encoder_is_relative_until_its_index_mark(parameters, eighths, expected):
     sensor = angle_encoder(counts=8, incremental=True, **parameters)
     found = read(sensor, [eighth * tau / 8 for eighth in eighths])
     assert found == pytest.approx([eighth * tau / 8 for eighth in expected], abs=1e-12)
 
 
-def test_the_index_mark_lies_at_the_offset():
+def test_encoder_index_mark_lies_at_the_offset():
     sensor = angle_encoder(counts=8, incremental=True, offset=0.5)
     found = read(sensor, [0.5 + eighth * tau / 8 for eighth in (2.5, 7.5, 8.5)])
     assert found == pytest.approx([0.0, 5 * tau / 8, 0.5 + tau], abs=1e-12)
@@ -120,7 +118,7 @@ def test_the_index_mark_lies_at_the_offset():
         pytest.param([0.245, 1.245, 5.245], [0.0, 1.0, 5.0], id='metres are no turns'),
     ],
 )
-def test_on_a_slide_there_is_one_mark(slides, expected):
+def test_slide_encoder_has_one_index_mark(slides, expected):
     sensor = slide_encoder(counts=100, incremental=True, offset=0.2)
     assert read(sensor, slides) == pytest.approx(expected, abs=1e-12)
 
@@ -132,7 +130,7 @@ def speeds(sensor, angles, times):
     ]
 
 
-def test_rates_are_differences_of_counts_over_the_time_between():
+def test_encoder_rates_are_count_differences_over_time():
     # Of 1000 counts a turn; angles in counts, times in ms.
     q = tau / 1000
     ticks = [(0, 10.5), (1, 10.9), (2, 11.1), (4, 15.5), (4, 16.5), (5, 17.5), (6, 14.5)]
@@ -145,7 +143,7 @@ def test_rates_are_differences_of_counts_over_the_time_between():
 
 
 @given(st.floats(-200.0, 200.0), st.floats(0.0, 6.0), st.integers(2, 10_000))
-def test_the_mean_of_the_rates_is_the_rate(rate, begin, n):
+def test_mean_encoder_rate_equals_the_true_rate(rate, begin, n):
     sensor = angle_encoder(counts=n)
     times = [BEGIN + i * MS for i in range(200)]
     found = speeds(sensor, [begin + rate * 1e-3 * i for i in range(200)], times)
@@ -157,14 +155,14 @@ def test_the_mean_of_the_rates_is_the_rate(rate, begin, n):
     assert abs(mean - rate) <= resolution / 0.199 * (1 + 1e-9)
 
 
-def test_the_step_at_the_index_mark_is_no_motion():
+def test_index_mark_step_adds_no_encoder_rate():
     sensor = angle_encoder(counts=8, incremental=True)
     angles = [eighth * tau / 8 for eighth in (5.5, 6.5, 7.5, 8.5, 9.5)]
     found = speeds(sensor, angles, [BEGIN + i * MS for i in range(5)])
     assert [rate for _, rate in found] == pytest.approx([0.0, *[1000 * tau / 8] * 4])
 
 
-def test_a_low_pass_smooths_the_rates_as_an_exponential():
+def test_encoder_low_pass_smooths_rates_exponentially():
     # The joint begins to turn by 5 counts a ms; readings come at irregular times.
     sensor = angle_encoder(cutoff=30.0, counts=1000)
     times = [0, 1, 2, 3, 5, 6, 10, 30]
@@ -174,13 +172,13 @@ def test_a_low_pass_smooths_the_rates_as_an_exponential():
     assert [rate for _, rate in found] == pytest.approx(expected)
 
 
-def test_exact_rates_pass_as_they_come():
+def test_encoder_passes_exact_rates_unchanged():
     sensor = angle_encoder(rates='exact', counts=8)
     found = speeds(sensor, [0.0, 1.0, 2.0], [BEGIN, BEGIN + MS, BEGIN + 2 * MS])
     assert found == [(7.0, 9.0)] * 3
 
 
-def test_where_no_rates_come_none_are_made_and_the_next_know_of_the_last_count():
+def test_encoder_makes_no_rates_where_none_exist():
     sensor = angle_encoder(counts=1000)
     found = [
         sensor(BEGIN + i * MS, reading(BEGIN, 0.0, (i**2 + 0.5) * tau / 1000, rates=rates)).rates
@@ -190,7 +188,7 @@ def test_where_no_rates_come_none_are_made_and_the_next_know_of_the_last_count()
     assert found[3] == pytest.approx((7.0, 5000 * tau / 1000))
 
 
-def test_in_a_scene_whose_angle_runs_on_over_turns():
+def test_multi_turn_encoder_counts_continuous_angles():
     # The coupler falls behind by a turn in each of the three turns of the crank.
     text = 'encoder: {joints: {coupler_joint: {counts: 64, multi_turn: true}}}'
     ideal, found = published('', 200, rate=100.0), published(text, 200, rate=100.0)
@@ -211,7 +209,7 @@ def test_in_a_scene_whose_angle_runs_on_over_turns():
         (0.0, 1, [0]),
     ],
 )
-def test_an_absolute_encoder_reads_within_half_a_turn_of_its_offset(offset, counts, expected):
+def test_absolute_encoder_reads_within_half_a_turn(offset, counts, expected):
     sensor = angle_encoder(counts=counts, offset=offset, multi_turn=False)
     angles = [offset + (k + 0.5) * tau / counts for k in range(-5 * counts, 5 * counts)]
     found = read(sensor, angles)
@@ -221,7 +219,7 @@ def test_an_absolute_encoder_reads_within_half_a_turn_of_its_offset(offset, coun
         assert count == pytest.approx(round(count / counts) * counts, abs=1e-9)
 
 
-def test_a_whole_turn_is_no_motion_in_the_rates_of_an_absolute_encoder():
+def test_absolute_encoder_rates_ignore_the_wrap():
     sensor = angle_encoder(counts=100, multi_turn=False)
     rates = []
     for ms in range(300):
@@ -231,7 +229,7 @@ def test_a_whole_turn_is_no_motion_in_the_rates_of_an_absolute_encoder():
     assert rates == pytest.approx([0.0, *[tau / 100 / 1e-3] * 299])
 
 
-def test_behind_a_slower_driver_rates_are_over_the_time_between_its_samples():
+def test_rate_limited_encoder_rates_span_the_sample_period():
     # 1024 counts a turn at 1 kHz make steps of 6.1 rad/s; read each 20 ms of 0.31 rad/s.
     effects = (
         'encoder: {joints: {rocker_joint: {counts: 1024}}}, rate_limit: {rate: 50, hold: silent}'

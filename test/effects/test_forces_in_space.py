@@ -46,7 +46,7 @@ def at_times():
     return [BEGIN + 37_000_000 * count for count in range(12)]
 
 
-def test_they_are_published_as_wrenches():
+def test_spatial_pin_forces_are_published_as_wrenches():
     at_work = pipeline('pin_forces: {}')
     closure = at_work.linkages[0].closure
     for now in at_times():
@@ -95,7 +95,7 @@ def differences(effects):
         yield motion, motion.wrenches(GRAVITY), after - before
 
 
-def test_a_rod_stretches_under_its_force():
+def test_spatial_rod_stretches_under_its_force():
     none = np.zeros(3)
     for motion, wrenches, moved in differences('compliance: {links: {rod: 1.0e+4}}'):
         _, along = rocker_by_hand(motion, 0.0, none, none)
@@ -106,7 +106,7 @@ def test_a_rod_stretches_under_its_force():
         assert moved == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
-def test_play_in_a_ball_and_in_a_hinge():
+def test_ball_and_hinge_clearance_move_the_rocker():
     none, axis = np.zeros(3), np.array([0.0, 1.0, 0.3]) / np.hypot(1.0, 0.3)
     for motion, wrenches, moved in differences('clearance: {pins: {B: 1.0e-5}}'):
         force = wrenches['rocker', 'rod'][0]
@@ -143,7 +143,7 @@ masses:
 """
 
 
-def test_of_an_over_constrained_linkage_the_certain_ones_are_published():
+def test_over_constrained_linkage_publishes_only_determinate_forces():
     at_work = pipeline('pin_forces: {}', FLAT_LOOP)
     forces = at_work.linkages[0].context.reactions
     assert forces.uncertain == (
@@ -169,7 +169,7 @@ def test_of_an_over_constrained_linkage_the_certain_ones_are_published():
         ),
     ],
 )
-def test_what_an_over_constrained_linkage_does_not_do_is_one_line(effects, line):
+def test_over_constrained_linkage_refuses_clearance_and_compliance(effects, line):
     with pytest.raises(FileError) as caught:
         pipeline(effects, FLAT_LOOP)
     assert line in str(caught.value)
@@ -183,7 +183,7 @@ def test_what_an_over_constrained_linkage_does_not_do_is_one_line(effects, line)
         ('{radius: 0.1}', 'effects.friction.joints.rocker_joint.radius: friction by the force in'),
     ],
 )
-def test_friction_by_the_force_in_a_hinge_needs_its_radius(friction, line):
+def test_load_dependent_hinge_friction_needs_a_radius(friction, line):
     with pytest.raises(FileError) as caught:
         pipeline(f'effort: {{}}, friction: {{joints: {{rocker_joint: {friction}}}}}')
     assert line in str(caught.value)

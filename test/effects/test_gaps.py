@@ -69,7 +69,7 @@ def run(effects, ticks=4000):
 @pytest.mark.parametrize('velocity', ['', 'velocity: {}, '], ids=['', 'with rates'])
 @pytest.mark.parametrize('between', ['interpolated', 'sampled'])
 @pytest.mark.parametrize(('seconds', 'late'), [(0.1, 100), (0.0996, 100), (0.0, 0)])
-def test_behind_a_delay_every_true_reading_arrives_and_no_other(seconds, late, between, velocity):
+def test_delay_publishes_only_readings_with_a_pose(seconds, late, between, velocity):
     delay = f'delay: {{seconds: {seconds}, between: {between}, stamp: measured}}'
     found = run(f'{velocity}{delay}')
     posed = [closes(crank_at(BEGIN + i * MS)) for i in range(len(found))]
@@ -85,7 +85,7 @@ def test_behind_a_delay_every_true_reading_arrives_and_no_other(seconds, late, b
 
 
 @pytest.mark.parametrize('distribution', ['uniform', 'half_normal'])
-def test_a_sensor_whose_instants_wander_reads_no_pose_that_was_not(distribution):
+def test_jitter_publishes_no_reading_from_a_gap(distribution):
     found = run(f'jitter: {{seconds: 0.004, distribution: {distribution}}}')
     posed = [closes(crank_at(BEGIN + i * MS)) for i in range(len(found))]
     # One that looks up to 4 ms back may miss the first four after a gap, and none else.
@@ -98,7 +98,7 @@ def test_a_sensor_whose_instants_wander_reads_no_pose_that_was_not(distribution)
             assert min(open_by(crank_at(time), one.joints) for time in instants) < 3e-4
 
 
-def test_a_topic_that_pauses_leaves_a_gap_that_arrives_a_delay_later():
+def test_topic_pause_gives_a_delayed_gap():
     drive = 'drive: {topic: {max_age: 0.05}}\n'
     work = pipeline('delay: {seconds: 0.02, stamp: measured}', drive)
     write = JointStateWriter(['crank_joint']).write
@@ -113,7 +113,7 @@ def test_a_topic_that_pauses_leaves_a_gap_that_arrives_a_delay_later():
     assert stamps == [*range(250), *range(400, 580)]
 
 
-def test_the_first_silence_of_a_sensor_arrives_a_delay_later():
+def test_first_sensor_silence_arrives_delayed():
     line = Delay(DelayEffect(0.0025), mixes=True)
     found = []
     for ms in range(12):
@@ -124,7 +124,7 @@ def test_the_first_silence_of_a_sensor_arrives_a_delay_later():
     assert found == [None, None, None, 0.5, 1.5, 2.5, 3.5, 4.0, None, 6.0, 7.0, 8.0]
 
 
-def test_a_gap_behind_a_silent_sensor_is_counted_once():
+def test_gap_behind_a_silent_sensor_counts_once():
     # With a lossy sensor before the delay, the line carries messages: a gap takes as long as they.
     line = Delay(DelayEffect(0.002), mixes=True)
     found = []
@@ -138,7 +138,7 @@ def test_a_gap_behind_a_silent_sensor_is_counted_once():
     assert found == [None, None, 0.0, None, 2.0, 3.0, None, None, None, 7.0, 8.0, 9.0]
 
 
-def test_freeze_over_an_open_loop_publishes_the_last_state():
+def test_freeze_fault_over_an_open_loop_repeats_the_reading():
     work = pipeline('velocity: {}', faults='faults: {hang: {freeze: {}}}\n')
     found = []
     for i in range(3000):
@@ -163,7 +163,7 @@ def test_freeze_over_an_open_loop_publishes_the_last_state():
         'encoder: {joints: {rocker_joint: {counts: 4096}}}, delay: {seconds: 0.0123}',
     ],
 )
-def test_to_name_velocity_changes_no_position(effects):
+def test_velocity_effect_does_not_change_positions(effects):
     with_rates, without = run(f'velocity: {{}}, {effects}'), run(effects)
     for one, other in zip(with_rates, without, strict=True):
         assert (one is None) == (other is None)
@@ -172,7 +172,7 @@ def test_to_name_velocity_changes_no_position(effects):
             assert other.rates == ()
 
 
-def test_behind_an_encoder_a_delay_keeps_whole_counts():
+def test_delay_keeps_whole_encoder_counts():
     encoder = 'encoder: {joints: {rocker_joint: {counts: 4096}}}'
     found = run(f'{encoder}, delay: {{seconds: 0.0123}}')
     counts = [one.joints[1] * 4096 / (2.0 * pi) for one in found if one is not None]
@@ -193,7 +193,7 @@ def test_behind_an_encoder_a_delay_keeps_whole_counts():
         'rate_limit: {rate: 90, hold: silent}, delay: {seconds: 0.05}',
     ],
 )
-def test_a_replay_of_the_ticks_that_count_gives_the_same_messages(effects):
+def test_replay_of_recorded_ticks_gives_the_same_messages(effects):
     # As a bag has it: the ticks with a message, and those without of which a replay has to know.
     # A topic that pauses remembers nothing by itself, other than a drive that goes on.
     drive = 'drive: {topic: {max_age: 0.02}}\n'
@@ -212,7 +212,7 @@ def test_a_replay_of_the_ticks_that_count_gives_the_same_messages(effects):
     assert 500 < kept < 2800
 
 
-def test_accelerations_arrive_with_their_reading_whether_the_linkage_has_a_pose_or_not():
+def test_delayed_accelerations_arrive_with_their_reading():
     work = pipeline('acceleration: {}, delay: {seconds: 0.1}')
     ticks = [work.tick(BEGIN + i * MS) for i in range(2000)]
     arrived = [tick for tick in ticks if tick.message]

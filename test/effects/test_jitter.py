@@ -36,7 +36,7 @@ def half_normal(seconds, most):
 
 @pytest.mark.parametrize('seconds', [0.0004, 0.0035], ids=['within a tick', 'over some ticks'])
 @pytest.mark.parametrize('distribution', [uniform, half_normal])
-def test_the_instants_have_the_distribution_and_stay_within_the_bounds(seconds, distribution):
+def test_jitter_instants_follow_the_declared_distribution(seconds, distribution):
     instants = earlier(seconds, distribution.__name__)
     n, bins = len(instants), 20
     assert min(instants) >= 0.0
@@ -50,7 +50,7 @@ def test_the_instants_have_the_distribution_and_stay_within_the_bounds(seconds, 
     assert UNLIKELY < chi_square(total, bins - 1) < 1.0 - UNLIKELY
 
 
-def test_all_that_is_read_is_of_one_instant():
+def test_jittered_reading_is_of_one_instant():
     sensor = JitterEffect(0.002).sensor(context())
     for i in range(200):
         now, t = BEGIN + i * MS, i * 1e-3
@@ -67,7 +67,7 @@ def test_all_that_is_read_is_of_one_instant():
         assert found.joints[1] == pytest.approx(5.0 * instant, abs=1e-15)
 
 
-def test_an_accelerated_motion_is_read_where_it_was():
+def test_jitter_interpolates_an_accelerated_motion_exactly():
     # With rates it is read off a cubic, which a motion at a constant acceleration is.
     sensor = JitterEffect(0.005).sensor(context())
     instants = []
@@ -80,7 +80,7 @@ def test_an_accelerated_motion_is_read_where_it_was():
     assert any(after < before for before, after in pairwise(instants))
 
 
-def test_before_the_first_tick_there_is_nothing_to_see():
+def test_jitter_never_looks_before_the_first_tick():
     sensor = JitterEffect(1.0).sensor(context())
     found = [sensor(BEGIN + i * MS, reading(BEGIN, 1.0 + i)).joints[0] for i in range(100)]
     assert found[0] == 1.0
@@ -88,18 +88,18 @@ def test_before_the_first_tick_there_is_nothing_to_see():
     assert max(found) > 10.0
 
 
-def test_none_changes_nothing():
+def test_zero_jitter_changes_nothing():
     for distribution in ('uniform', 'half_normal'):
         assert set(earlier(0.0, distribution, n=100)) == {0.0}
 
 
-def test_while_time_stands_the_newest_reading_counts():
+def test_jitter_uses_the_newest_reading_of_an_instant():
     sensor = JitterEffect(0.001).sensor(context())
     for value in range(10):
         assert sensor(BEGIN, reading(BEGIN, 1.0 * value)).joints == (1.0 * value,)
 
 
-def test_a_scene_is_misread_by_no_more_than_its_rates_make_of_it():
+def test_jitter_error_is_bounded_by_the_joint_rates():
     ideal, shaken = published(''), published('jitter: {seconds: 0.001}')
     errors = [
         abs(a - b)

@@ -103,7 +103,7 @@ def some_inputs(closure):
 
 
 @pytest.mark.parametrize('linkage', GALLERY)
-def test_links_lie_where_a_drawing_of_the_pose_has_them(linkage):
+def test_link_markers_equal_the_drawing_of_the_pose(linkage):
     held = Held(linkage)
     closure = held.closure
     extent = size = None
@@ -138,7 +138,7 @@ ALL_RAILS = {'elliptic_trammel', 'inverted_slider_crank', 'scotch_yoke'}
 
 
 @pytest.mark.parametrize('linkage', GALLERY)
-def test_pins_and_blocks_lie_in_their_places(linkage):
+def test_pin_and_block_markers_lie_at_their_points(linkage):
     held = Held(linkage)
     closure = held.closure
     for inputs in some_inputs(closure):
@@ -161,7 +161,7 @@ def test_pins_and_blocks_lie_in_their_places(linkage):
             assert any(abs(middle - place) < 2.0 * rim.scale.x for place in points.values())
 
 
-def test_parts_lie_on_each_other_as_they_are_drawn():
+def test_marker_heights_follow_the_drawing_order():
     markers = Held('excavator_bucket').markers(1.0)
     heights = [marker.pose.position.z for marker in markers if marker.ns in ('links', 'sliders')]
     assert heights == sorted(set(heights))
@@ -173,7 +173,7 @@ def test_parts_lie_on_each_other_as_they_are_drawn():
     assert all(marker.pose.position.z > highest for marker in named(markers, 'pins'))
 
 
-def test_bars_are_as_thick_as_the_scene_says():
+def test_bar_markers_have_the_thickness_of_the_scene():
     for share in (0.01, 0.05):
         markers = Held('four_bar', f'markers: {{thickness: {share}}}').markers(1.0)
         (crank,) = [edge for edge in named(markers, 'edges')
@@ -188,7 +188,7 @@ EXTENT = hypot(0.196, 0.115)
 """Of the four-bar, roughly: from −0.04 to 0.156 m, and from −0.04 to 0.076 m."""
 
 
-def test_curves_are_those_of_the_traced_points():
+def test_trace_markers_follow_the_traced_points():
     held = Held('four_bar')
     (curve,) = named(held.markers(1.0), 'traces')
     assert curve.type == LINE_STRIP
@@ -201,7 +201,7 @@ def test_curves_are_those_of_the_traced_points():
     assert not named(Held('five_bar').markers(*usual_inputs(Held('five_bar').closure)), 'traces')
 
 
-def test_a_trace_is_the_way_of_the_last_seconds():
+def test_timed_trace_marker_keeps_the_last_seconds():
     held = Held('five_bar', 'markers: {rate: 2, trace: 2.0}')
     start = usual_inputs(held.closure)
     gone = []
@@ -233,7 +233,7 @@ def ticked(effects, times, scene='rate: 1000'):
     rate=st.sampled_from(['30', '25', '7.5', '0.3', '1000', '59.94']),
     steps=st.lists(st.integers(1, 40 * MS), min_size=2, max_size=60),
 )
-def test_the_first_tick_of_each_period_has_a_message(rate, steps):
+def test_first_tick_of_each_period_publishes_markers(rate, steps):
     times = [sum(steps[:index]) for index in range(len(steps))]
     came = [time for time, _ in ticked(f'markers: {{rate: {rate}}}', times)]
     # Exact, as fractions: the double that stands for the rate is one.
@@ -243,7 +243,7 @@ def test_the_first_tick_of_each_period_has_a_message(rate, steps):
     assert came == expected
 
 
-def test_what_does_not_move_comes_once_a_second():
+def test_static_markers_are_published_once_a_second():
     came = ticked('markers: {rate: 10}', [100 * MS * index + MS for index in range(35)])
     assert len(came) == 35
     whole = [time for time, message in came if named(message.markers, 'ground')]
@@ -260,14 +260,14 @@ def test_what_does_not_move_comes_once_a_second():
         ('30', 'rate: 0.5', 6.0, 6.0),
     ],
 )
-def test_markers_live_as_long_as_they_are_due(rate, scene, moves, stays):
+def test_marker_lifetime_covers_the_publish_period(rate, scene, moves, stays):
     ((_, message),) = ticked(f'markers: {{rate: {rate}}}', [0], scene)
     for marker in message.markers:
         lifetime = marker.lifetime.sec + marker.lifetime.nanosec * 1e-9
         assert lifetime == (stays if marker.ns in ('ground', 'traces') else moves)
 
 
-def test_where_samples_make_the_ticks_nothing_goes_by_itself():
+def test_markers_of_sample_driven_ticks_never_expire():
     pipeline = built('four_bar', 'rate: 0\neffects: {markers: {}}')
     stamp = BEGIN + 5
     pipeline.offer(JointStateWriter(['crank_joint']).write(stamp, [1.0], [0.0]), stamp)
@@ -276,14 +276,14 @@ def test_where_samples_make_the_ticks_nothing_goes_by_itself():
         assert marker.header.stamp.nanosec == 5
 
 
-def test_ids_stay():
+def test_marker_ids_stay_the_same():
     held = Held('excavator_bucket', 'markers: {}')
     first, second = ([(m.ns, m.id) for m in held.markers(x)] for x in (0.8, 1.1))
     assert first == second
     assert len(set(first)) == len(first)
 
 
-def test_sensors_change_nothing_of_it():
+def test_sensor_effects_do_not_change_markers():
     noisy = 'bias: {joints: {rocker_joint: 0.5}}, encoder: {joints: {coupler_joint: {counts: 4}}}'
     (_, plain), (_, read) = (
         ticked(effects, [0])[0] for effects in ('markers: {}', f'markers: {{}}, {noisy}')
@@ -297,11 +297,11 @@ def test_sensors_change_nothing_of_it():
 @pytest.mark.parametrize(
     ('said', 'frame'), [('markers: {}', 'ground'), ('markers: {frame: base_link}', 'base_link')]
 )
-def test_markers_lie_in_the_frame_that_the_scene_says(said, frame):
+def test_markers_use_the_frame_of_the_scene(said, frame):
     assert {marker.header.frame_id for marker in Held('four_bar', said).markers(1.0)} == {frame}
 
 
-def test_of_several_linkages_each_has_its_own():
+def test_each_linkage_publishes_its_own_markers():
     four_bar = (LINKAGES / 'four_bar.yaml').read_bytes()
     text = (
         'linkages: [{name: left, linkage: l.yaml}, {name: right, linkage: l.yaml}]\n'
@@ -329,7 +329,7 @@ def transmission_angle(theta):
 
 @settings(max_examples=40)
 @given(theta=st.floats(radians(36.88), radians(101.5)), limit=st.sampled_from([0.0, 0.2, 0.6]))
-def test_links_are_red_near_a_toggle(theta, limit):
+def test_link_markers_turn_red_near_a_toggle(theta, limit):
     markers = DOUBLE_ROCKER[limit].markers(theta)
     red = [m.id for m in named(markers, 'links') if colour(m) == pytest.approx(RED, abs=0.01)]
     # The crank is no part of the dyad that folds.
@@ -344,7 +344,7 @@ DOUBLE_ROCKER = {
 }
 
 
-def test_at_a_toggle_there_is_a_pose_and_it_is_red():
+def test_link_markers_at_a_toggle_are_red():
     held = Held('double_rocker')
     # An end of the range, to the last float.
     tick = held.at(held.closure.input_ranges[0].lowest)
@@ -353,7 +353,7 @@ def test_at_a_toggle_there_is_a_pose_and_it_is_red():
     assert sum(colour(link) == pytest.approx(RED, abs=0.01) for link in links) == 2
 
 
-def test_beyond_it_what_moves_is_deleted_and_a_text_says_why():
+def test_open_loop_deletes_moving_markers_and_shows_the_gap():
     held = Held('double_rocker', 'markers: {}, velocity: {}')
     closed = {(m.ns, m.id): m.action for m in held.markers(1.0)}
     assert closed['status', 0] == DELETE
@@ -375,7 +375,7 @@ def test_beyond_it_what_moves_is_deleted_and_a_text_says_why():
     assert again == closed
 
 
-def test_of_two_linkages_one_may_be_open():
+def test_open_linkage_deletes_only_its_own_markers():
     text = (
         'linkages:\n'
         '- {name: a, linkage: l.yaml, drive: {profile: {table: [[0, 2.0], [9, 2.0]]}}}\n'
@@ -397,7 +397,7 @@ def test_of_two_linkages_one_may_be_open():
     assert not any(pipeline.tick(BEGIN + MS).extras)
 
 
-def test_without_a_crank_and_without_a_reading_nothing_comes():
+def test_markers_need_a_crank_and_a_reading():
     pipeline = built('four_bar', 'effects: {markers: {}}')
     assert pipeline.tick(BEGIN).extras == ()
     silent = built(
@@ -415,7 +415,7 @@ LOADED = 'loads: {gravity: [0, -9.81]}\ndrive: {constant_rate: {start: %s, rate:
 
 @pytest.mark.parametrize(('start', 'rate'), [(1.0, 0.0), (1.0, 30.0), (4.0, 0.01)])
 @pytest.mark.parametrize('scale', [0.0, 0.02])
-def test_an_arrow_shows_the_force_that_is_published(start, rate, scale):
+def test_force_arrow_marker_equals_the_published_force(start, rate, scale):
     effects = f'effects: {{pin_forces: {{}}, markers: {{force_scale: {scale}}}}}'
     pipeline = built('four_bar', LOADED % (start, rate) + effects)
     tick = pipeline.tick(BEGIN)
@@ -446,7 +446,7 @@ def test_an_arrow_shows_the_force_that_is_published(start, rate, scale):
 
 
 @pytest.mark.parametrize('start', [0.5, 2.5, 5.5])
-def test_an_effort_is_an_arc_the_way_it_pushes(start):
+def test_effort_marker_is_an_arc_in_push_direction(start):
     effects = 'effects: {effort: {}, markers: {force_scale: 0.02}}'
     pipeline = built('four_bar', LOADED % (start, 0.0) + effects)
     tick = pipeline.tick(BEGIN)
@@ -463,7 +463,7 @@ def test_an_effort_is_an_arc_the_way_it_pushes(start):
     assert not named(markers, 'forces')
 
 
-def test_the_effort_of_a_cylinder_is_straight():
+def test_cylinder_effort_marker_is_a_straight_arrow():
     pipeline = built(
         'excavator_bucket',
         'loads: {gravity: [0, -9.81]}\ndrive: {profile: {table: [[0, 1.0], [9, 1.0]]}}\n'
@@ -480,7 +480,7 @@ def test_the_effort_of_a_cylinder_is_straight():
     assert abs((end - begin) - 1e-4 * effort * way) < 1e-12
 
 
-def test_at_a_toggle_there_are_no_forces():
+def test_force_markers_are_deleted_at_a_toggle():
     linkage = (LINKAGES / 'double_rocker.yaml').read_text()
     masses = ''.join(
         f'  {link}: {{mass: 1.0, center: [0.05, 0], inertia: 0.1}}\n'

@@ -20,7 +20,7 @@ def limited(**limits):
 
 
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
-def test_readings_are_the_nearest_within_the_range(value, rate, effort):
+def test_measuring_range_clips_readings(value, rate, effort):
     sensor = limited(low=-1.0, high=2.0, rate=3.0, effort=0.5)
     given_reading = reading(BEGIN, value, value, rates=(rate, rate), efforts=(effort, effort))
     found = sensor(BEGIN, given_reading)
@@ -31,7 +31,7 @@ def test_readings_are_the_nearest_within_the_range(value, rate, effort):
     assert found.stamp == BEGIN
 
 
-def test_it_ends_what_bias_and_noise_have_made():
+def test_measuring_range_clips_biased_readings():
     effects = (
         'bias: {joints: {rocker_joint: 5}}, measuring_range: {joints: {rocker_joint: {high: 2}}}'
     )

@@ -47,21 +47,21 @@ def assert_white(numbers, deviation):
 
 
 @pytest.mark.parametrize('deviation', [1e-9, 0.002, 1e3])
-def test_white_noise_has_its_standard_deviation_and_no_memory(deviation):
+def test_white_noise_has_its_deviation_and_no_correlation(deviation):
     found = noisy({'rocker_joint': JointNoise(white=deviation)})
     assert_white(values(found), deviation)
     assert set(values(found, 0)) == {0.0}
     assert all(read.rates == (0.0, 0.0) for read in found)
 
 
-def test_white_noise_is_normal_beyond_its_variance():
+def test_white_noise_has_the_normal_fourth_moment():
     # Of a normal number the fourth moment is 3, and that of its estimate 96/n.
     numbers = values(noisy({'rocker_joint': JointNoise(white=0.5)}))
     fourth = sum((number / 0.5) ** 4 for number in numbers) / N
     assert likely((fourth - 3.0) ** 2 / (96.0 / N), 1)
 
 
-def test_the_noise_of_rates_is_in_the_rates_only():
+def test_rate_noise_changes_only_the_rates():
     found = noisy({'rocker_joint': JointNoise(rate_white=0.3)})
     assert_white([read.rates[1] for read in found], 0.3)
     assert all(read.joints == (0.0, 0.0) for read in found)
@@ -69,7 +69,7 @@ def test_the_noise_of_rates_is_in_the_rates_only():
 
 
 @pytest.mark.parametrize('times', [REGULAR, IRREGULAR], ids=['1 kHz', 'irregular ticks'])
-def test_the_steps_of_a_walk_go_as_the_root_of_the_time(times):
+def test_walk_steps_grow_with_the_root_of_time(times):
     walk = values(noisy({'rocker_joint': JointNoise(walk=0.25)}, times))
     assert walk[0] == 0.0
     steps = []
@@ -81,7 +81,7 @@ def test_the_steps_of_a_walk_go_as_the_root_of_the_time(times):
     assert_white(steps, 0.25)
 
 
-def test_a_walk_ends_as_far_off_whatever_the_ticks_between():
+def test_walk_deviation_does_not_depend_on_the_ticks():
     # After 0.1 s the standard deviation is K·√0.1, in one step or in a hundred.
     for times in ([BEGIN, BEGIN + 100 * MS], [BEGIN + i * MS for i in range(101)]):
         ends = [
@@ -91,7 +91,7 @@ def test_a_walk_ends_as_far_off_whatever_the_ticks_between():
         assert likely(squares(ends, 2.0 * sqrt(0.1)), 300)
 
 
-def test_white_and_walk_add_up():
+def test_white_noise_and_walk_add_up():
     white, walk = JointNoise(white=0.01), JointNoise(walk=0.3)
     both = JointNoise(white=0.01, walk=0.3)
     alone = [values(noisy({'rocker_joint': kind})) for kind in (white, walk)]
@@ -100,7 +100,7 @@ def test_white_and_walk_add_up():
 
 
 @pytest.mark.parametrize('times', [REGULAR, IRREGULAR])
-def test_a_drift_has_its_deviation_at_any_time_and_forgets_by_its_correlation_time(times):
+def test_drift_has_its_deviation_and_correlation_time(times):
     # What is new at each reading is white: d₂ − φ·d₁, of variance s²·(1 − φ²).
     noise = JointNoise(drift=0.02, correlation_time=0.05)
     drifted = values(noisy({'rocker_joint': noise}, times))
@@ -114,19 +114,19 @@ def test_a_drift_has_its_deviation_at_any_time_and_forgets_by_its_correlation_ti
     assert_white(new, 1.0)
 
 
-def test_drifts_of_many_seeds_spread_as_much_at_the_first_reading_as_later():
+def test_drift_spreads_equally_from_the_first_reading():
     noise = {'rocker_joint': JointNoise(drift=0.5, correlation_time=0.01)}
     runs = [values(noisy(noise, REGULAR[:30], seed=f'{seed}')) for seed in range(1000)]
     for reading_number in (0, 3, 29):
         assert likely(squares([run[reading_number] for run in runs], 0.5), 1000)
 
 
-def test_a_density_is_white_noise_of_the_root_of_the_rate():
+def test_noise_density_scales_with_the_root_of_rate():
     # The context of these tests ticks at 1 kHz.
     assert_white(values(noisy({'rocker_joint': JointNoise(density=1e-3)})), 1e-3 * sqrt(1000.0))
 
 
-def test_the_noise_of_efforts_is_in_the_efforts_only():
+def test_effort_noise_changes_only_the_efforts():
     where = context(seed='seed')
     sensor = NoiseEffect({'rocker_joint': JointNoise(effort_white=0.3)}).sensor(where)
     found = [sensor(now, reading(now, 0.0, 0.0)._replace(efforts=(0.0, 0.0))) for now in REGULAR]
@@ -135,7 +135,7 @@ def test_the_noise_of_efforts_is_in_the_efforts_only():
     assert sensor(BEGIN, reading(BEGIN, 0.0, 0.0)).efforts == ()
 
 
-def test_what_one_joint_has_does_not_change_the_other():
+def test_noise_of_one_joint_does_not_change_another():
     one = JointNoise(white=0.01, walk=0.3, rate_white=1.0)
     alone, beside = (
         noisy({'rocker_joint': one}),
@@ -146,25 +146,25 @@ def test_what_one_joint_has_does_not_change_the_other():
     assert values(beside, 0) != values(beside, 1)
 
 
-def test_the_noise_of_two_joints_goes_its_own_ways():
+def test_noise_of_two_joints_is_independent():
     one = JointNoise(white=1.0)
     found = noisy({'coupler_joint': one, 'rocker_joint': one})
     products = sum(a * b for a, b in zip(values(found, 0), values(found, 1), strict=True))
     assert likely(products**2 / N, 1)
 
 
-def test_the_kinds_of_noise_of_a_joint_go_their_own_ways():
+def test_noise_kinds_of_one_joint_are_independent():
     found = noisy({'rocker_joint': JointNoise(white=1.0, rate_white=1.0)})
     products = sum(read.joints[1] * read.rates[1] for read in found)
     assert likely(products**2 / N, 1)
 
 
-def test_that_of_a_slide_is_in_metres():
+def test_slide_noise_is_in_metres():
     found = noisy({'rod_slide': JointNoise(white=1e-5)}, loop=SLIDE)
     assert_white(values(found), 1e-5)
 
 
-def test_a_scene_has_the_noise_that_it_names_and_no_other():
+def test_scene_publishes_only_the_named_noise():
     text = 'noise: {joints: {rocker_joint: {white: 0.01, walk: 0.1}}}'
     ideal, first = published('', 2000 // 10), published(text, 2000 // 10)
     errors = [a.joints[1] - b.joints[1] for a, b in zip(first, ideal, strict=True)]

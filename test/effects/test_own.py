@@ -157,7 +157,7 @@ def refusal(file):
     return str(caught.value)
 
 
-def test_a_module_of_ones_own_is_an_effect(tmp_path, package):
+def test_user_module_works_as_an_effect(tmp_path, package):
     ideal = joints(scene_file(tmp_path, ['velocity: {}']))
     mine = package(add=ADD)
     file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}'])
@@ -174,7 +174,7 @@ def test_a_module_of_ones_own_is_an_effect(tmp_path, package):
         ({'a': ADD, 'b': DOUBLE.replace('bias', 'tolerance')}, lambda x: x * 2.0 + 1.5),
     ],
 )
-def test_it_acts_behind_the_effect_that_it_says(tmp_path, package, behind, expected):
+def test_user_effect_acts_behind_its_declared_effect(tmp_path, package, behind, expected):
     mine = package(**behind)
     ideal = joints(scene_file(tmp_path, ['velocity: {}']))
     own = [f'{mine}.{name}: {{}}' for name in behind]
@@ -182,7 +182,7 @@ def test_it_acts_behind_the_effect_that_it_says(tmp_path, package, behind, expec
     assert joints(file)[2] == pytest.approx(expected(ideal[2]), rel=1e-15)
 
 
-def test_the_order_in_the_file_does_not_matter(tmp_path, package):
+def test_file_order_does_not_change_the_effect_order(tmp_path, package):
     mine = package(add=ADD, double=DOUBLE)
     lines = [f'{mine}.add: {{}}', f'{mine}.double: {{}}', 'velocity: {}']
     stages = [
@@ -192,20 +192,20 @@ def test_the_order_in_the_file_does_not_matter(tmp_path, package):
     assert stages == [('velocity', f'{mine}.add', f'{mine}.double')] * 2
 
 
-def test_it_may_stand_between_motor_and_crank(tmp_path, package):
+def test_user_effect_may_change_the_crank(tmp_path, package):
     mine = package(late=LATE_CRANK)
     file = scene_file(tmp_path, [f'{mine}.late: {{by: 0.5}}'])
     assert joints(file, 2)[0] == pytest.approx(2 * RATE - 0.5, rel=1e-15)
 
 
-def test_it_may_alter_the_linkage(tmp_path, package):
+def test_user_effect_may_alter_the_linkage(tmp_path, package):
     mine = package(longer=LONGER)
     file = scene_file(tmp_path, [f'{mine}.longer: {{by: 0.02}}'])
     altered = Pipeline(load_scene(file)).closures[0].linkage
     assert altered.links['crank']['A'] == (0.06, 0.0)
 
 
-def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
+def test_user_effect_inputs_are_computed_but_not_published(tmp_path, package):
     mine = package(soft=YIELD)
     rigid = joints(scene_file(tmp_path, ['velocity: {}']))
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
@@ -224,7 +224,7 @@ def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
     assert look.reading.joints == pytest.approx([joint + force for joint in rigid], rel=1e-12)
 
 
-def test_it_may_publish_a_message_of_its_own(tmp_path, package):
+def test_user_effect_may_publish_its_own_message(tmp_path, package):
     mine = package(tell=TELL)
     pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.tell: {{}}'])))
     assert [extra.topic for extra in pipeline.extras] == ['~/mine']
@@ -285,7 +285,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('case', REFUSED)
-def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
+def test_invalid_user_effect_is_refused_in_one_line(tmp_path, package, case):
     code, said = REFUSED[case]
     mine = package(effect=code)
     file = scene_file(tmp_path, ['velocity: {}', f'{mine}.effect: {{}}'])
@@ -307,13 +307,13 @@ def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
     ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {}'),
     ('biass: {}', "effects.biass: unknown key; did you mean 'bias'?"),
 ])  # fmt: skip
-def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, line, said):
+def test_wrong_user_effect_name_is_refused_in_one_line(tmp_path, package, line, said):
     mine = package(add=ADD)
     file = scene_file(tmp_path, ['velocity: {}', line.replace('MINE', mine)])
     assert refusal(file).startswith(f'{file}:5: {said.replace("MINE", mine)}')
 
 
-def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, package):
+def test_schema_accepts_user_effects_and_refuses_misspelt_keys(tmp_path, package):
     mine = package(add=ADD)
     file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}', 'biass: {}', f'{mine}.other: 3'])
     validator = pytest.importorskip('jsonschema').Draft202012Validator(scene_schema())
@@ -323,7 +323,7 @@ def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, packag
     }  # fmt: skip
 
 
-def test_a_scene_without_one_does_not_import_what_looks_for_them():
+def test_scene_without_user_effects_imports_no_loader():
     code = (
         'import sys\nfrom linkage_ros.tick.pipeline import Pipeline\n'
         'from linkage_ros.description.scene_file import load_scene\n'
@@ -341,7 +341,7 @@ def test_a_scene_without_one_does_not_import_what_looks_for_them():
         ('__init__', '__version__ = "3.2"\n', '3.2, sha256 {}'),
     ],
 )
-def test_a_run_says_which_module_it_was(tmp_path, package, where, line, expected):
+def test_run_records_the_hash_of_user_effects(tmp_path, package, where, line, expected):
     code = {'effect': ADD, '__init__': ''}
     mine = package(**{name: text + line * (name == where) for name, text in code.items()})
     file = scene_file(tmp_path, [f'{mine}.effect: {{}}', 'bias: {joints: {rocker_joint: 1}}'])
@@ -361,7 +361,7 @@ def crank_bag(folder):
     bag.close({})
 
 
-def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
+def test_bag_with_a_user_effect_replays_with_its_module(tmp_path, package):
     mine, folder = package(add=ADD), tmp_path / 'elsewhere'
     folder.mkdir()
     scene_file(folder, []).write_text(f'linkage: linkage.yaml\neffects: {{{mine}.add: {{}}}}\n')
@@ -392,7 +392,7 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
     assert versions['here'][f'{mine}.add'] == f'sha256 {now}'
 
 
-def test_a_bag_says_which_module_it_was(tmp_path, package):
+def test_bag_records_the_hash_of_user_effects(tmp_path, package):
     mine = package(add=ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
     files = scene_files(scene, [], 'with the run', tmp_path)

@@ -52,7 +52,7 @@ def values(found):
     st.lists(st.integers(1, 5 * MS), min_size=5, max_size=40),
     st.booleans(),
 )
-def test_each_joint_has_a_clock_of_its_own_to_the_nanosecond(rates, phase, ppm, gaps, silent):
+def test_each_joint_sensor_has_its_own_clock(rates, phase, ppm, gaps, silent):
     ticks = [sum(gaps[:n]) for n in range(len(gaps))]
 
     def sample(now, begin, rate):
@@ -80,7 +80,7 @@ def test_each_joint_has_a_clock_of_its_own_to_the_nanosecond(rates, phase, ppm, 
             assert (found.stamp, found.joints) == (BEGIN + now, expected)
 
 
-def test_a_gap_is_as_late_as_the_readings_of_each_joint():
+def test_gap_is_delayed_like_each_joint():
     sensor, found, begins = delayed(0.001, {'seconds': 0.004}, between='sampled'), [], []
     for ms in range(16):
         now = BEGIN + ms * MS
@@ -98,7 +98,7 @@ def test_a_gap_is_as_late_as_the_readings_of_each_joint():
     assert begins == [4]
 
 
-def test_a_joint_repeats_all_that_it_has_read():
+def test_rate_limited_joint_repeats_its_whole_reading():
     sensor = limited(1000.0, {'rate': 100.0})
     for ms in range(10):
         now, ones = BEGIN + ms * MS, (ms, ms)
@@ -107,7 +107,7 @@ def test_a_joint_repeats_all_that_it_has_read():
         assert found == expected
 
 
-def test_there_are_no_rates_while_a_reading_without_them_is_repeated():
+def test_repeated_reading_without_rates_publishes_no_rates():
     sensor = limited(1000.0, {'rate': 500.0})
     found = []
     for ms in range(6):
@@ -134,7 +134,7 @@ def losses(sensor, n=N):
 
 
 @pytest.mark.parametrize('chain', OWN)
-def test_of_each_joint_as_much_is_lost_as_it_says(chain):
+def test_each_joint_loses_its_declared_share(chain):
     probability, burst = OWN[chain]
     of_coupler, of_rocker = losses(lossy(0.1, {'rocker_joint': OWN[chain]}))
     # Variances of means: of independent samples; of a chain of two states whose correlation falls
@@ -152,7 +152,7 @@ def test_joints_lose_their_samples_independently():
     assert likely((both - 0.03) ** 2 / (0.03 * 0.97 / N), 1)
 
 
-def test_nothing_is_published_where_all_joints_are_lost():
+def test_loss_of_all_joints_publishes_nothing():
     sensor = lossy(0.5, {'rocker_joint': (0.5,)})
     found = [sensor(BEGIN + n * MS, reading(BEGIN + n * MS, n, n)) for n in range(400)]
     _, *rest = found
@@ -161,7 +161,7 @@ def test_nothing_is_published_where_all_joints_are_lost():
 
 
 @pytest.mark.parametrize(('hold', 'samples'), [('silent', 1), ('repeat', 50)])
-def test_a_lost_sample_of_a_slow_joint_is_missing_until_its_next(hold, samples):
+def test_lost_sample_of_a_slow_joint_stays_missing(hold, samples):
     # Of the rocker's samples, each 50 ms, half are lost; repeated, each is lost 50 times or fewer.
     limit = limited(1000.0, {'rate': 20.0}, hold=hold)
     line = lossy(0.0, {'rocker_joint': (0.5,)})
@@ -180,7 +180,7 @@ def test_a_lost_sample_of_a_slow_joint_is_missing_until_its_next(hold, samples):
         assert likely((sum(change > 0 for change in changes) - n / 100) ** 2 / (n / 50 / 4), 1)
 
 
-def test_a_joint_that_is_silent_is_so_for_its_delay():
+def test_silent_joint_is_delayed_by_its_own_delay():
     # The rocker is sampled at 0, 5, 10, … ms, and its samples come in turn, 7 ms and more later.
     limit = limited(1000.0, {'rate': 200.0}, hold='silent')
     line = delayed(0.0, {'seconds': 0.0061}, between='interpolated')
@@ -194,7 +194,7 @@ def test_a_joint_that_is_silent_is_so_for_its_delay():
     ]
 
 
-def test_one_more_joint_changes_no_other():
+def test_added_joint_sensor_changes_no_other_joint():
     alone, _ = losses(lossy(0.1, {'rocker_joint': (0.3,)}), 500)
     whole = DropoutEffect(0.1).sensor(context())
     told = [whole(BEGIN, reading(BEGIN, n, n)) is None for n in range(500)]
@@ -207,7 +207,7 @@ def test_one_more_joint_changes_no_other():
     assert both[0] != both[1]
 
 
-def test_one_more_random_latency_changes_no_other():
+def test_added_random_latency_changes_no_other_joint():
     def rocker(joints):
         found = published(f'delay: {{seconds: 0, joints: {{{joints}}}}}', 200)
         return [None if read is None else read.joints[1] for read in found]
@@ -239,7 +239,7 @@ CHAINS = {
 
 
 @pytest.mark.parametrize('name', CHAINS)
-def test_a_joint_reads_as_where_all_are_read_by_its_sensor(name):
+def test_joint_sensor_equals_the_same_general_sensor(name):
     effects, general, own = CHAINS[name]
     found = published(effects.format(f'{general}, joints: {{rocker_joint: {{{own}}}}}'), 200)
     coupler = published(effects.format(general), 200)
@@ -262,7 +262,7 @@ MUJOCO = [
 
 
 @pytest.mark.parametrize('sensors', MUJOCO)
-def test_as_sensors_of_mujoco_with_an_interval_and_a_delay(sensors):
+def test_joint_sensors_equal_mujoco_interval_and_delay(sensors):
     mujoco = pytest.importorskip('mujoco')
     elements = [
         f'<jointpos joint="slide" nsample="9" interval="{period} {phase}" delay="{late}"/>'
@@ -295,7 +295,7 @@ def test_as_sensors_of_mujoco_with_an_interval_and_a_delay(sensors):
     assert told > 45
 
 
-def test_all_three_together_as_the_timeline_says():
+def test_joint_rate_phase_and_delay_follow_the_timeline():
     # The rocker's samples of 10, 60, 110, … ms are 20 ms late; the coupler's, of each 10 ms, 4 ms.
     found = published(
         'rate_limit: {rate: 100, joints: {rocker_joint: {rate: 20, phase: 0.01}}}, '

@@ -30,7 +30,7 @@ def reactions(within, *crank):
 
 
 @given(numbers, numbers, numbers)
-def test_the_pin_of_a_pendulum_bears_weight_and_inertia(angle, rate, acceleration):
+def test_pendulum_pin_force_equals_weight_and_inertia(angle, rate, acceleration):
     # m·(a + g), with a = r·(iα − ω²)·e^{iθ}.
     (found,) = reactions(context(linkage_of(PENDULUM)), angle, rate, acceleration)
     pull = 0.3 * (1j * acceleration - rate * rate) * rect(1.0, angle)
@@ -41,7 +41,7 @@ def test_the_pin_of_a_pendulum_bears_weight_and_inertia(angle, rate, acceleratio
 @pytest.mark.parametrize(
     'motion', [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
 )
-def test_those_of_a_four_bar_are_in_balance(motion):
+def test_four_bar_pin_forces_balance_every_link(motion):
     within = context(FOUR_BAR)
     _, _, forces = FourBar(FOUR_BAR, motion, GRAVITY).balance()
     found = dict(zip(within.reactions.names, reactions(within, *motion), strict=True))
@@ -52,7 +52,7 @@ def test_those_of_a_four_bar_are_in_balance(motion):
         assert found[name] == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
-def test_where_the_balance_has_no_solution_there_are_none():
+def test_singular_balance_gives_no_pin_forces():
     within = context(FOUR_BAR)
     vars(within)['reactions'] = type('Singular', (), {'solve': lambda *_: None})()
     assert moved(within, (1.0, 1.0, 1.0), {'pin_forces': ()}).reactions == ()
@@ -66,7 +66,7 @@ def pipeline(effects, linkages=b'linkage: l.yaml'):
     return Pipeline(parse_scene('scene', 'here', files))
 
 
-def test_they_are_published_beside_the_joint_states():
+def test_pin_forces_are_published_beside_the_joint_states():
     at_work = pipeline(b'{pin_forces: {}}\nloads: {gravity: [0, -9.81]}')
     assert [(each.topic, each.message) for each in at_work.extras] == [('~/pin_forces', TYPE)]
     begin = 1_700_000_000_000_000_000
@@ -88,7 +88,7 @@ def test_they_are_published_beside_the_joint_states():
         assert len(state.velocity) == len(state.effort) == 0
 
 
-def test_of_several_linkages_each_has_its_topic_and_its_names():
+def test_each_linkage_publishes_its_own_pin_forces():
     both = pipeline(
         b'{pin_forces: {}}', b'linkages: [{name: one, linkage: l}, {name: two, linkage: l}]'
     )
@@ -99,7 +99,7 @@ def test_of_several_linkages_each_has_its_topic_and_its_names():
 
 
 @pytest.mark.parametrize('effects', [b'{}', b'{effort: {}}', b'{velocity: {}, acceleration: {}}'])
-def test_without_it_no_forces_are_computed(effects):
+def test_scene_without_pin_forces_computes_none(effects):
     at_work = pipeline(effects)
     at_work.tick(10**9)
     assert all('reactions' not in vars(line.context) for line in at_work.linkages)

@@ -40,11 +40,11 @@ def sampled_at(rate, times, **clock):
         pytest.param(0.001, [0, 1, 999_999, 1_000_000], [0, 0, 0, 1_000_000], id='slow'),
     ],
 )
-def test_samples_are_taken_as_the_timeline_says(rate, ticks, samples):
+def test_rate_limit_samples_on_its_grid(rate, ticks, samples):
     assert sampled_at(rate, [ms * MS for ms in ticks]) == [ms * MS for ms in samples]
 
 
-def test_half_a_nanosecond_is_rounded_up():
+def test_rate_limit_rounds_half_nanoseconds_up():
     # 10⁹/1024 is 976562.5.
     ticks = [0, 976_562, 976_563, 1_953_124, 1_953_125]
     assert sampled_at(1024.0, ticks) == [0, 0, 976_563, 976_563, 1_953_125]
@@ -58,7 +58,7 @@ def test_half_a_nanosecond_is_rounded_up():
     st.floats(-1000.0, 1000.0),
     st.integers(1, 10**9),
 )
-def test_a_sample_is_due_to_the_nanosecond_however_many_came_before(rate, k, ppm, first):
+def test_rate_limit_grid_is_exact_to_the_nanosecond(rate, k, ppm, first):
     # By a clock that runs fast, whose first sample is later than the first tick.
     real = Fraction(rate) * (1 + Fraction(ppm) / 10**6)
     due, before = (first + floor(n * Fraction(10**9) / real + Fraction(1, 2)) for n in (k, k - 1))
@@ -69,7 +69,7 @@ def test_a_sample_is_due_to_the_nanosecond_however_many_came_before(rate, k, ppm
     assert sampled_at(rate, times, **clock) == [None, first, before, before, due]
 
 
-def test_a_day_of_samples_at_three_hertz_does_not_drift():
+def test_rate_limit_does_not_drift_over_a_day():
     seconds = 86_400
     times = [t * 10**9 + third for t in range(0, seconds, 600) for third in (0, 333_333_333)]
     assert sampled_at(3.0, times) == times
@@ -77,7 +77,7 @@ def test_a_day_of_samples_at_three_hertz_does_not_drift():
     assert sampled_at(3.0, sorted({0, *early})) == [0, 0, *early[1:]]
 
 
-def test_what_is_held_bears_the_stamp_of_the_tick():
+def test_held_reading_carries_the_stamp_of_the_tick():
     sensor = RateLimitEffect(100.0).sensor(context())
     rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
     first = reading(BEGIN, 0.5, 0.25, **rest)
@@ -87,7 +87,7 @@ def test_what_is_held_bears_the_stamp_of_the_tick():
         assert sensor(now, reading(now, 9.0, 9.0)) == first._replace(stamp=now)
 
 
-def test_a_scene_holds_readings_or_is_silent_between_samples():
+def test_rate_limited_scene_holds_or_omits_readings():
     ideal = published('')
     for n, held in enumerate(published('rate_limit: {rate: 100}')):
         assert held == ideal[n // 10 * 10]._replace(stamp=BEGIN + n * MS)

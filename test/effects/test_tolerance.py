@@ -40,11 +40,11 @@ def deviations(altered, drawn=FOUR_BAR):
     }
 
 
-def test_every_point_deviates_those_of_the_ground_too():
+def test_tolerance_shifts_every_point_including_the_ground():
     assert all(dx and dy for dx, dy in deviations(made(ToleranceEffect(1e-4))).values())
 
 
-def test_nothing_else_than_the_points_changes():
+def test_tolerance_changes_only_the_points():
     altered = made(ToleranceEffect(1e-4))
     for name in FOUR_BAR.__slots__:
         assert (getattr(altered, name) == getattr(FOUR_BAR, name)) is (
@@ -53,7 +53,7 @@ def test_nothing_else_than_the_points_changes():
 
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
-def test_without_a_deviation_the_linkage_is_the_drawn_one(file):
+def test_zero_tolerance_keeps_the_drawn_linkage(file):
     drawn = linkage_of(file.read_bytes())
     assert made(ToleranceEffect(), drawn=drawn) == drawn
 
@@ -69,12 +69,12 @@ def left_of(before):
         ]
 
 
-def test_what_is_cut_off_has_the_standard_deviation_that_is_written():
+def test_truncated_normal_has_the_written_standard_deviation():
     square, _ = left_of(BEFORE)
     assert abs(square - 1) < 1e-15
 
 
-def test_what_comes_out_is_normal_within_three_times_its_standard_deviation():
+def test_tolerance_deviations_are_normal_within_three_sigma():
     sigma = 1e-5
     values = sorted(
         value / sigma
@@ -100,7 +100,7 @@ def test_what_comes_out_is_normal_within_three_times_its_standard_deviation():
     assert sum(v * v for v in values) / n == pytest.approx(1.0, abs=error)
 
 
-def test_a_length_deviates_by_the_root_of_two():
+def test_link_length_deviates_by_root_two_sigma():
     sigma = 1e-5
     off = []
     for seed in range(2000):
@@ -111,13 +111,13 @@ def test_a_length_deviates_by_the_root_of_two():
     assert found == pytest.approx(1.0, abs=4.0 * sqrt(2.0 / len(off)))
 
 
-def test_twice_the_deviation_is_the_same_mechanism_twice_as_badly_made():
+def test_doubled_tolerance_doubles_every_deviation():
     one, two = (deviations(made(ToleranceEffect(s))) for s in (1e-4, 2e-4))
     for point, pair in one.items():
         assert two[point] == pytest.approx([2.0 * value for value in pair], abs=1e-16)
 
 
-def test_links_that_are_not_named_stay_and_those_that_are_draw_what_they_drew():
+def test_tolerance_changes_only_the_named_links():
     every = made(ToleranceEffect(1e-4))
     some = made(ToleranceEffect(1e-4, links=('rocker', 'ground')))
     for link in FOUR_BAR.links:
@@ -125,7 +125,7 @@ def test_links_that_are_not_named_stay_and_those_that_are_draw_what_they_drew():
         assert some.links[link] == (every if deviating else FOUR_BAR).links[link]
 
 
-def test_what_is_given_takes_the_place_of_what_is_drawn():
+def test_given_deviation_replaces_the_drawn_one():
     every = deviations(made(ToleranceEffect(1e-4)))
     given = {'coupler.B': (1e-4, 0.0), 'ground.O4': (0.0, -2e-4)}
     some = deviations(made(ToleranceEffect(1e-4, given=given)))
@@ -133,7 +133,7 @@ def test_what_is_given_takes_the_place_of_what_is_drawn():
         assert some[point] == pytest.approx(given.get(point, pair), abs=1e-16)
 
 
-def test_given_lengths_are_those_of_a_linkage_written_so():
+def test_given_deviations_equal_a_linkage_of_those_lengths():
     # The coupler 0.1 mm longer, the ground 0.2 mm shorter.
     altered = made(ToleranceEffect(given={'coupler.B': (1e-4, 0), 'ground.O4': (-2e-4, 0)}))
     written = linkage_of('four_bar: {a: 0.04, b: 0.1201, c: 0.08, d: 0.0998}')
@@ -142,7 +142,7 @@ def test_given_lengths_are_those_of_a_linkage_written_so():
         assert found == pytest.approx(expected, abs=1e-13)
 
 
-def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
+def test_off_axis_pin_shifts_the_published_joint():
     # The rocker's frame stays that of the drawing: its pin lies 1 mm to the left of its axis.
     altered = made(ToleranceEffect(given={'rocker.B': (0.0, 1e-3)}))
     straight = linkage_of(f'four_bar: {{a: 0.04, b: 0.12, c: {hypot(0.08, 1e-3)!r}, d: 0.1}}')
@@ -153,7 +153,7 @@ def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
 
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
-def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
+def test_gallery_linkage_with_tolerance_closes(file):
     drawn = linkage_of(file.read_bytes())
     closure = Closure(made(ToleranceEffect(1e-6), drawn=drawn))
     if len(drawn.inputs) > 1:
@@ -166,7 +166,7 @@ def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
     assert closure.residual(position) < 1e-12
 
 
-def test_a_parallelogram_as_it_was_made_is_none_any_more():
+def test_parallelogram_with_tolerance_no_longer_turns_fully():
     # A change point is a matter of exact lengths: the two assemblies no longer meet there.
     drawn = linkage_of('four_bar: {a: 0.3, b: 1.6, c: 0.3, d: 1.6}')
     follower = [Closure(drawn).position(pi * i / 50).joints[1] for i in range(101)]

@@ -24,7 +24,7 @@ def reading(*joints):
 
 
 @given(st.lists(steps, min_size=1, max_size=60), st.floats(-pi, pi))
-def test_continuous_follows_from_any_turns(moves, start):
+def test_continuous_angle_follows_the_turns(moves, start):
     # What the loop knows of an angle is the angle up to turns.
     stage = Continuous([True])
     angle = wrap_angle(start)
@@ -35,14 +35,14 @@ def test_continuous_follows_from_any_turns(moves, start):
 
 
 @given(st.floats(-1e6, 1e6))
-def test_the_first_angle_is_wrapped(angle):
+def test_continuous_angle_starts_wrapped(angle):
     (first,) = Continuous([True])(0, reading(angle)).joints
     assert -pi < first <= pi
     assert first == wrap_angle(angle)
 
 
 @given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=20))
-def test_a_step_is_never_more_than_half_a_turn(angles):
+def test_continuous_angle_steps_at_most_half_a_turn(angles):
     stage = Continuous([True])
     last = None
     for angle in angles:
@@ -53,14 +53,14 @@ def test_a_step_is_never_more_than_half_a_turn(angles):
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20))
-def test_slides_are_left_alone(lengths):
+def test_turn_handling_leaves_slides_unchanged(lengths):
     for stage in (Continuous([False, True]), wrap_all([False, True])):
         for length in lengths:
             assert stage(0, reading(length, length)).joints[0] == length
 
 
 @given(st.floats(-1e9, 1e9))
-def test_wrapped_is_exact(angle):
+def test_wrapped_angle_is_exact(angle):
     rest = wrap_angle(angle)
     assert -pi < rest <= pi
     turns = round((Fraction(angle) - Fraction(rest)) / Fraction(tau))
@@ -81,14 +81,14 @@ def test_wrapped_is_exact(angle):
         (4.0, 4.0 - tau),
     ],
 )
-def test_wrapped_at_the_edge(angle, rest):
+def test_wrapped_angle_is_right_at_pi(angle, rest):
     assert wrap_angle(angle) == pytest.approx(rest, abs=1e-15)
     assert -pi < wrap_angle(angle) <= pi
     (now,) = wrap_all([True])(0, reading(angle)).joints
     assert now == wrap_angle(angle)
 
 
-def test_many_turns_add_up_without_drift():
+def test_continuous_angle_does_not_drift_over_many_turns():
     stage = Continuous([True])
     for step in range(100_001):
         (now,) = stage(0, reading(wrap_angle(step * 1.0))).joints
@@ -96,7 +96,7 @@ def test_many_turns_add_up_without_drift():
     assert abs(now - 100_000.0) < 1e-11
 
 
-def test_the_rest_of_the_motion_is_passed_on():
+def test_turn_handling_passes_other_fields_unchanged():
     rest = (1.0, 2.0), (3.0, 4.0), (5.0, 0.0)
     for stage in (Continuous([True, False]), wrap_all([True, False])):
         assert stage(9, SensorReading(7, (0.5, 0.5), *rest)) == (7, (0.5, 0.5), *rest)

@@ -41,25 +41,25 @@ def printed(script: str, folder: Path, *arguments: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def test_the_readme_names_each_script_once() -> None:
+def test_readme_lists_each_example_script_once() -> None:
     text = (FOLDER / 'README.md').read_text('utf-8')
     assert sorted(re.findall(r'^\| \[(.*?)\]', text, re.MULTILINE)) == SCRIPTS
     assert len(SCRIPTS) == 9
 
 
-def test_each_is_short() -> None:
+def test_example_scripts_have_at_most_40_lines() -> None:
     for file in FOLDER.rglob('*.py'):
         own = [line for line in file.read_text('utf-8').splitlines() if line[:1] != '#']
         assert len(own) <= 40, file
 
 
-def test_turn(tmp_path: Path) -> None:
+def test_turn_example_prints_the_joints_every_30_degrees(tmp_path: Path) -> None:
     head, *rows = printed('turn.py', tmp_path)
     assert head.split() == ['crank', *lr.load('jansen_leg').joint_names]
     assert [int(row.split()[0]) for row in rows] == list(range(0, 360, 30))
 
 
-def test_table_to_csv(tmp_path: Path) -> None:
+def test_csv_example_writes_angles_and_rates_of_closure(tmp_path: Path) -> None:
     assert printed('table_to_csv.py', tmp_path)[0] == '361 states, 0 of them open'
     rows = list(csv.DictReader((tmp_path / 'four_bar.csv').open()))
     closure = lr.load('four_bar')
@@ -71,7 +71,7 @@ def test_table_to_csv(tmp_path: Path) -> None:
             assert told == pytest.approx(dict(found), abs=1e-12)
 
 
-def test_draw_svg(tmp_path: Path) -> None:
+def test_svg_example_draws_every_shipped_linkage(tmp_path: Path) -> None:
     printed('draw_svg.py', tmp_path)
     pictures = sorted(tmp_path.glob('*.svg'))
     assert [picture.stem for picture in pictures] == lr.linkage_names()
@@ -79,14 +79,14 @@ def test_draw_svg(tmp_path: Path) -> None:
         assert ET.parse(picture).getroot().tag.endswith('svg')
 
 
-def test_scene_without_ros(tmp_path: Path) -> None:
+def test_scene_example_prints_read_and_true_slides(tmp_path: Path) -> None:
     lines = printed('scene_without_ros.py', tmp_path)
     pairs = re.findall(r'piston_slide: read (\S+), true (\S+)', ' '.join(lines))
     assert len(pairs) == 5
     assert all(0.0 < abs(float(read) - float(true)) < 1e-3 for read, true in pairs)
 
 
-def test_own_effect(tmp_path: Path) -> None:
+def test_effect_example_reads_within_its_dead_zone(tmp_path: Path) -> None:
     lines = printed('own_effect.py', tmp_path)
     off = [
         float(true) - float(read)
@@ -97,7 +97,7 @@ def test_own_effect(tmp_path: Path) -> None:
     assert any(off)
 
 
-def test_function_generator(tmp_path: Path) -> None:
+def test_function_generator_example_meets_three_precision_points(tmp_path: Path) -> None:
     _, *rows = printed('function_generator.py', tmp_path)
     values = [re.findall(r'-?\d+\.\d{5}', row) for row in rows]
     assert len(values) == 11
@@ -114,14 +114,14 @@ def test_function_generator(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which('cc') is None, reason='there is no C compiler')
-def test_compile_to_c(tmp_path: Path) -> None:
+def test_compile_example_gives_equal_joints_in_c_and_python(tmp_path: Path) -> None:
     status, in_c, in_python = printed('compile_to_c.py', tmp_path)
     assert status == 'status: 0'
     assert in_c.split()[2:] == in_python.split()[2:] != []
 
 
 @pytest.mark.skipif(find_spec('jax') is None, reason='needs jax')
-def test_rods_by_gradients(tmp_path: Path) -> None:
+def test_gradient_example_finds_rods_with_zero_residual(tmp_path: Path) -> None:
     lines = printed('rods_by_gradients.py', tmp_path)
     before, gradient, rods, after = ([float(x) for x in line.split()[-2:]] for line in lines)
     assert max(map(abs, after)) < 1e-14
@@ -137,7 +137,7 @@ def test_rods_by_gradients(tmp_path: Path) -> None:
     assert gradient == pytest.approx(2.0 * np.array(before) @ turned, rel=1e-9)
 
 
-def test_read_bag(tmp_path: Path) -> None:
+def test_read_bag_example_prints_the_recorded_joints(tmp_path: Path) -> None:
     lines = printed('read_bag.py', tmp_path, str(BAG))
     assert lines[0] == '/joint_states sensor_msgs/msg/JointState'
     states = [line.split() for line in lines if line[0].isdigit()]

@@ -63,22 +63,22 @@ def window(fault, at='[0.02]', seconds=0.02):
     return f'{TURNING}faults: {{mine: {{{fault}, at: {at}, seconds: {seconds}}}}}'
 
 
-def test_during_silence_no_message_is_published():
+def test_silence_fault_publishes_no_message():
     assert angles(run(window('silence: {}'), TIMES)) == [0, 10, NOTHING, NOTHING, 40, 50]
 
 
-def test_freeze_repeats_the_last_reading_with_new_stamps():
+def test_freeze_fault_repeats_the_reading_with_new_stamps():
     messages = run(window('freeze: {}'), TIMES)
     assert angles(messages) == [0, 10, 10, 10, 40, 50]
     assert stamps(messages) == TIMES
     assert [CRANK.read(message).rates for message in messages] == [(1.0,)] * 6
 
 
-def test_freeze_from_the_first_tick_on_has_nothing_to_repeat():
+def test_freeze_fault_before_any_reading_publishes_nothing():
     assert angles(run(window('freeze: {}', '[0]'), TIMES)) == [NOTHING, NOTHING, 20, 30, 40, 50]
 
 
-def test_a_stuck_joint_stands_still_and_the_others_go_on():
+def test_stuck_joint_stands_still_while_others_move():
     sound = run(f'{TURNING}faults: {{mine: {{silence: {{}}}}}}', TIMES)
     messages = run(window('stuck: {joint: rocker_joint}'), TIMES)
     assert angles(messages) == TIMES
@@ -88,7 +88,7 @@ def test_a_stuck_joint_stands_still_and_the_others_go_on():
     assert [rate == 0.0 for rate in rates] == [False, False, True, True, False, False]
 
 
-def test_a_broken_link_leaves_no_pose():
+def test_broken_link_fault_gives_no_pose():
     pipeline = Pipeline(scene_of(window('broken_link: {link: coupler}')))
     looks = []
     for time in TIMES:
@@ -101,7 +101,7 @@ def test_a_broken_link_leaves_no_pose():
     assert [look.reading is None for look in looks] == [False, False, True, True, False, False]
 
 
-def test_not_a_number_is_refused_and_the_last_good_sample_carried_forward():
+def test_not_a_number_fault_carries_the_last_sample_forward():
     text = 'effects: {velocity: {}}\nfaults: {mine: {not_a_number: {}, at: [0.02], seconds: 0.02}}'
     pipeline = Pipeline(scene_of(text))
     writer = JointStateWriter(['crank_joint'])
@@ -119,12 +119,12 @@ def test_not_a_number_is_refused_and_the_last_good_sample_carried_forward():
     assert crank == [pytest.approx(2.03)]
 
 
-def test_the_clock_jumps_and_jumps_back():
+def test_time_jump_fault_shifts_the_stamps():
     messages = run(window('time_jump: {by: 5.0}'), TIMES)
     assert stamps(messages) == [0, 10, 5020, 5030, 40, 50]
 
 
-def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
+def test_faults_start_and_end_at_the_first_tick_due():
     injection = Injection(scene_of(window('silence: {}', '[0.0151, 0.04]', 0.01)).faults)
     changes = {t: injection.advance(BEGIN + t * MS) for t in (0, 15, 16, 25, 26, 39, 40, 49, 50)}
     on, off = [FaultChange('mine', True)], [FaultChange('mine', False)]
@@ -132,7 +132,7 @@ def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
     assert injection.injected == {'mine': 2}
 
 
-def test_windows_that_touch_are_two():
+def test_touching_fault_windows_count_twice():
     injection = Injection(scene_of(window('silence: {}', '[0.01, 0.02]', 0.01)).faults)
     assert injection.advance(BEGIN) == []
     assert injection.advance(BEGIN + 10 * MS) == [FaultChange('mine', True)]
@@ -152,7 +152,7 @@ def test_windows_that_touch_are_two():
         ([0.002, 0.004], 0.002, range(2, 6), 2),
     ],
 )
-def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
+def test_overlapping_fault_windows_last_until_the_later_end(at, seconds, on, times):
     injection = Injection({'hang': FaultEntry('freeze', Freeze(), tuple(at), seconds)})
     seen = []
     for ms in range(15):
@@ -163,13 +163,13 @@ def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
     assert injection.injected['hang'] == times
 
 
-def test_a_fault_that_is_asked_for_lasts_until_its_end_is_asked_for():
+def test_requested_fault_lasts_until_switched_off():
     text = f'{TURNING}faults: {{mine: {{silence: {{}}}}}}'
     ask = {20: [('mine', True)], 30: [('mine', True)], 40: [('mine', False)]}
     assert angles(run(text, TIMES, ask)) == [0, 10, NOTHING, NOTHING, 40, 50]
 
 
-def test_several_faults_at_once():
+def test_two_faults_act_at_once():
     quiet = 'quiet: {silence: {}, at: [0.03], seconds: 0.01}'
     late = 'late: {time_jump: {by: 1}, at: [0.01], seconds: 0.03}'
     messages = run(f'{TURNING}faults: {{{quiet}, {late}}}', TIMES)
@@ -242,7 +242,7 @@ def of_samples(silent=()):
     return {time: [] if time in silent else [time - OLD] for time in MESSAGE_TIMES}
 
 
-def test_a_fault_begins_with_the_first_sample_that_is_not_before_its_time():
+def test_fault_starts_with_the_first_sample_due():
     run = Run(fault_window('silence: {}'))
     assert run.stamps() == of_samples(IN_WINDOW)
     assert run.changes == {21: [True], 41: [False]}
@@ -250,29 +250,29 @@ def test_a_fault_begins_with_the_first_sample_that_is_not_before_its_time():
 
 
 @pytest.mark.parametrize(('at', 'first'), [('[0.021]', 21), ('[0.0210001]', 35)])
-def test_on_its_instant_it_has_begun(at, first):
+def test_fault_is_active_at_its_start_instant(at, first):
     assert list(Run(fault_window('silence: {}', at, 1.0)).changes) == [first]
 
 
 @pytest.mark.parametrize(('seconds', 'first'), [(0.02, 39), (0.0200001, 41)])
-def test_on_its_end_it_has_ended(seconds, first):
+def test_fault_is_inactive_at_its_end_instant(seconds, first):
     # From 19 to 39 ms.
     assert list(Run(fault_window('silence: {}', '[0.019]', seconds)).changes) == [21, first]
 
 
-def test_a_fault_between_two_samples_is_told_and_touches_none():
+def test_fault_between_two_samples_is_reported_without_effect():
     run = Run(fault_window('silence: {}', '[0.022]', 0.01))
     assert run.stamps() == of_samples()
     assert run.changes == {35: [True, False]}
 
 
-def test_the_times_are_those_of_the_clock_and_not_of_the_stamps():
+def test_fault_times_follow_the_clock_not_the_stamps():
     # By its stamp, 18 ms, the sample that comes at 21 ms would be before the fault.
     assert 21 - OLD < 20
     assert Run(fault_window('silence: {}')).published[21] == []
 
 
-def test_of_samples_that_come_together_all_see_the_same():
+def test_samples_of_one_burst_see_the_same_fault():
     run = Run(fault_window('silence: {}'), burst=3)
     assert {time: len(found) for time, found in run.published.items()} == {
         time: 0 if time in IN_WINDOW else 3 for time in MESSAGE_TIMES
@@ -280,7 +280,7 @@ def test_of_samples_that_come_together_all_see_the_same():
     assert run.changes == {21: [True], 41: [False]}
 
 
-def test_a_frozen_reading_has_the_stamps_of_the_samples():
+def test_frozen_reading_carries_the_stamps_of_samples():
     run = Run(fault_window('freeze: {}'))
     assert run.stamps() == of_samples()
     angles = {time: CRANK.read(found[0]).angles[0] for time, found in run.published.items()}
@@ -288,27 +288,27 @@ def test_a_frozen_reading_has_the_stamps_of_the_samples():
     assert angles == pytest.approx({t: (f - OLD) * 1e-3 for t, f in frozen.items()}, abs=1e-12)
 
 
-def test_samples_that_are_no_numbers_are_no_ticks():
+def test_not_a_number_samples_make_no_ticks():
     run = Run(fault_window('not_a_number: {}'))
     assert run.stamps() == of_samples(IN_WINDOW)
     assert run.counts.ticks == len(MESSAGE_TIMES) - len(IN_WINDOW)
     assert run.counts.rejected[Rejection.NOT_FINITE] == len(IN_WINDOW)
 
 
-def test_a_clock_that_is_set_back_refuses_samples_that_come_from_its_future():
+def test_clock_set_back_rejects_samples_from_the_future():
     run = Run(fault_window('time_jump: {by: -5}'))
     assert run.stamps() == of_samples(IN_WINDOW)
     assert run.counts.clock_jumps == 1
     assert sum(run.counts.rejected.values()) == len(IN_WINDOW)
 
 
-def test_a_clock_that_jumps_ahead_leaves_the_stamps_alone():
+def test_clock_jump_ahead_keeps_the_sample_stamps():
     run = Run(fault_window('time_jump: {by: 0.05}'))
     assert run.stamps() == of_samples()
     assert run.counts.clock_jumps == 1, 'when it comes back'
 
 
-def test_a_link_that_is_broken_leaves_samples_without_a_pose():
+def test_broken_link_publishes_no_sample():
     run = Run(fault_window('broken_link: {link: coupler}'))
     assert run.stamps() == of_samples(IN_WINDOW)
     assert sum(run.counts.unclosed.values()) == len(IN_WINDOW)

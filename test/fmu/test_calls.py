@@ -131,7 +131,7 @@ def call(tmp_path_factory) -> Iterator[Call]:
 
 @pytest.mark.parametrize('state', STATES)
 @pytest.mark.parametrize('name', TABLE)
-def test_each_call_in_each_state(state, name, call):
+def test_fmi_call_in_each_state_has_its_status(state, name, call):
     after = TABLE[name][STATES.index(state)]
     *_, (status, logged), (then, _) = call([*REACHED[state], name, 'step'])
     if after:
@@ -152,7 +152,7 @@ def test_each_call_in_each_state(state, name, call):
 
 @settings(max_examples=60, deadline=None)
 @given(names=st.lists(st.sampled_from([*TABLE, 'enter', 'exit', 'step', 'reset']), max_size=30))
-def test_no_order_of_calls_ends_the_importer(names, call):
+def test_random_fmi_calls_do_not_crash_the_importer(names, call):
     state, ticks_fit = 'instantiated', True
     for name, (status, logged) in zip(names, call(names), strict=True):
         after = TABLE[name][STATES.index(state)]
@@ -171,7 +171,7 @@ def test_no_order_of_calls_ends_the_importer(names, call):
         state = after or ('failed' if state != 'failed' else state)
 
 
-def test_a_reset_after_its_files_are_gone_fails_each_step(tmp_path):
+def test_reset_without_extracted_files_fails_each_step(tmp_path):
     fmu = tmp_path / 'bare.fmu'
     fmu.write_bytes(scene_fmu(load_scene('bare')))
     extracted = tmp_path / 'extracted'

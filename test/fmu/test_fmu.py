@@ -76,13 +76,13 @@ def bench(tmp_path) -> Iterator[Open]:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'bare', 'torque_crank', 'two_fingers', 'worn_press'])
-def test_the_model_description_is_valid(name, tmp_path):
+def test_fmu_model_description_is_valid(name, tmp_path):
     file = tmp_path / 'a.fmu'
     file.write_bytes(_fmu(name))
     assert validate_fmu(str(file)) == []
 
 
-def test_the_interface_is_that_of_the_scene(bench):
+def test_fmu_variables_equal_the_joints_of_the_scene(bench):
     variables = bench(load_scene('torque_crank')).variables
     shown = {(v.name, v.causality, v.unit) for v in variables.values() if v.type == 'Float64'}
     joints = ('crank_joint', 'coupler_joint', 'rocker_joint')
@@ -105,7 +105,7 @@ def test_the_interface_is_that_of_the_scene(bench):
         ('voltage', 'V', 'voltage that is commanded to the motor of crank_joint'),
     ],
 )
-def test_a_motor_is_commanded_in_its_own_unit(command, unit, text, bench):
+def test_fmu_motor_command_has_its_own_unit(command, unit, text, bench):
     scene = load_scene('torque_crank', [VOLTAGE, f'drive.torque.motor.command={command}'])
     variables = bench(scene).variables.values()
     (given,) = [v for v in variables if v.causality == 'input']
@@ -122,7 +122,7 @@ def test_a_motor_is_commanded_in_its_own_unit(command, unit, text, bench):
         ('motor_encoder: {}, motor: {torque_constant: 1, ratio: 100}', ['rad', 'rad/s', 'N.m']),
     ],
 )
-def test_a_motor_turns_though_its_input_slides(keys, units, bench):
+def test_fmu_motor_units_follow_motor_and_ratio(keys, units, bench):
     cylinder = (LINKAGES / 'excavator_bucket.yaml').read_text('utf-8')
     scene = scene_of(f'drive: {{torque: {{start: 0.9, {keys}}}}}', cylinder)
     motor = [v for v in bench(scene).variables.values() if v.name.startswith('motor.')]
@@ -130,7 +130,7 @@ def test_a_motor_turns_though_its_input_slides(keys, units, bench):
     assert all(v.causality == 'output' for v in motor)
 
 
-def test_a_slide_is_in_metres_and_has_accelerations_where_the_scene_has(bench):
+def test_fmu_slide_is_in_metres_with_accelerations(bench):
     scene = load_scene('slider_crank', ['effects.acceleration={}'])
     variables = bench(scene).variables.values()
     of_piston = [v for v in variables if '.piston_slide.' in v.name]
@@ -171,7 +171,7 @@ VOLTAGE = (
         ('torque_crank', ('drive.torque.motor_encoder={}',)),
     ],
 )
-def test_every_output_has_the_bits_of_the_message(name, settings, bench):
+def test_fmu_outputs_equal_the_joint_states_bit_for_bit(name, settings, bench):
     scene = load_scene(name, settings)
     pipeline = Pipeline(scene)
     instance = bench(scene)
@@ -238,7 +238,7 @@ def _message(inputs: dict[str, float], now: int) -> bytes:
     return joint_state(joints, *arrays.values(), stamp=divmod(now, SECOND))
 
 
-def test_a_reading_that_is_not_finite_does_not_come_out():
+def test_non_finite_reading_does_not_reach_fmu_outputs():
     (line,) = Pipeline(load_scene('four_bar')).linkages
     look = line.interpret_from(SECOND, CrankState((1.0,), (2.0,), (0.0,), 0))
     outputs = LinkageOutputs(line)
@@ -251,7 +251,7 @@ def test_a_reading_that_is_not_finite_does_not_come_out():
     assert outputs.values == good
 
 
-def test_accelerations_are_those_of_the_pipeline(bench):
+def test_fmu_accelerations_equal_those_of_the_pipeline(bench):
     scene = load_scene('four_bar', ['effects.acceleration={}'])
     pipeline = Pipeline(scene)
     outputs = bench(scene).start()
@@ -261,7 +261,7 @@ def test_accelerations_are_those_of_the_pipeline(bench):
     assert any(shown)
 
 
-def test_an_importer_of_its_own_gets_the_law_of_cosines(tmp_path):
+def test_fmu_in_fmpy_obeys_the_law_of_cosines(tmp_path):
     # FMPy's own loop; the rocker by the triangle A-O4-B, at 30 digits.
     file = tmp_path / 'four_bar.fmu'
     file.write_bytes(_fmu('bare'))
@@ -278,7 +278,7 @@ def test_an_importer_of_its_own_gets_the_law_of_cosines(tmp_path):
             assert abs(mp.arg(to_crank) - between - mpf(float(row[ROCKER]))) < 1e-12
 
 
-def test_a_reset_begins_again_and_another_seed_gives_other_noise(bench):
+def test_fmu_reset_repeats_and_another_seed_changes_the_noise(bench):
     instance = bench(load_scene('encoder_rocker'))
 
     def run(seed: int | None) -> list[dict[str, Any]]:
@@ -315,7 +315,7 @@ def _at(tick: Any) -> dict[str, Any]:
     }
 
 
-def test_two_instances_know_nothing_of_each_other(bench):
+def test_two_fmu_instances_are_independent(bench):
     alone, one, other = (bench(load_scene('torque_crank')) for _ in range(3))
     for instance in (alone, one, other):
         instance.start({TORQUE: 0.0})
@@ -330,7 +330,7 @@ OPENING = four_bar_text(0.1, 0.05, 0.06, 0.08)
 """A crank that is longer than the others allow: it opens beyond 0.8 rad."""
 
 
-def test_where_a_loop_opens_the_last_values_stay_and_are_not_valid(bench):
+def test_open_loop_keeps_last_fmu_outputs_as_invalid(bench):
     instance = bench(scene_of('effects: {velocity: {}}', OPENING))
     good = instance.start({CRANK: 0.4, CRANK_RATE: 0.0})
     assert (good['valid'], good['velocity_valid'], good['status']) == (True, True, 1)
@@ -340,14 +340,14 @@ def test_where_a_loop_opens_the_last_values_stay_and_are_not_valid(bench):
     assert again == good
 
 
-def test_before_the_first_sample_there_is_no_crank(bench):
+def test_fmu_without_a_sample_has_no_crank(bench):
     instance = bench(scene_of('drive: {topic: {}}'))
     outputs = instance.start({CRANK: nan})
     assert (outputs['valid'], outputs['status'], outputs['rejected']) == (False, 0, 1)
     assert outputs[ROCKER] == 0.0
 
 
-def test_a_rejected_sample_is_counted_and_logged_once(bench):
+def test_fmu_counts_rejected_samples_and_logs_once(bench):
     instance = bench(scene_of('drive: {topic: {carry_forward: false}}'))
     good = instance.start({CRANK: 1.0})
     for index in range(3):
@@ -357,7 +357,7 @@ def test_a_rejected_sample_is_counted_and_logged_once(bench):
     assert 'rejected' in instance.logged[0][1]
 
 
-def test_a_step_of_several_periods_does_as_many_ticks(bench):
+def test_fmu_step_of_several_periods_makes_several_ticks(bench):
     one, other = bench(load_scene('encoder_rocker')), bench(load_scene('encoder_rocker'))
     # Any start time: the scene's own clock begins there.
     one.start(at=3.0)
@@ -372,7 +372,7 @@ def test_a_step_of_several_periods_does_as_many_ticks(bench):
     ('time', 'seconds'),
     [(0.001, 0.0015), (0.001, 0.0004), (0.001, nan), (0.001, 1e9), (0.002, 0.001), (0.0, 0.001)],
 )
-def test_a_step_that_cannot_be_done_is_discarded_and_changes_nothing(time, seconds, bench):
+def test_impossible_fmu_step_is_discarded_without_effect(time, seconds, bench):
     instance, other = bench(load_scene('encoder_rocker')), bench(load_scene('encoder_rocker'))
     for each in (instance, other):
         each.start()
@@ -385,7 +385,7 @@ def test_a_step_that_cannot_be_done_is_discarded_and_changes_nothing(time, secon
     assert instance.step(0.001, 0.001) == other.step(0.001, 0.001)
 
 
-def test_several_inputs_go_into_one_linkage(bench):
+def test_fmu_takes_both_inputs_of_a_five_bar(bench):
     instance = bench(scene_of('rate: 100', FIVE_BAR))
     names = {name for name, v in instance.variables.items() if v.causality == 'input'}
     assert names == {
@@ -404,7 +404,7 @@ def test_several_inputs_go_into_one_linkage(bench):
         assert outputs[f'joint_states.{joint}.position'] == value
 
 
-def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monkeypatch):
+def test_repeated_fmu_has_the_same_bytes_and_no_paths(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path / 'temporary'))
     (tmp_path / 'temporary').mkdir()
     file = tmp_path / 'my press 2.yaml'
@@ -436,25 +436,25 @@ def test_the_same_scene_gives_the_same_bytes_and_names_no_folder(tmp_path, monke
         ('loads: {wrenches: {coupler: {}}}', 'loads.wrenches', 'come on topics'),
     ],
 )
-def test_a_scene_that_needs_more_than_its_files_is_refused(scene, where, reason):
+def test_fmu_refuses_a_scene_with_further_files(scene, where, reason):
     with pytest.raises(LinkageError, match=rf'{where}: .*({reason})'):
         scene_fmu(scene_of(scene))
 
 
-def test_a_drive_with_a_message_of_its_own_is_refused(monkeypatch):
+def test_fmu_refuses_a_drive_with_an_unknown_message(monkeypatch):
     monkeypatch.delitem(stepped_scene._INPUT_FIELDS, 'torque')
     with pytest.raises(LinkageError, match=r'drive.torque: listens to crank_commands, .*name one'):
         scene_fmu(load_scene('torque_crank'))
 
 
-def test_without_pythonfmu3_one_line_says_so(monkeypatch):
+def test_fmu_without_pythonfmu3_names_what_to_install(monkeypatch):
     monkeypatch.setattr('linkage_ros.errors.find_spec', lambda _name: None)
     with pytest.raises(LinkageError, match=r"pythonfmu3: is not .*linkage_ros\[fmu\]'$"):
         scene_fmu(load_scene('bare'))
 
 
 @pytest.mark.parametrize('seed', [-1, 2**53 + 1])
-def test_a_seed_out_of_bounds_fails_every_step(seed, bench):
+def test_fmu_seed_out_of_bounds_fails_every_step(seed, bench):
     instance = bench(load_scene('encoder_rocker'))
     outputs = instance.start(seed=seed)
     assert not outputs['valid']
@@ -465,7 +465,7 @@ def test_a_seed_out_of_bounds_fails_every_step(seed, bench):
             instance.step(0.0, 0.001)
 
 
-def test_without_this_package_the_fmu_says_what_it_needs(tmp_path, monkeypatch):
+def test_fmu_without_linkage_ros_names_the_needed_version(tmp_path, monkeypatch):
     file = _opened('bare', tmp_path)
     monkeypatch.setitem(sys.modules, 'linkage_ros.tools.models.fmu.slave', None)
     logged: list[tuple[int, str]] = []
@@ -475,7 +475,7 @@ def test_without_this_package_the_fmu_says_what_it_needs(tmp_path, monkeypatch):
     assert f'linkage_ros {__version__} is needed in this Python' in text
 
 
-def test_another_version_is_refused_when_it_is_loaded(tmp_path):
+def test_fmu_of_another_version_is_refused_at_loading(tmp_path):
     file = tmp_path / 'old.fmu'
     with zipfile.ZipFile(file, 'w') as old, zipfile.ZipFile(_opened('bare', tmp_path)) as new:
         for name in new.namelist():

@@ -77,7 +77,7 @@ def half_angle(request, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.usefixtures('half_angle')
 @pytest.mark.parametrize('family', FOUR_BARS)
-def test_all_is_right_in_every_family(family):
+def test_batch_solution_of_four_bars_equals_the_reference(family):
     worst = Worst()
     closed = 0
     for case, truth in truths(family):
@@ -105,7 +105,7 @@ def test_all_is_right_in_every_family(family):
     assert closed >= ACCELERATED, 'a sweep that closes nothing proves nothing'
 
 
-def test_accelerations_keep_their_digits_at_a_change_point():
+def test_batch_accelerations_stay_exact_near_a_change_point():
     near = [sign * 10.0**-i for i in (1, 3, 6, 9, 12, 100, 290) for sign in (1, -1)]
     # The coupler of a parallelogram does not turn, and its rocker turns with the crank.
     for turn, angles in ((0.0, near), (pi, near[:10]), (2 * pi, near[:10])):
@@ -128,7 +128,7 @@ def test_accelerations_keep_their_digits_at_a_change_point():
             assert found[:, i] == pytest.approx(expected, rel=2e-14, abs=1e-300)
 
 
-def test_accelerations_of_a_rhombus_that_folds_are_numbers():
+def test_batch_accelerations_of_a_folding_rhombus_are_finite():
     angles = [sign * 10.0**-i for i in range(0, 153, 4) for sign in (1, -1)]
     codes, _, _, found = solved(four_bars_of(1.0, 1.0, 1.0, 1.0, 1), angles, 1.0, 0.5)
     assert (codes < TOGGLED).all()
@@ -143,7 +143,7 @@ def test_accelerations_of_a_rhombus_that_folds_are_numbers():
     [((2.0, 3.0, 3.0, 2.0), INDETERMINATE), ((2.0, 3.0, 3.5, 2.0), OPEN)],
     ids=['kite', 'unequal'],
 )
-def test_where_the_pins_meet_there_is_no_pose(lengths, code):
+def test_batch_returns_no_pose_where_pins_coincide(lengths, code):
     codes, *arrays = solved(four_bars_of(*lengths, 1), [1.0, 0.0, -0.0, 1e-200, 2.0])
     assert codes.tolist() == [CLOSED, code, code, code, CLOSED]
     for array in arrays:

@@ -57,7 +57,7 @@ def count_searches(monkeypatch):
 
 
 @pytest.mark.parametrize('case', CASES)
-def test_a_state_beyond_reach_is_searched_for_once(monkeypatch, case):
+def test_unreachable_state_is_searched_only_once(monkeypatch, case):
     closure, beyond = case()
     searches = count_searches(monkeypatch)
     first = closure.close_unlimited(*beyond)
@@ -73,7 +73,7 @@ def test_a_state_beyond_reach_is_searched_for_once(monkeypatch, case):
 
 
 @pytest.mark.parametrize('case', CASES)
-def test_what_is_no_longer_remembered_is_found_again_to_the_same_bits(monkeypatch, case):
+def test_forgotten_unreachable_states_give_the_same_gap_again(monkeypatch, case):
     monkeypatch.setattr('linkage_ros.kinematics.iterated.group._REMEMBERED', 2)
     closure, beyond = case()
     states = [tuple(value + 0.01 * k for value in beyond) for k in range(5)]
@@ -89,7 +89,7 @@ BASE = [(193, -52), (193, 52), (-52, 193), (-141, 141), (-141, -141), (-52, -193
 TOP = [(85, -85), (85, 85), (31, 116), (-116, 31), (-116, -31), (31, -116)]
 
 
-def test_legs_that_are_too_short_for_any_pose_miss_by_what_a_ring_of_two_lacks(monkeypatch):
+def test_hexapod_gap_equals_the_shortfall_of_its_legs(monkeypatch):
     closure = load('hexapod')
     legs = (0.002, 0.003, 0.002, 0.004, 0.002, 0.002)
     gaps = []
@@ -104,7 +104,7 @@ def test_legs_that_are_too_short_for_any_pose_miss_by_what_a_ring_of_two_lacks(m
     assert position.gap == pytest.approx(max(gaps), rel=1e-12)
 
 
-def test_no_pose_of_a_platform_is_said_to_be_beyond_reach():
+def test_reachable_hexapod_poses_have_no_shortfall():
     (grid,) = load('hexapod').grids
     shortfall, scale = grid._group.shortfall, load('hexapod').scale
     rng = np.random.default_rng(7)

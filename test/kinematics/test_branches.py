@@ -83,7 +83,7 @@ def off_branch(closure: Closure, walked: Walked, joint: int = 0, count: int = 15
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
-def test_the_walk_keeps_the_constraints(kind):
+def test_reference_walk_keeps_the_constraints(kind):
     for made, _, *both in family(kind):
         for walked in both:
             for p_x, p_y, angle, x in walked.states[:: max(1, len(walked.states) // 20)].tolist():
@@ -106,7 +106,7 @@ def test_a_platform_stays_on_the_branch_of_its_pose(kind):
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', KINDS)
-def test_ranges_end_where_the_curve_turns_back(kind):
+def test_platform_ranges_end_where_the_reference_walk_turns_back(kind):
     for index, (made, linkage, down, up) in enumerate(family(kind)):
         closure = Closure(linkage)
         (interval,) = closure.input_ranges
@@ -130,7 +130,7 @@ def test_ranges_end_where_the_curve_turns_back(kind):
                 assert behind.gap > 0.0
 
 
-def test_ends_are_toggles_to_the_last_digits():
+def test_platform_range_ends_are_exact_toggles():
     """With 40 digits: constraints and the determinant of their slopes by place and angle are 0."""
     checked = 0
     for made, linkage, down, up in family('three arms'):
@@ -180,7 +180,7 @@ def exact_toggle(made: Platform, start: list[float]) -> tuple[mp.mpf, float]:
         return root[3], abs(float(root[3])) + condition
 
 
-def test_a_state_does_not_depend_on_what_was_asked_before():
+def test_platform_states_do_not_depend_on_their_order():
     for _, linkage, down, up in family('three arms')[:6]:
         inputs = [float(x) for w in (down, up) for x in w.states[:: len(w.states) // 8, 3]]
         forward, mixed = Closure(linkage), Closure(linkage)
@@ -189,7 +189,7 @@ def test_a_state_does_not_depend_on_what_was_asked_before():
         assert {x: mixed.position(x).joints for x in inputs} == expected
 
 
-def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them():
+def test_platform_branch_repeats_after_its_crank_turns():
     seen = set()
     for made, linkage, down, up in family('three arms'):
         closure = Closure(linkage)
@@ -209,7 +209,7 @@ def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them():
     assert seen
 
 
-def test_an_input_that_does_not_turn_round_is_taken_modulo_a_turn():
+def test_oscillating_input_is_taken_modulo_a_turn():
     checked = 0
     for _, linkage, _, _ in family('three arms'):
         closure = Closure(linkage)
@@ -226,7 +226,7 @@ def test_an_input_that_does_not_turn_round_is_taken_modulo_a_turn():
 
 
 @pytest.mark.parametrize('name', DEFECTS)
-def test_what_once_leapt_stays_on_its_branch(name):
+def test_formerly_failing_platforms_stay_on_their_branch(name):
     closure = defect(name)
     made = platform_of(closure.linkage, DEFECTS[name])
     # Of the linkage whose range is a five-hundredth, the walk's steps are too long for its turns.
@@ -243,7 +243,7 @@ def test_what_once_leapt_stays_on_its_branch(name):
     assert InputSweep(closure).ranges == (interval,)
 
 
-def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns():
+def test_crank_angle_has_one_pose_per_turn():
     closure = defect('class3_over_a_turn')
     (interval,) = closure.input_ranges
     assert interval.highest - interval.lowest > tau
@@ -257,7 +257,7 @@ def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns():
     )
 
 
-def test_beyond_the_end_of_more_than_a_turn_it_is_open():
+def test_platform_is_open_beyond_a_range_over_one_turn():
     closure = defect('class3_beyond_range')
     (interval,) = closure.input_ranges
     assert interval.highest - interval.lowest > tau > interval.highest + pi
@@ -302,7 +302,7 @@ def two_inputs(rng: random.Random) -> tuple[Linkage, Platform]:
     return replace(linkage, traced=()), line
 
 
-def test_two_inputs_lead_along_a_straight_line():
+def test_two_input_platform_follows_a_straight_input_line():
     rng = random.Random(4)
     cases = [two_inputs(rng) for _ in range(12)]
     walked = walks([line for _, line in cases], [1.0] * 12, turns=0.6)
@@ -330,7 +330,7 @@ def test_two_inputs_lead_along_a_straight_line():
     assert opened > 2
 
 
-def test_the_other_assemblies_are_those_that_a_scan_finds():
+def test_other_assemblies_equal_those_of_a_scan():
     rng = random.Random(8)
     counts = []
     for _ in range(12):
@@ -348,7 +348,7 @@ def test_the_other_assemblies_are_those_that_a_scan_finds():
     assert max(counts) >= 3
 
 
-def test_an_assembly_that_is_listed_can_be_named_as_the_pose():
+def test_listed_assembly_can_be_chosen_as_the_pose():
     closure = defect('class3_beyond_range')
     others = other_assemblies(closure, 1)
     assert len(others) == 3
@@ -360,7 +360,7 @@ def test_an_assembly_that_is_listed_can_be_named_as_the_pose():
         assert all(abs(places[name] - place) < 1e-9 for name, place in one.points.items())
 
 
-def test_a_branch_of_several_turns_comes_to_assemblies_that_are_listed():
+def test_listed_assembly_is_reached_after_a_crank_turn():
     closure = defect('class3_over_a_turn')
     assert closure.linkage.pose is not None
     x = -1.1

@@ -51,7 +51,7 @@ def off(angle: float, expected: float) -> float:
     ('turn', 'near'), [*((0.0, x) for x in NEAR), *((pi, x) for x in (*NEAR[:4], 2.0**-50))]
 )
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_parallelogram_passes_its_change_points_as_a_parallelogram(name, turn, near, sign):
+def test_parallelogram_passes_its_change_points(name, turn, near, sign):
     dyad, phi = FourBar(*PARALLELOGRAMS[name], 1), turn + sign * near
     pose = dyad.close(phi)
     assert pose.status is (Status.CLOSED if near > 1e-14 else Status.CHANGE_POINT)
@@ -67,7 +67,7 @@ def test_a_parallelogram_passes_its_change_points_as_a_parallelogram(name, turn,
 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
 @pytest.mark.parametrize('zero', [0.0, -0.0, 5e-324, -1e-310])
-def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_it(name, zero):
+def test_parallelogram_has_rates_at_its_change_point(name, zero):
     dyad = FourBar(*PARALLELOGRAMS[name], 1)
     pose = dyad.close(zero)
     assert pose.status is Status.CHANGE_POINT
@@ -83,7 +83,7 @@ def test_at_the_change_point_position_and_rates_are_those_of_the_motion_through_
 @pytest.mark.parametrize('step', [0.001, 0.1, 2.9])
 @pytest.mark.parametrize('sign', [1, -1])
 @pytest.mark.parametrize('start', [0.0005, 1.7])
-def test_a_parallelogram_stays_one_at_any_step_in_either_direction(name, step, sign, start):
+def test_parallelogram_keeps_its_assembly_at_any_step(name, step, sign, start):
     dyad = FourBar(*PARALLELOGRAMS[name], 1)
     for i in range(round(max(2, 4 * pi / step))):
         phi = sign * (start + i * step)
@@ -97,7 +97,7 @@ def test_a_parallelogram_stays_one_at_any_step_in_either_direction(name, step, s
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-300, 0.5, 3.0])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near, sign):
+def test_folded_kite_turns_about_the_crank_pivot(near, sign):
     # a = b and c = d, B on the crank's pivot: the crank carries the coupler, the rocker stands.
     dyad, phi = FourBar(1.0, 1.0, 2.0, 2.0, -1), sign * near
     pose = dyad.close(phi)
@@ -109,7 +109,7 @@ def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near, sign):
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 0.5, 3.0])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(near, sign):
+def test_kite_with_meeting_pins_passes_its_change_point(near, sign):
     # a = d and b = c: A passes D. The diagonal turns at half the crank's rate, and with its
     # length goes the height of the triangle; closed form: B lies at √(b² − s²/4) from its middle.
     a, b = 2.0, 3.0
@@ -125,7 +125,7 @@ def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(near, sign):
 
 
 @pytest.mark.parametrize('zero', [0.0, -0.0])
-def test_a_kite_with_a_pin_on_the_ground_pivot_has_no_pose_that_could_be_told(zero):
+def test_kite_with_coincident_pins_is_indeterminate(zero):
     assert FourBar(2.0, 3.0, 3.0, 2.0, 1).close(zero).status is Status.INDETERMINATE
 
 
@@ -141,7 +141,7 @@ SINGLE = {
 
 @pytest.mark.parametrize('name', SINGLE)
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_single_change_point_is_passed_steadily_over_two_turns(name, side):
+def test_four_bar_passes_a_single_change_point_without_jumps(name, side):
     lengths, half = SINGLE[name]
     dyad = FourBar(*lengths, side)
     step = 4 * pi / 4000
@@ -160,7 +160,7 @@ def test_a_single_change_point_is_passed_steadily_over_two_turns(name, side):
 
 @pytest.mark.parametrize('name', [name for name in SINGLE if 'decimal' not in name])
 @pytest.mark.parametrize('phi', [0.3, 2.0, 4.0, 6.0, 7.0, 9.0, 12.0, -1.0, -5.0])
-def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(name, phi):
+def test_single_change_point_four_bar_equals_the_reference(name, phi):
     lengths, half = SINGLE[name]
     dyad = FourBar(*lengths, 1)
     pose = dyad.close(phi)
@@ -175,7 +175,7 @@ def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(name, phi
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-100])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_next_to_a_single_change_point_poses_keep_their_digits(near, sign):
+def test_four_bar_stays_exact_near_a_single_change_point(near, sign):
     lengths, phi = (3.0, 2.0, 4.0, 1.0), sign * near
     pose = FourBar(*lengths, 1).close(phi)
     truth = four_bar(*lengths, phi, sign, digits=300)
@@ -187,7 +187,7 @@ def test_next_to_a_single_change_point_poses_keep_their_digits(near, sign):
     assert rocker_rate == pytest.approx(float(truth.rocker_rate.value), rel=4e-15)
 
 
-def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point():
+def test_decimal_lengths_that_cancel_make_a_change_point():
     # 0.4 - 0.1 and 0.5 - 0.2 differ as floats. As decimals, which a file holds, they do not.
     assert 0.4 - 0.1 != 0.5 - 0.2
     assert FourBar(0.4, 0.2, 0.5, 0.1, 1).diagonal.fold_margin == 0.0
@@ -198,7 +198,7 @@ def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point():
 @pytest.mark.parametrize('b', [0.2, 1.0, 1.3, 7.0])
 @pytest.mark.parametrize('phi', [1e-9, -1e-9, 1e-15, 1e-16, 1e-20, -1e-100, 1e-150])
 @pytest.mark.parametrize('sign', [1, -1])
-def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(b, phi, sign):
+def test_four_bar_rates_stay_exact_at_coincident_pins(b, phi, sign):
     # a = d and b = c: the diagonal vanishes, and the triangle on it stands ever more upright. By
     # hand, for a = d = 1 and φ → 0: θ3' = (1 ∓ 1/b)/2 and θ4' = (1 ± 1/b)/2, σ = ±1.
     dyad = FourBar(1.0, b, b, 1.0, sign)
@@ -238,7 +238,7 @@ def inward(name: str) -> int:
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_inside_the_limit_the_loop_closes_to_the_last_digit(name, distance, side):
+def test_four_bar_closes_exactly_inside_its_limit_angle(name, distance, side):
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = float(limit_angle(name) + inward(name) * distance)
@@ -261,7 +261,7 @@ def test_inside_the_limit_the_loop_closes_to_the_last_digit(name, distance, side
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize('turn', [1, -1])
-def test_outside_the_limit_the_loop_is_open_by_the_gap(name, distance, turn):
+def test_four_bar_reports_its_gap_outside_the_limit_angle(name, distance, turn):
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = turn * float(limit_angle(name) - inward(name) * distance)
@@ -276,7 +276,7 @@ def test_outside_the_limit_the_loop_is_open_by_the_gap(name, distance, turn):
 @pytest.mark.parametrize('name', LIMITS)
 @pytest.mark.parametrize('turn', [1, -1])
 @pytest.mark.parametrize('side', [1, -1])
-def test_at_the_limit_the_position_is_that_of_links_in_line(name, turn, side):
+def test_four_bar_links_align_at_the_limit_angle(name, turn, side):
     lengths, kind = LIMITS[name]
     a, b, c, d = lengths
     with mp.workdps(60):
@@ -295,9 +295,7 @@ def test_at_the_limit_the_position_is_that_of_links_in_line(name, turn, side):
 @pytest.mark.parametrize('distance', DISTANCES)
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.5, 2.0, 1.0), (2.0, 1.5, -1.0), (1.0, 1.0, 1e-3)])
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
-    distance, a, d, h, side
-):
+def test_bent_rod_closes_only_inside_its_limit_angle(distance, a, d, h, side):
     with mp.workdps(60):
         limit = mp.acos((mpf(a) ** 2 + mpf(d) ** 2 - mpf(h) ** 2) / (2 * mpf(a) * d))
         inside, outside = float(limit + distance), float(limit - distance)
@@ -331,7 +329,7 @@ def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
         ((1.0, 2.0, 1.0, 1.0), 1.0),
     ],
 )
-def test_the_gap_is_what_the_links_miss_each_other_by(lengths, gap):
+def test_four_bar_gap_equals_the_missing_length(lengths, gap):
     # Crank along the ground, where all lengths lie on one line and are added up by hand.
     phi = 0.0 if gap in (4.0, 6.0, 1.0) else pi
     pose = FourBar(*lengths, 1).close(phi)
@@ -355,7 +353,7 @@ def drawn(kind: str, number: int) -> Flat:
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind):
+def test_named_side_holds_up_to_the_fold(kind):
     for index in range(COUNT):
         flat = drawn(kind, index)
         closure = Closure(flat.linkage)
@@ -372,7 +370,7 @@ def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind):
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind):
+def test_flat_linkages_keep_their_motion_through_change_points(kind):
     for index in range(COUNT // 3):
         flat = drawn(kind, index)
         closure = Closure(flat.linkage)
@@ -406,7 +404,7 @@ def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind):
         ('straight_rev_behind', 'r', -0.517638),
     ],
 )
-def test_a_rail_on_the_ground_has_the_named_side(name, joint, expected):
+def test_rail_on_the_ground_keeps_the_named_side(name, joint, expected):
     closure = defect(name)
     position = closure.position(pi / 6.0)
     value = position.joints[list(closure.linkage.joints).index(joint)]

@@ -52,7 +52,7 @@ def odd_frames(seed: int, links: tuple[str, ...]) -> dict[str, Frame]:
 
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize(('side', 'sign'), [('left', 1), ('right', -1)])
-def test_a_four_bar_publishes_child_less_parent(crank_angle, side, sign):
+def test_four_bar_joint_equals_child_angle_minus_parent_angle(crank_angle, side, sign):
     closure = Closure(four_bar_linkage(FOUR_BAR, side))
     position = closure.position(crank_angle)
     truth = four_bar(*FOUR_BAR, crank_angle, sign)
@@ -70,7 +70,7 @@ def test_a_four_bar_publishes_child_less_parent(crank_angle, side, sign):
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize('side', ['left', 'right'])
 @pytest.mark.parametrize('seed', range(5))
-def test_turning_link_frames_shifts_a_four_bar_s_joints_by_the_turns(crank_angle, side, seed):
+def test_turned_link_frames_shift_the_four_bar_joints(crank_angle, side, seed):
     frames = odd_frames(seed, ('ground', 'crank', 'coupler', 'rocker'))
     turned = {link: angle for link, (_, _, angle) in frames.items()}
     plain, odd = (Closure(four_bar_linkage(FOUR_BAR, side, f)) for f in (None, frames))
@@ -89,7 +89,7 @@ def test_turning_link_frames_shifts_a_four_bar_s_joints_by_the_turns(crank_angle
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize(('side', 'sign'), [('ahead', 1), ('behind', -1)])
 @pytest.mark.parametrize('along', [0.0, 0.11, -0.2])
-def test_a_slide_is_measured_from_the_point_it_runs_through(crank_angle, side, sign, along):
+def test_slide_is_measured_from_its_named_point(crank_angle, side, sign, along):
     closure = Closure(inverted_slider_crank_linkage(SLIDER_CRANK, side, along=along))
     truth = inverted_slider_crank(*SLIDER_CRANK, crank_angle, sign)
     position = closure.position(crank_angle)
@@ -107,7 +107,7 @@ def test_a_slide_is_measured_from_the_point_it_runs_through(crank_angle, side, s
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
 @pytest.mark.parametrize('side', ['ahead', 'behind'])
 @pytest.mark.parametrize('seed', range(5))
-def test_turning_link_frames_shifts_the_rod_s_joint_and_leaves_the_slide(crank_angle, side, seed):
+def test_turned_link_frames_shift_the_rod_joint_only(crank_angle, side, seed):
     frames = odd_frames(seed, ('ground', 'crank', 'rod'))
     turned = {link: angle for link, (_, _, angle) in frames.items()}
     plain, odd = (
@@ -126,7 +126,7 @@ def test_turning_link_frames_shifts_the_rod_s_joint_and_leaves_the_slide(crank_a
     assert odd.residual(other) < 4e-16
 
 
-def test_the_links_of_a_file_meet_where_the_joints_put_them():
+def test_published_joints_close_the_loop_of_the_file():
     # Frames that no formula of the package prefers, walked by hand from joint to joint.
     ground = {'O': (0.3, -0.1), 'D': (0.2, 0.35)}
     crank = {'O': (0.01, 0.02), 'A': (-0.05, 0.11)}
@@ -162,14 +162,14 @@ def test_the_links_of_a_file_meet_where_the_joints_put_them():
         assert pin == pytest.approx(ground['D'], abs=1e-15)
 
 
-def test_the_residual_sees_a_loop_that_is_open_by_a_hair():
+def test_residual_detects_a_tiny_loop_error():
     closure = Closure(four_bar_linkage(FOUR_BAR, 'left'))
     position = closure.position(1.0)
     position.state.coordinates[3] += 1e-9
     assert closure.residual(position) == pytest.approx(FOUR_BAR[2] * 1e-9, rel=1e-5)
 
 
-def test_an_open_loop_has_a_gap_in_metres_and_no_joints():
+def test_open_loop_has_a_gap_and_no_joints():
     closure = Closure(four_bar_linkage((0.04, 0.02, 0.03, 0.05), 'left'))
     position = closure.position(pi)
     assert (position.status, position.joints) == (Status.OPEN, ())
@@ -184,13 +184,13 @@ def test_an_open_loop_has_a_gap_in_metres_and_no_joints():
         ((0.04, 0.05, 0.10), 'ahead', inverted_slider_crank_linkage),
     ],
 )
-def test_a_linkage_that_closes_nowhere_has_no_range(lengths, side, build):
+def test_linkage_that_never_closes_has_no_range(lengths, side, build):
     closure = Closure(build(lengths, side))
     assert closure.input_ranges == ()
     assert closure.position(1.0).status is Status.OPEN
 
 
-def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points():
+def test_slide_direction_may_have_any_length():
     plain = inverted_slider_crank_linkage(SLIDER_CRANK, 'ahead', along=0.05)
     slider = plain.sliders['swivel']
     for factor in (1e-8, 1.0, 1e8):
@@ -211,7 +211,7 @@ def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points():
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('name', [file.stem for file in FILES])
-def test_a_step_alone_is_as_among_the_others(name):
+def test_single_step_equals_the_step_within_its_closure(name):
     closure = closure_of(name)
     usual = usual_inputs(closure)
     inputs = [[value + 0.02 * i for value in usual] for i in range(-150, 150)]
@@ -241,7 +241,7 @@ def side_by_side(count: int) -> Closure:
     )
 
 
-def test_what_a_loop_takes_hardly_grows_with_the_number_of_loops(monkeypatch):
+def test_range_search_cost_per_loop_stays_constant(monkeypatch):
     taken = []
     for count in (2, 20):
         closings = [0]
@@ -299,7 +299,7 @@ def case(request):
     return closure, INPUTS[request.param], names, points
 
 
-def test_they_lie_where_their_links_carry_them(case):
+def test_point_tracker_places_equal_the_link_points(case):
     closure, inputs, names, points = case
     position = closure.position(*inputs)
     follower = closure.point_tracker(points)
@@ -312,7 +312,7 @@ def test_they_lie_where_their_links_carry_them(case):
         assert places[index] == pytest.approx(place, rel=1e-14, abs=1e-15)
 
 
-def test_rates_are_slopes_of_places(case):
+def test_point_tracker_rates_equal_numerical_derivatives(case):
     closure, inputs, _, points = case
     follower, step = closure.point_tracker(points), 1e-4
     rates, pulls = [0.9, -0.6][: len(inputs)], [0.4, 1.1][: len(inputs)]
@@ -335,13 +335,13 @@ def test_rates_are_slopes_of_places(case):
         assert changes[i] == pytest.approx(bend, rel=1e-5, abs=1e-5)
 
 
-def test_what_is_asked_twice_is_walked_once():
+def test_point_tracker_computes_a_repeated_point_once():
     closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
     follower = closure.point_tracker([('coupler', 0.06 + 0j)] * 3)
     assert len(set(follower.indices)) == 1
 
 
-def test_the_ground_stands():
+def test_ground_point_has_no_velocity():
     closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
     position = closure.position(1.0)
     velocity = closure.velocity(position, 5.0)

@@ -77,7 +77,7 @@ CASES = [*((name, False) for name in CLOSURES), *((name, True) for name in USED)
 @pytest.mark.sample(22)
 @pytest.mark.parametrize('way', COPIES)
 @pytest.mark.parametrize(('name', 'used'), CASES)
-def test_a_copy_gives_the_same_bits(name, used, way):
+def test_copied_closure_gives_the_same_bits(name, used, way):
     """It takes the positions of its original, and the original takes those of the copy."""
     closure = CLOSURES[name]()
     if used:
@@ -94,7 +94,7 @@ def test_a_copy_gives_the_same_bits(name, used, way):
 
 
 @pytest.mark.parametrize('way', COPIES)
-def test_results_are_copied_with_their_closure(way):
+def test_copied_results_keep_their_closure(way):
     closure = lr.load('class_3')
     position = closure.position(*usual_inputs(closure))
     velocity = closure.velocity(position, 1.0)
@@ -104,7 +104,7 @@ def test_results_are_copied_with_their_closure(way):
     assert motion(found[0].closure, found[0]) == motion(closure)
 
 
-def test_positions_of_another_linkage_are_refused_by_a_copy():
+def test_copied_closure_refuses_positions_of_another_linkage():
     other = lr.load('jansen_leg').position(1.0)
     with pytest.raises(TypeError, match='is not from'):
         copy.deepcopy(lr.load('four_bar')).velocity(other, 1.0)
@@ -134,7 +134,7 @@ def busy():
 
 @pytest.mark.usefixtures('busy')
 @pytest.mark.parametrize('name', ['four_bar', 'excavator_bucket', 'jansen_leg'])
-def test_the_first_solutions_of_several_threads(name):
+def test_concurrent_first_solutions_are_equal(name):
     expected = lr.load(name).solve(np.linspace(0.0, 6.0, 50))
     for _ in range(10):
         closure = lr.load(name)
@@ -145,7 +145,7 @@ def test_the_first_solutions_of_several_threads(name):
 
 @pytest.mark.usefixtures('busy')
 @pytest.mark.parametrize('derivatives', [(0, 1, 2)])
-def test_what_is_compiled_is_compiled_once_and_is_what_was_asked_for(derivatives):
+def test_concurrent_threads_compile_each_order_once(derivatives):
     for _ in range(20):
         closure = lr.load('four_bar')
         calls = [lambda d=d, c=closure: (d, c.compile_linkage(d)) for d in derivatives]
@@ -155,7 +155,7 @@ def test_what_is_compiled_is_compiled_once_and_is_what_was_asked_for(derivatives
 
 
 @pytest.mark.usefixtures('busy')
-def test_whatever_is_used_first_by_several_threads():
+def test_concurrent_first_uses_give_equal_results():
     """Also a branch, which is followed farther on demand."""
     expected = motion(lr.load('class_3'))
     for _ in range(3):
@@ -170,7 +170,7 @@ def test_whatever_is_used_first_by_several_threads():
         assert many(calls, 2) == [expected] * 10
 
 
-def test_a_process_forked_while_a_thread_builds_builds_too():
+def test_process_forked_during_a_build_can_build():
     """A lock that another thread holds is never released in a forked process."""
     closure = lr.load('class_3')
     thread = Thread(target=closure.position, args=usual_inputs(closure))

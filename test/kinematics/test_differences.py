@@ -33,7 +33,7 @@ def needles(count):
 
 
 @pytest.mark.parametrize(('diagonal', 'lengths', 'x'), needles(200))
-def test_no_difference_is_computed_from_one_that_cancels(diagonal, lengths, x):
+def test_four_bar_differences_start_from_the_least_cancelling_term(diagonal, lengths, x):
     """In 60 digits; the bound is the rounding of the terms of the one that cancels least."""
     found = diagonal.diagonal_at(LinkState([0.0, x], []))
     with mp.workdps(60):

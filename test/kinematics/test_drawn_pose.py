@@ -159,7 +159,7 @@ MANY = [(seed, 24) for seed in range(3)]
 
 
 @pytest.mark.parametrize(('seed', 'dyads'), [*RANDOM, *MANY])
-def test_a_rough_point_of_each_dyad_gives_the_linkage_as_drawn(seed, dyads):
+def test_rough_points_of_each_dyad_select_the_drawn_assembly(seed, dyads):
     drawn = drawing(seed, dyads)
     rng = random.Random(seed)
     places = {name: place for (_, name), place in drawn.places.items() if name in drawn.tells}
@@ -172,7 +172,7 @@ def test_a_rough_point_of_each_dyad_gives_the_linkage_as_drawn(seed, dyads):
 
 
 @pytest.mark.parametrize(('seed', 'dyads'), RANDOM)
-def test_rough_angles_of_the_links_give_the_linkage_as_drawn(seed, dyads):
+def test_rough_link_angles_select_the_drawn_assembly(seed, dyads):
     drawn = drawing(seed, dyads)
     rng = random.Random(seed)
     rough = {
@@ -183,7 +183,7 @@ def test_rough_angles_of_the_links_give_the_linkage_as_drawn(seed, dyads):
 
 
 @pytest.mark.parametrize(('seed', 'dyads'), RANDOM)
-def test_few_points_give_the_linkage_as_drawn_or_a_line_that_says_what_is_missing(seed, dyads):
+def test_too_few_points_are_refused_with_a_remedy(seed, dyads):
     drawn = drawing(seed, dyads)
     rng = random.Random(seed)
     names = rng.sample(drawn.tells, 1 + rng.randrange(dyads))
@@ -202,7 +202,7 @@ def test_few_points_give_the_linkage_as_drawn_or_a_line_that_says_what_is_missin
 
 @pytest.mark.sample(25)
 @pytest.mark.parametrize(('seed', 'dyads'), RANDOM)
-def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dyads):
+def test_exported_pose_and_sides_reproduce_the_drawing(seed, dyads):
     drawn = drawing(seed, dyads)
     places = {name: place for (_, name), place in drawn.places.items() if name in drawn.tells}
     closure = posed(drawn, places, {})
@@ -223,7 +223,7 @@ def test_the_pose_to_copy_leads_back_and_sides_are_those_of_the_drawing(seed, dy
     assert repr(side) in error.value.reason
 
 
-def test_a_pose_that_does_not_tell_lists_the_assemblies_and_what_tells():
+def test_ambiguous_pose_error_lists_the_assemblies():
     linkage = replace(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'), assembly={})
     meant = AssemblyPose((1.0,), {'B': (0.12, 0.0)})
     with pytest.raises(DefinitionError) as error:
@@ -274,7 +274,7 @@ def loaded(tmp_path, text):
 
 @pytest.mark.parametrize('half', [20, 30, 45, 60, 80])
 @pytest.mark.parametrize('drawn_half', [25, 45, 70])
-def test_a_leg_of_two_motors_on_one_axis_stands_as_drawn(half, drawn_half, tmp_path):
+def test_two_motor_leg_keeps_the_drawn_assembly(half, drawn_half, tmp_path):
     pose = (
         f'pose: {{inputs: [{-90 + drawn_half}, {-90 - drawn_half}], points: {{foot: [9, -190]}}}}'
     )
@@ -285,7 +285,7 @@ def test_a_leg_of_two_motors_on_one_axis_stands_as_drawn(half, drawn_half, tmp_p
     assert abs(foot + 1j * below) < 1e-12
 
 
-def test_a_scissor_lift_stands_as_drawn_and_says_what_a_pose_leaves_open(tmp_path):
+def test_scissor_lift_keeps_the_drawn_assembly(tmp_path):
     pose = 'pose: {inputs: [0.866], points: {M: [0.4, 0.2], load: [0.4, 0.6]}}'
     closure = loaded(tmp_path, LIFT + pose)
     for slide in (0.4, 0.6, 0.9):
@@ -299,7 +299,7 @@ def test_a_scissor_lift_stands_as_drawn_and_says_what_a_pose_leaves_open(tmp_pat
 
 
 @pytest.mark.parametrize('at', ['[-60]', '[60]', '[150]'])
-def test_a_shorthand_takes_a_pose(at, tmp_path):
+def test_four_bar_shorthand_accepts_a_pose(at, tmp_path):
     side = -1 if at == '[-60]' else 1
     drawn = f'pose: {{inputs: {at}, angles: {{rocker: {at[1:-1]}}}}}'
     lengths = 'a: 0.08, b: 0.1, c: 0.0799999, d: 0.1'
@@ -399,7 +399,7 @@ def off(one, other):
 @pytest.mark.parametrize('how', ['sides', 'pose', 'pose below', 'nominal'])
 @pytest.mark.parametrize('number', range(4))
 @pytest.mark.parametrize(('name', 'side'), ONCE)
-def test_a_changed_length_stays_on_the_branch_through_change_points(name, side, number, how):
+def test_changed_length_keeps_the_branch_through_change_points(name, side, number, how):
     nominal, branch = FAMILIES[name], ONCE[name, side]
     word = {1: 'left', -1: 'right'}[side]
     for by in CHANGED:
@@ -421,7 +421,7 @@ def test_a_changed_length_stays_on_the_branch_through_change_points(name, side, 
 
 @pytest.mark.parametrize('name', FAMILIES)
 @pytest.mark.parametrize('seed', range(10))
-def test_tolerance_leaves_the_linkage_on_its_branch(name, seed):
+def test_tolerance_keeps_the_linkage_on_its_branch(name, seed):
     linkage = four_bar_linkage(FAMILIES[name], 'left')
     made = Closure(ToleranceEffect(1e-5).alter(linkage, random.Random(seed)))
     for at, angles in ONCE[name, 1].items():
@@ -469,7 +469,7 @@ TURNING = {
 
 @pytest.mark.parametrize('name', TURNING)
 @pytest.mark.parametrize('by', CHANGED)
-def test_sliders_next_to_change_points_follow_the_nominal_linkage(name, by):
+def test_changed_sliders_follow_the_nominal_linkage_near_change_points(name, by):
     made, angle = TURNING[name]
     closure = Closure(replace(made(by), nominal=made(0.0)))
     for degrees in (-430, -300, -60, 50, 130, 250, 400, 670):
@@ -481,7 +481,7 @@ def test_sliders_next_to_change_points_follow_the_nominal_linkage(name, by):
 
 
 @pytest.mark.parametrize('name', [*FAMILIES, *TURNING])
-def test_many_states_at_once_are_those_of_one_next_to_a_change_point(name):
+def test_batch_equals_single_states_near_a_change_point(name):
     if name in FAMILIES:
         linkage = four_bar_linkage(changed(FAMILIES[name], 2, 1e-6), 'left')
     else:
@@ -500,7 +500,7 @@ def test_many_states_at_once_are_those_of_one_next_to_a_change_point(name):
 
 @pytest.mark.parametrize('side', ['left', 'right'])
 @pytest.mark.parametrize('drawn', ['P', 'A', 'left', 'left_rod'])
-def test_links_that_inputs_hold_to_one_another_are_drawn_too(side, drawn):
+def test_pose_places_links_driven_at_their_elbows(side, drawn):
     """A five-bar that its elbows drive: each half is one body, whose second link comes behind."""
     arms = {
         f'{name}{part}': ends

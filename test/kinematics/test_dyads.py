@@ -41,7 +41,7 @@ side = st.sampled_from((1, -1))
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('family', FOUR_BARS)
-def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family):
+def test_four_bar_dyad_equals_the_reference(family):
     worst = Worst()
     seen: dict[Status, int] = dict.fromkeys(Status, 0)
     for case in four_bars(family, COUNT):
@@ -69,7 +69,7 @@ def test_a_four_bar_has_its_positions_rates_and_status_in_every_family(family):
 
 @settings(derandomize=True)
 @given(length, length, length, length, crank, side)
-def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
+def test_mirrored_four_bar_has_mirrored_motion(a, b, c, d, phi, sign):
     dyad, mirrored = FourBar(a, b, c, d, sign), FourBar(a, b, c, d, -sign)
     pose, image = dyad.close(phi), mirrored.close(-phi)
     assert (pose.status, pose.gap) == (image.status, image.gap)
@@ -86,7 +86,7 @@ def test_a_mirrored_four_bar_moves_in_the_mirror(a, b, c, d, phi, sign):
 
 @settings(derandomize=True)
 @given(length, length, length, length, crank, side, st.integers(-40, 40))
-def test_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
+def test_four_bar_rates_are_proportional_to_the_crank_rate(a, b, c, d, phi, sign, power):
     dyad = FourBar(a, b, c, d, sign)
     pose = dyad.close(phi)
     assume(pose.status is Status.CLOSED)
@@ -105,7 +105,7 @@ offset = st.one_of(st.just(0.0), st.floats(-8.0, 8.0).filter(lambda h: h == 0.0 
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('family', SLIDER_CRANKS)
-def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(family):
+def test_slider_crank_dyad_equals_the_reference(family):
     worst = Worst()
     closed = 0
     for case in inverted_slider_cranks(family, COUNT):
@@ -129,7 +129,7 @@ def test_a_slider_crank_has_its_positions_rates_and_status_in_every_family(famil
 
 @settings(derandomize=True)
 @given(length, length, offset, crank, side)
-def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
+def test_mirrored_slider_crank_has_mirrored_motion(a, d, h, phi, sign):
     assume(abs(a - d) != abs(h))
     dyad, mirrored = InvertedSliderCrank(a, d, h, sign), InvertedSliderCrank(a, d, -h, sign)
     pose, image = dyad.close(phi), mirrored.close(-phi)
@@ -145,7 +145,7 @@ def test_a_mirrored_linkage_moves_in_the_mirror(a, d, h, phi, sign):
 
 @settings(derandomize=True)
 @given(length, length, crank)
-def test_a_straight_rod_behind_is_the_one_ahead_turned_round(a, d, phi):
+def test_straight_rod_assemblies_differ_by_half_a_turn(a, d, phi):
     assume(a != d)
     ahead, behind = InvertedSliderCrank(a, d, 0.0, 1), InvertedSliderCrank(a, d, 0.0, -1)
     one, other = ahead.close(phi), behind.close(phi)
@@ -156,7 +156,7 @@ def test_a_straight_rod_behind_is_the_one_ahead_turned_round(a, d, phi):
 
 
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.0, 2.0, 1.0), (2.0, 1.0, -1.0), (0.75, 2.0, 1.25)])
-def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_change_point(a, d, h):
+def test_bent_rod_that_just_reaches_is_at_change_point(a, d, h):
     # At φ = 0 the pin is |d − a| = |h| from the swivel: the rod stands across the ground.
     pose = InvertedSliderCrank(a, d, h, 1).close(0.0)
     assert (pose.status, pose.gap, pose.slide) == (Status.CHANGE_POINT, 0.0, 0.0)
@@ -230,7 +230,7 @@ PLACES = st.floats(-0.5, 0.5).map(lambda x: round(x, 3))
     facing=st.floats(-pi, pi),
     angle=st.sampled_from([0.0, 0.5 * pi, 1.0]),
 )
-def test_the_length_is_positive(foot, c, start, end, facing, angle):
+def test_cylinder_range_keeps_a_positive_length(foot, c, start, end, facing, angle):
     assume(hypot(*foot) > c + 0.05 and end)
     try:
         closure = cylinder(foot, c, start, end, facing, angle=angle)
@@ -253,19 +253,19 @@ def test_the_length_is_positive(foot, c, start, end, facing, angle):
 
 
 @pytest.mark.parametrize('beside', [0.05, -0.1])
-def test_beside_its_pin_a_negative_slide_is_a_pose_of_its_own(beside):
+def test_offset_cylinder_has_separate_positive_and_negative_ranges(beside):
     low, high = cylinder(beside=beside).input_ranges
     assert low.highest < 0.0 < high.lowest
 
 
-def test_one_that_starts_behind_its_pin_stays_there():
+def test_cylinder_drawn_behind_its_pin_has_negative_range():
     said = cylinder(pose='pose: {inputs: [-1.0]}')
     (one,) = said.input_ranges
     assert one.highest < 0.0
     assert 'mean: -' in scene_text_for(said, 'c.yaml')
 
 
-def test_limits_say_the_side_too():
+def test_cylinder_limits_choose_the_sign_of_its_range():
     (one,) = cylinder(limits=', limits: [-1.2, -0.8]').input_ranges
     assert one[:2] == (-1.2, -0.8)
     (one,) = cylinder(limits=', limits: [-1.2, 0.9]').input_ranges
@@ -284,7 +284,7 @@ joints: {crank_joint: {parent: ground, child: crank}}
 """
 
 
-def test_a_slide_on_the_ground_is_no_cylinder():
+def test_slide_on_the_ground_keeps_both_ranges():
     """A slider-crank that is driven by its slider goes to either side of its crank's pivot."""
     closure = closure_of(SLOT)
     low, high = closure.input_ranges
@@ -311,7 +311,7 @@ NEEDLES = {
 
 @pytest.mark.parametrize('exponent', [-500, -300, -41, -1, 1, 2, 41, 300, 900])
 @pytest.mark.parametrize('crank_angle', CRANK_ANGLES)
-def test_scaling_by_a_power_of_two_changes_no_bit(exponent, crank_angle):
+def test_power_of_two_scaling_keeps_all_bits(exponent, crank_angle):
     factor = 2.0**exponent
     for build, lengths, side in (
         (four_bar_linkage, FOUR_BAR, 'left'),
@@ -331,7 +331,7 @@ def test_scaling_by_a_power_of_two_changes_no_bit(exponent, crank_angle):
 @pytest.mark.parametrize('factor', [1e-150, 1e-9, 1e9, 1e150])
 @pytest.mark.parametrize('phi', CRANK_ANGLES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_lengths_of_any_size_are_solved_to_the_last_digit(factor, phi, side):
+def test_dyads_stay_exact_for_lengths_of_any_size(factor, phi, side):
     lengths = tuple(factor * x for x in FOUR_BAR)
     check_four_bar(lengths, phi, side, RATE)
     a, d, h = (factor * x for x in SLIDER_CRANK)
@@ -348,7 +348,7 @@ def test_lengths_of_any_size_are_solved_to_the_last_digit(factor, phi, side):
 
 @pytest.mark.parametrize('name', NEEDLES)
 @pytest.mark.parametrize('side', [1, -1])
-def test_lengths_that_differ_by_twelve_decades_are_solved_to_the_last_digit(name, side):
+def test_four_bar_stays_exact_with_widely_different_lengths(name, side):
     a, b, c, d = NEEDLES[name]
     closed = 0
     for i in range(-40, 41):
@@ -361,11 +361,11 @@ def test_lengths_that_differ_by_twelve_decades_are_solved_to_the_last_digit(name
 
 @pytest.mark.parametrize('turns', [1, 10, 159_155, -159_155, 10**9])
 @pytest.mark.parametrize('phi', [0.3, 1.0, 2.5])
-def test_a_crank_that_has_turned_often_loses_only_what_its_angle_has_lost(turns, phi):
+def test_four_bar_stays_exact_after_many_crank_turns(turns, phi):
     assert check_four_bar(FOUR_BAR, phi + turns * 2 * pi, 1, RATE)
 
 
-def test_a_crank_angle_of_a_million_radians_is_where_it_belongs():
+def test_crank_angle_of_a_million_radians_is_reduced_exactly():
     # 1e6 rad are 159154 turns and 5.927… rad, digits that a sloppy reduction loses.
     closure = Closure(four_bar_linkage(FOUR_BAR, 'left'))
     turned = 1e6 - 159154 * 2 * pi

@@ -53,7 +53,7 @@ def error_of(rows: Rows, right: Sequence[float], found: Sequence[float]) -> floa
 
 @pytest.mark.parametrize('zeros', [0.0, 0.3, 0.6])
 @pytest.mark.parametrize('size', [1, 2, 3, 4, 6])
-def test_it_is_as_accurate_as_the_rows_allow(size, zeros):
+def test_elimination_error_stays_within_the_condition_bound(size, zeros):
     rng = random.Random(f'{size} {zeros}')
     for _ in range(12):
         rows = random_matrix(rng, size, zeros)
@@ -61,7 +61,7 @@ def test_it_is_as_accurate_as_the_rows_allow(size, zeros):
         assert error_of(rows, right, Elimination(rows, []).solve(right)) < 4.0 * size
 
 
-def test_entries_that_happen_to_be_0_keep_the_rows_of_others():
+def test_compiled_elimination_handles_permuted_zero_entries():
     """Slides along the axes: the structure has all entries, the numbers are a permutation."""
     rng = random.Random(5)
 
@@ -79,7 +79,7 @@ def test_entries_that_happen_to_be_0_keep_the_rows_of_others():
         assert list(found) == pytest.approx(wanted, rel=1e-15)
 
 
-def test_constants_1_are_eliminated_without_rounding():
+def test_unit_pivots_are_eliminated_without_division():
     # The first two rows give x and y; the third is parallel links; the last one is left.
     rows = [
         [1.0, 0.0, 0.3, 0.0],
@@ -94,7 +94,7 @@ def test_constants_1_are_eliminated_without_rounding():
 
 
 @pytest.mark.parametrize('size', [2, 4, 6])
-def test_its_line_of_code_has_the_same_bits_for_all_numbers(size):
+def test_compiled_elimination_equals_the_interpreted_one(size):
     rng = random.Random(size)
 
     def solve(*numbers: float) -> list[float]:
@@ -110,7 +110,7 @@ def test_its_line_of_code_has_the_same_bits_for_all_numbers(size):
         assert line(*numbers) == (tuple(solve(*numbers)),)
 
 
-def test_a_singular_matrix_has_a_divisor_of_0_and_no_error():
+def test_singular_matrix_gives_a_zero_divisor():
     rows = [[1.5, 3.0], [3.0, 6.0]]
 
     def divisors(*numbers: float) -> list[float]:
@@ -122,7 +122,7 @@ def test_a_singular_matrix_has_a_divisor_of_0_and_no_error():
     assert min(abs(one), abs(other)) == 0.0
 
 
-def test_a_compiled_state_of_iterated_links_calls_nothing_but_its_table():
+def test_compiled_iterated_state_calls_only_its_start_table():
     (path,) = Closure(class_3_linkage()).compile_linkage(2).paths
     operations = count_uses(number for group in path.outputs for number in group)
     called = [one.arguments[0] for one in operations if one.name == 'call']

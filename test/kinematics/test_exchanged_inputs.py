@@ -81,7 +81,7 @@ def numbers(count):
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('name', LINKAGES)
-def test_crank_is_as_exact_as_the_roundings_allow(name):
+def test_inverse_crank_angle_stays_within_the_rounding_bound(name):
     """|θ − exact| ≤ 8·u·(|θ| + (|y| + 2π)/|f′| + 1)."""
     closure = gallery(name)
     for joint in outputs(closure):
@@ -93,7 +93,7 @@ def test_crank_is_as_exact_as_the_roundings_allow(name):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'double_rocker', 'jansen_leg'])
-def test_exact_crank_lies_within_the_bound(name):
+def test_exact_crank_angle_lies_within_the_error_bound(name):
     """The joint, to fifty digits, passes the wanted value within the bound about the crank."""
     closure = gallery(name)
     for joint in outputs(closure)[-2:]:
@@ -118,7 +118,7 @@ def test_exact_crank_lies_within_the_bound(name):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'double_rocker', 'klann_leg'])
-def test_rates_of_the_crank_give_the_joint_its_rates(name):
+def test_inverse_crank_rates_give_the_requested_joint_rates(name):
     """The reference, driven by the crank's rates, moves the joint as was asked."""
     closure = gallery(name)
     for joint in [*outputs(closure)[:2], outputs(closure)[-1]]:
@@ -150,7 +150,7 @@ def closures_to_scan():
     yield from random_four_bars(STATES, random.Random(33))
 
 
-def test_all_cranks_of_a_value_are_found():
+def test_inverse_finds_all_crank_angles_of_a_value():
     rng = random.Random(5)
     cases = 0
     for closure in closures_to_scan():
@@ -172,7 +172,7 @@ def test_all_cranks_of_a_value_are_found():
     assert cases >= STATES
 
 
-def test_all_cranks_of_a_value_are_found_about_poles_of_slides():
+def test_inverse_finds_all_crank_angles_near_slide_poles():
     """A slide passes through infinity, and links that hang on it turn round there."""
     rng = random.Random(9)
     endless = 0
@@ -212,7 +212,7 @@ def tangent_mechanism(limits=FREE):
 
 
 @pytest.mark.parametrize('slide', [-1e6, -40.0, -0.5, 0.0, 1e-9, 3.0, 1e3, 1.9e6])
-def test_slide_through_infinity_has_a_branch_up_to_each_pole(slide):
+def test_slide_has_a_branch_up_to_each_pole(slide):
     """The slide is cot(crank): its poles are 0 and pi, and each value has two cranks a turn."""
     closure = tangent_mechanism()
     expected = atan2(1.0, slide)
@@ -234,7 +234,7 @@ def test_slide_through_infinity_has_a_branch_up_to_each_pole(slide):
 
 
 @pytest.mark.parametrize('slide', [3e6, -1e19, 1e150])
-def test_slide_too_near_a_pole_has_no_crank_but_drives_the_crank(slide):
+def test_slide_value_near_a_pole_drives_the_crank(slide):
     """The crank has too few digits for the slide; the slide has enough for the crank."""
     closure = tangent_mechanism()
     assert closure.cranks('shoe_slide', slide) == []
@@ -246,7 +246,7 @@ def test_slide_too_near_a_pole_has_no_crank_but_drives_the_crank(slide):
         )
 
 
-def test_pole_is_no_end_of_the_range_of_the_crank():
+def test_slide_pole_does_not_end_the_crank_range():
     (whole,) = tangent_mechanism().input_ranges
     assert whole.is_whole
     (limited,) = tangent_mechanism(Limits(-1.0, 2.0)).input_ranges
@@ -262,14 +262,14 @@ def test_pole_is_no_end_of_the_range_of_the_crank():
         (Limits(0.5, 7.0), [(0.5, pi), (pi, tau), (tau, 7.0)]),
     ],
 )
-def test_limits_may_lie_on_both_sides_of_a_pole(limits, ends):
+def test_crank_limits_around_a_pole_split_the_branches(limits, ends):
     branches = tangent_mechanism(limits).branches('shoe_slide')
     found = [(branch.least, branch.most) for branch in branches]
     assert found == [pytest.approx(each, abs=1e-6) for each in ends]
     assert not any(any(branch.turns_back) for branch in branches)
 
 
-def test_slide_that_returns_from_infinity_ends_there_too():
+def test_returning_slide_ends_its_branches_at_poles():
     """The slot's slide is 1/sin(crank): it comes back on the side on which it went."""
     closure = tangent_mechanism(Limits(0.5, 6.0))
     found = [(one.least, one.most, one.turns_back) for one in closure.branches('slot_slide')]
@@ -281,7 +281,7 @@ def test_slide_that_returns_from_infinity_ends_there_too():
     assert cranks == pytest.approx([asin(0.8), pi - asin(0.8)], abs=1e-15)
 
 
-def test_compiled_code_inverts_beside_a_pole():
+def test_compiled_inverse_equals_the_closure_near_a_pole():
     inverse = tangent_mechanism().driven_by('shoe_slide', branch=1)
     subject = Subject(inverse, 'm', 'x.yaml', 0, inverse.joint_names)
     made: dict = {}
@@ -294,7 +294,7 @@ def test_compiled_code_inverts_beside_a_pole():
 
 
 @pytest.mark.parametrize('name', LINKAGES)
-def test_compiled_code_has_the_bits_of_the_closure_at_the_ends_of_cells(name):
+def test_compiled_inverse_equals_the_closure_at_cell_ends(name):
     """One of them is the middle of the branch. Beside a toggle numbers are bisected further."""
     closure = gallery(name)
     branch = closure.branches(outputs(closure)[0])[0]
@@ -311,7 +311,7 @@ def test_compiled_code_has_the_bits_of_the_closure_at_the_ends_of_cells(name):
             assert repr(joints) == repr(inverse.position(value).joints), (k, value)
 
 
-def test_calls_in_any_order_give_the_same_bits():
+def test_inverse_states_do_not_depend_on_their_order():
     values = np.linspace(0.97, 2.24, 500).tolist()
     once = [
         load('four_bar').driven_by('rocker_joint', branch=2).position(y).joints
@@ -323,7 +323,7 @@ def test_calls_in_any_order_give_the_same_bits():
     assert [found[y] for y in sorted(values)[::50]] == once
 
 
-def test_joint_that_turns_back_is_a_toggle_there_and_open_beyond():
+def test_driven_rocker_toggles_at_its_dead_centres():
     inverse = load('four_bar').driven_by('rocker_joint', branch=1)
     branch = load('four_bar').branches('rocker_joint')[0]
     # The dead centres of the crank-rocker: coupler and crank in line (cosine rule).
@@ -351,7 +351,7 @@ def _lengths(linkage):
 
 
 @pytest.mark.parametrize('number', [1, 2, 3, 4])
-def test_joint_leads_the_crank_through_its_toggle(number):
+def test_driven_rocker_moves_the_crank_through_its_toggle(number):
     """There the crank stands; behind it the crank turns back, in its other assembly."""
     closure = load('double_rocker')
     branch = closure.branches('right_rocker_joint')[number - 1]
@@ -378,7 +378,7 @@ def test_joint_leads_the_crank_through_its_toggle(number):
     )
 
 
-def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
+def test_whole_rocker_turns_give_whole_crank_turns():
     inverse = load('drag_link').driven_by('rocker_joint')
     first = inverse.position(1.0).joints[0]
     for turns in (-3, 2, 1000):
@@ -390,7 +390,7 @@ def test_whole_turns_of_a_joint_that_turns_on_are_turns_of_the_crank():
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('name', LINKAGES)
-def test_exchanged_input_has_the_crank_of_its_branch_with_its_whole_turns(name):
+def test_inverse_crank_angle_follows_its_branch_continuously(name):
     """
     The crank runs on from end to end of the branch; its errors are as those of `cranks`.
 
@@ -416,7 +416,7 @@ def test_exchanged_input_has_the_crank_of_its_branch_with_its_whole_turns(name):
             assert abs(off) <= limit * U * allowed, (joint, share)
 
 
-def test_rod_of_a_parallelogram_leads_it_through_its_change_points():
+def test_driven_rod_moves_parallelogram_through_its_change_points():
     """The rod keeps its direction: crank and follower turn against it, and together."""
     inverse = load('parallelogram').driven_by('rod_joint')
     for rod in (0.0, -pi, *(0.37 * k for k in range(-20, 21))):
@@ -430,7 +430,7 @@ def test_rod_of_a_parallelogram_leads_it_through_its_change_points():
 
 
 @pytest.mark.parametrize('turned', [('coupler', 'crank'), ('crank', 'coupler')])
-def test_four_bars_are_driven_by_the_angle_of_their_coupler_on_their_crank(turned):
+def test_coupler_angle_on_the_crank_drives_four_bars(turned):
     """By the loop itself: a·e^{iθ} + b·e^{i(θ ± x)} = d + c·e^{iψ}, with its derivatives."""
     child, parent = turned
     way = 1.0 if child == 'coupler' else -1.0
@@ -486,7 +486,7 @@ def test_four_bars_are_driven_by_the_angle_of_their_coupler_on_their_crank(turne
     assert cases > STATES // 3
 
 
-def test_follower_is_an_input_and_what_it_followed_follows_it():
+def test_driven_ratio_follower_moves_the_joint_it_followed():
     closure = load('gripper')
     inverse = closure.driven_by('right_knuckle_joint')
     position = closure.position(0.4)
@@ -496,14 +496,14 @@ def test_follower_is_an_input_and_what_it_followed_follows_it():
         assert found[joint] == pytest.approx(wanted, abs=1e-15)
 
 
-def test_joint_that_oscillates_is_compared_modulo_a_turn():
+def test_oscillating_driven_joint_is_taken_modulo_a_turn():
     inverse = load('four_bar').driven_by('rocker_joint', branch=1)
     assert inverse.position(1.2 + 3 * tau).joints[0] == pytest.approx(
         inverse.position(1.2).joints[0], abs=1e-13
     )
 
 
-def test_limits_cut_branches():
+def test_crank_limits_cut_the_inverse_branches():
     linkage = load('four_bar').linkage
     crank = replace(linkage.inputs[0], limits=Limits(0.5, 3.0))
     closure = Closure(replace(linkage, inputs=(crank,)))
@@ -516,7 +516,7 @@ def test_limits_cut_branches():
     assert closure.cranks('rocker_joint', ends[1] + 0.1) == []
 
 
-def test_iterated_linkage_is_inverted_along_its_branch():
+def test_class_3_linkage_is_inverted_along_its_branch():
     closure = load('class_3')
     inverse = closure.driven_by('platform_joint', branch=1)
     branch = closure.branches('platform_joint')[0]
@@ -534,7 +534,7 @@ def test_iterated_linkage_is_inverted_along_its_branch():
 
 
 @pytest.mark.parametrize('lengths', [(3.0, 2.0, 4.0, 1.0), (1.0, 2.0, 3.0, 4.0)])
-def test_branches_are_of_both_turns_where_two_turns_repeat(lengths):
+def test_branches_cover_both_turns_of_change_point_four_bars(lengths):
     """One change point only: a turn of the crank ends in the other assembly."""
     closure = Closure(four_bar_linkage(lengths, 'left'))
     for joint in closure.joint_names:
@@ -545,7 +545,7 @@ def test_branches_are_of_both_turns_where_two_turns_repeat(lengths):
             assert min(abs(remainder(x - crank, 2.0 * tau)) for x in found) < 1e-9
 
 
-def test_coordinate_of_a_traced_point_is_an_input():
+def test_traced_point_coordinate_drives_jansens_leg():
     closure = load('jansen_leg')
     for branch, crank in closure.cranks('foot.y', -0.08):
         assert closure.position(crank).points['foot'].imag == pytest.approx(-0.08, abs=1e-15)
@@ -563,7 +563,7 @@ def test_coordinate_of_a_traced_point_is_an_input():
         assert motion.acceleration.imag == pytest.approx(0.2, rel=1e-11)
 
 
-def test_many_states_are_those_of_single_calls():
+def test_inverse_batch_equals_single_states():
     inverse = load('four_bar').driven_by('rocker_joint', branch=1)
     values = np.linspace(0.5, 2.5, 40)
     batch = inverse.solve(values, rates=2.0, accelerations=0.5)
@@ -578,7 +578,7 @@ def test_many_states_are_those_of_single_calls():
                 assert group[:, k] == pytest.approx(joints, rel=1e-12)
 
 
-def test_inverse_is_pickled_with_its_branch():
+def test_pickled_inverse_keeps_its_branch():
     inverse = load('four_bar').driven_by('rocker_joint', branch=2)
     position = inverse.position(1.5)
     again = pickle.loads(pickle.dumps((inverse, position)))
@@ -600,7 +600,7 @@ def test_inverse_is_pickled_with_its_branch():
         ('five_bar', 'left_elbow right_elbow left_crank_joint', '3 for 2 inputs'),
     ],
 )
-def test_what_cannot_be_asked_is_one_line(name, joints, line):
+def test_driven_by_refuses_unknown_joints_in_one_line(name, joints, line):
     joints, number, _ = joints.partition(' 3')
     with pytest.raises(DefinitionError) as error:
         load(name).driven_by(*joints.split(), branch=int(number) if number else None)
@@ -616,7 +616,7 @@ def test_what_cannot_be_asked_is_one_line(name, joints, line):
         ('five_bar', ('right_elbow', 'right_crank_joint')),
     ],
 )
-def test_several_inputs_are_exchanged_in_the_same_assembly(name, joints):
+def test_exchanged_inputs_of_two_motors_keep_the_assembly(name, joints):
     closure = load(name)
     other = closure.driven_by(*joints)
     assert other.input_names == joints
@@ -635,7 +635,7 @@ def test_several_inputs_are_exchanged_in_the_same_assembly(name, joints):
             assert moving[joint] == pytest.approx(rates[joint], abs=1e-8)
 
 
-def test_nothing_is_imported_that_was_not_asked_for():
+def test_forward_solution_does_not_import_the_inverse_modules():
     code = (
         'import sys, linkage_ros as lr; lr.load("four_bar").position(0.7); '
         'print(sorted(name for name in sys.modules if "exchange" in name or "crank_br" in name))'
@@ -661,7 +661,7 @@ class Cubic:
         return tuple((value,) for value in self(crank))
 
 
-def test_flat_place_within_a_branch_goes_on():
+def test_branch_continues_across_a_flat_inflection():
     output = Cubic()
     ((piece, turns_on),) = monotonic_pieces(output, InputRange(-1.1, 0.9))
     assert not turns_on
@@ -672,7 +672,7 @@ def test_flat_place_within_a_branch_goes_on():
 
 
 @pytest.mark.parametrize('bend', [1e-2, 1e-3, -1e-3])
-def test_joint_that_turns_back_only_a_little_has_three_branches(bend):
+def test_slightly_reversing_joint_has_three_branches(bend):
     pieces = list(monotonic_pieces(Cubic(bend), InputRange(-1.1, 0.9)))
     ends = [piece[0][0] for piece, _ in pieces[1:]]
     assert ends == pytest.approx(sorted((0.0, -2.0 * bend / 3.0)), abs=1e-12)

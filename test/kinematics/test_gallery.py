@@ -70,14 +70,14 @@ def inputs_of(closure: Closure, name: str, count: int) -> list[tuple[float, ...]
             for s in steps for t in steps]  # fmt: skip
 
 
-def test_every_file_of_the_gallery_is_tested():
+def test_every_gallery_linkage_is_tested():
     files = {file.stem for file in FOLDER.glob('*.yaml')}
     assert files == set(KINDS)
     assert files == {name.removesuffix('.yaml') for name in EXPECTED}
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_it_consists_of_the_dyads_that_it_is_known_for(name):
+def test_gallery_linkage_has_its_known_dyads(name):
     groups = closure_of(name).structure.groups
     kinds = [
         group.kind if isinstance(group, Dyad) else 'iterated'
@@ -88,7 +88,7 @@ def test_it_consists_of_the_dyads_that_it_is_known_for(name):
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_every_point_is_where_the_independent_solver_has_it(name):
+def test_gallery_points_equal_the_independent_solver(name):
     closure = closure_of(name)
     expected = EXPECTED[f'{name}.yaml']
     size = size_of(closure)
@@ -103,7 +103,7 @@ def test_every_point_is_where_the_independent_solver_has_it(name):
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name):
+def test_gallery_linkage_closes_to_rounding_over_its_range(name):
     closure = closure_of(name)
     size = size_of(closure)
     worst = 0.0
@@ -115,7 +115,7 @@ def test_it_moves_through_its_whole_range_with_a_residual_at_rounding_level(name
 
 
 @pytest.mark.parametrize('name', [name for name in KINDS if name != 'five_bar'])
-def test_its_range_is_the_one_that_the_independent_solver_met(name):
+def test_gallery_range_equals_the_independent_solver(name):
     closure = closure_of(name)
     low, high = EXPECTED[f'{name}.yaml']['range']
     if closure.input_ranges[0].is_whole:
@@ -132,7 +132,7 @@ def test_its_range_is_the_one_that_the_independent_solver_met(name):
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_velocities_and_accelerations_are_the_slopes_of_the_positions(name):
+def test_gallery_velocities_and_accelerations_equal_numerical_derivatives(name):
     closure = closure_of(name)
     size = size_of(closure)
     count = len(closure.linkage.inputs)
@@ -162,7 +162,7 @@ def test_velocities_and_accelerations_are_the_slopes_of_the_positions(name):
             assert abs(curve - bent) < 1e-5 * (pull + size), (values, key)
 
 
-def test_andrews_squeezer_stands_where_its_sources_start_it():
+def test_andrews_squeezer_equals_its_published_initial_values():
     # Hairer and Wanner, and the Bari test set: consistent initial values.
     joints = closure_of('andrews_squeezer').linkage.joints
     position = closure_of('andrews_squeezer').position(-0.0617138900142764496358948458001)
@@ -187,7 +187,7 @@ def test_peaucellier_draws_a_straight_line():
         assert place.real == pytest.approx(0.13125, abs=3e-16)
 
 
-def test_the_trammel_draws_an_ellipse():
+def test_elliptic_trammel_draws_an_ellipse():
     closure = closure_of('elliptic_trammel')
     (traced,) = closure.linkage.traced
     points = []
@@ -204,7 +204,7 @@ def test_the_trammel_draws_an_ellipse():
     assert half_axes[0] != pytest.approx(half_axes[1], rel=0.1)
 
 
-def test_hoeken_draws_nearly_a_straight_line_for_half_a_turn():
+def test_hoeken_linkage_draws_a_nearly_straight_line():
     closure = closure_of('hoeken')
     heights = [
         closure.points(closure.position(radians(90 + i)))['coupler', 'P'].imag for i in range(181)
@@ -213,7 +213,7 @@ def test_hoeken_draws_nearly_a_straight_line_for_half_a_turn():
     assert max(heights) - min(heights) == pytest.approx(0.000195, abs=1e-6)
 
 
-def test_a_linkage_does_not_drift_in_a_million_turns():
+def test_linkage_does_not_drift_over_a_million_turns():
     for name in ('jansen_leg', 'class_3'):
         closure = closure_of(name)
         start = closure.points(closure.position(1.0))

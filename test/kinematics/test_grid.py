@@ -86,7 +86,7 @@ def sphere_grid(rng, count):
 
 @pytest.mark.parametrize('count', [1, 2])
 @pytest.mark.parametrize('seed', range(12))
-def test_a_cell_is_the_same_whatever_was_asked_before(seed, count):
+def test_grid_cells_do_not_depend_on_earlier_queries(seed, count):
     rng = random.Random(seed)
     make, draw = sphere_grid(rng, count)
     states = draw(40)
@@ -99,7 +99,7 @@ def test_a_cell_is_the_same_whatever_was_asked_before(seed, count):
 
 
 @pytest.mark.parametrize('seed', range(12))
-def test_the_way_that_a_grid_follows_is_the_same_whatever_was_asked_before(seed):
+def test_grid_reach_does_not_depend_on_earlier_queries(seed):
     rng = random.Random(seed)
     make, draw = sphere_grid(rng, 2)
     states = draw(20)
@@ -112,7 +112,7 @@ def test_the_way_that_a_grid_follows_is_the_same_whatever_was_asked_before(seed)
 
 @pytest.mark.parametrize('count', [1, 2])
 @pytest.mark.parametrize('states', [0, 1, 30])
-def test_many_inputs_at_once_have_the_cells_of_each(states, count):
+def test_grid_batch_returns_the_cells_of_single_inputs(states, count):
     make, draw = sphere_grid(random.Random(states), count)
     inputs, one_by_one = draw(states), make()
     rows, found = make().rows_at(*np.array(inputs).reshape(states, count).T)

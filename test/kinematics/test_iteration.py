@@ -65,7 +65,7 @@ def iterated(linkage: Linkage) -> Structure:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', CLOSED_FORM)
-def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
+def test_iterated_solution_equals_the_closed_form(name, monkeypatch):
     linkage = shipped(name)
     exact = Closure(linkage)
     start = PLACES[f'{name}.yaml']['inputs'][1]
@@ -97,7 +97,7 @@ def test_it_finds_what_the_closed_form_finds(name, monkeypatch):
     assert found.residual(other) < 1e-14 * exact.scale
 
 
-def test_a_state_has_the_same_bits_whatever_the_last_digits_of_numpy_are(monkeypatch):
+def test_iterated_states_do_not_depend_on_numpy_rounding(monkeypatch):
     # Another LAPACK gives other last digits: here they are drawn.
     rng = np.random.default_rng(5)
 
@@ -124,7 +124,7 @@ def test_a_state_has_the_same_bits_whatever_the_last_digits_of_numpy_are(monkeyp
     assert motions() == expected
 
 
-def test_near_a_limit_its_conditioning_falls_to_nothing():
+def test_class_3_conditioning_vanishes_at_the_range_end():
     closure = Closure(class_3_linkage())
     (interval,) = closure.input_ranges
     found = [
@@ -136,7 +136,7 @@ def test_near_a_limit_its_conditioning_falls_to_nothing():
 
 
 @pytest.mark.parametrize('first', [True, False])
-def test_links_that_one_of_two_inputs_moves_follow_its_branch(first):
+def test_class_3_links_ignore_a_second_input(first):
     """A second crank on the ground changes nothing of them, to the last bit."""
     alone = shipped('class_3')
     spare = Input('spare_joint', GROUND, 'spare')
@@ -159,7 +159,7 @@ def test_links_that_one_of_two_inputs_moves_follow_its_branch(first):
         assert (one.status, one.joints) == (other.status, other.joints)
 
 
-def test_a_pose_that_leads_nowhere_is_an_open_loop():
+def test_pose_beyond_the_limit_gives_an_open_loop():
     # The pose's input is beyond the limit: there is nothing to continue from.
     sound = class_3_linkage()
     assert sound.pose is not None
@@ -245,7 +245,7 @@ def misfit(closure: Closure, position: Position) -> float:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
+def test_chain_moves_through_its_ranges_without_jumps(name, tail):
     rng = random.Random(3)
     for _ in range(6):
         closure = Closure(chain(rng, FOUR_BARS[name], tail))
@@ -275,7 +275,7 @@ def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name, tail):
                     assert not closure.position(end + sign * 1e-9).status.has_pose
 
 
-def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns():
+def test_platform_on_change_point_linkage_repeats_after_two_turns():
     found = 0
     for seed in (4, 8, 9, 11, 12):
         closure = Closure(chain(random.Random(seed), FOUR_BARS['change point'], tail=False))

@@ -72,7 +72,7 @@ STATES = {
 
 
 @pytest.mark.parametrize('name', STATES)
-def test_what_is_found(name):
+def test_joint_limits_give_the_expected_statuses(name):
     text, limits, states = STATES[name]
     closure = closed(text, limits)
     assert {value: closure.position(value).status for value in states} == states
@@ -80,7 +80,7 @@ def test_what_is_found(name):
     assert batch.status.tolist() == [CODES[status] for status in states.values()]
 
 
-def test_a_toggle_beyond_the_limits_stays_a_toggle():
+def test_toggle_beyond_the_limits_keeps_its_status():
     """It has no rates, which is worse; only what is published goes by the limits still."""
     toggle = closed(DOUBLE_ROCKER).input_ranges[0].highest
     closure = closed(DOUBLE_ROCKER, ', input: {limits: [-0.5, 0.5]}')
@@ -89,7 +89,7 @@ def test_a_toggle_beyond_the_limits_stays_a_toggle():
     assert closure.limit_exceeded(closure.position(toggle)).startswith('crank_joint at ')
 
 
-def test_beyond_the_limits_all_numbers_are_those_of_the_linkage():
+def test_limited_states_keep_their_values_and_rates():
     free = closed(CRANK_ROCKER)
     closure = closed(CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}')
     position, same = closure.position(2.0), free.position(2.0)
@@ -104,7 +104,7 @@ def test_beyond_the_limits_all_numbers_are_those_of_the_linkage():
         assert np.array_equal(found, expected)
 
 
-def test_without_limits_nothing_is_asked():
+def test_unlimited_linkage_has_no_limit_check():
     """What is called is the method itself, and no object stands between."""
     assert 'position' not in vars(closed(CRANK_ROCKER))
     assert 'position' not in vars(closed(CRANK_ROCKER, ', input: {velocity: 1}'))
@@ -125,7 +125,7 @@ RANGES = {
 
 
 @pytest.mark.parametrize('name', RANGES)
-def test_ranges_end_at_limits(name):
+def test_input_ranges_end_at_joint_limits(name):
     text, limits, expected, joint = RANGES[name]
     closure = closed(text, limits)
     assert len(closure.input_ranges) == len(expected)
@@ -141,7 +141,7 @@ def test_ranges_end_at_limits(name):
             assert closure.position(end).status is CLOSED
 
 
-def test_a_range_without_an_end():
+def test_input_range_may_be_unlimited_on_one_side():
     (one,) = closed(CRANK_ROCKER, ', input: {limits: [0.5, .inf]}').input_ranges
     assert (one.lowest, one.limited, one.by, one.is_whole) == (
         0.5, (True, False), ('crank_joint', ''), False,
@@ -149,7 +149,7 @@ def test_a_range_without_an_end():
     assert str(one) == '0.5 rad and more'
 
 
-def test_a_narrow_gap_between_samples_is_found():
+def test_range_search_finds_a_narrow_gap_of_limits():
     """At its summit the rocker is beyond its limit for a thousandth of a radian of the crank."""
     free = closed(CRANK_ROCKER)
     values = np.linspace(0.0, tau, 200_001)
@@ -167,7 +167,7 @@ def test_a_narrow_gap_between_samples_is_found():
 
 @pytest.mark.parametrize('near', [1e-2, 1e-4, 1e-5, 1e-6, 1e-8])
 @pytest.mark.parametrize('width', [1e-3, 1e-2, 0.1])
-def test_a_narrow_window_of_a_joint_is_found_up_to_the_toggle(near, width):
+def test_range_search_finds_narrow_joint_windows_near_toggles(near, width):
     """Next to a toggle joints move as the square root: a window is crossed in a short range."""
     draw = random.Random(f'{near} {width}')
     missed = []
@@ -199,7 +199,7 @@ def test_a_narrow_window_of_a_joint_is_found_up_to_the_toggle(near, width):
     rocker=st.none() | st.tuples(st.floats(-pi, pi), st.floats(0.01, 3.0)),
     coupler=st.none() | st.tuples(st.floats(-pi, pi), st.floats(0.01, 3.0)),
 )
-def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
+def test_positions_batches_and_ranges_agree_on_limits(sides, own, rocker, coupler):
     """Random four-bars with random limits agree with the same linkage without, limited here."""
     a, b, c, d = sides
     try:
@@ -284,7 +284,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
     ('lines', 'seed', 'turns'),
     [(0, 10, 0), (0, 50, 0), (1, 27, 0), (2, 11, 0), (2, 38, 0), (0, 0, 1), (0, 2, 1)],
 )
-def test_links_that_are_iterated(lines, seed, turns):
+def test_iterated_platforms_keep_joint_limits(lines, seed, turns):
     """Platforms whose branch has other poses a turn on (turns 0), or the same (1)."""
     rng = random.Random(seed)
     linkage = linkage_of(platform(rng, lines=lines), rng)
@@ -333,7 +333,7 @@ def test_links_that_are_iterated(lines, seed, turns):
             assert inside == (left > 0.0)
 
 
-def test_rounding_of_typed_numbers_is_within():
+def test_limits_tolerate_the_rounding_of_decimal_sums():
     """0.45 + 0.35 is 0.7999999999999999 or 0.8; a sum may be a rounding beyond a limit."""
     closure = closed(CRANK_ROCKER, ', input: {limits: [0.1, 0.3]}')
     assert 0.1 + 0.2 > 0.3
@@ -341,7 +341,7 @@ def test_rounding_of_typed_numbers_is_within():
     assert closure.position(nextafter(0.3 * (1 + 1e-15), inf)).status is LIMITED
 
 
-def test_with_several_inputs_the_limits_of_each_joint_hold():
+def test_five_bar_limits_hold_for_every_joint():
     text = symmetric_five_bar(', limits: [1, 2]', rod=', limits: [-1.5, 0.5]')
     closure = closed(text)
     rod = closure.position(1.5, 1.5).joints[0]
@@ -363,7 +363,7 @@ def test_with_several_inputs_the_limits_of_each_joint_hold():
     'limits', [dict.fromkeys(names, ', limits: [-2, 2]') for names in
                (('left',), ('left', 'right'), ('rod',), ('left', 'right', 'rod'))]
 )  # fmt: skip
-def test_several_inputs_have_no_ranges_whatever_is_limited(limits):
+def test_five_bar_with_limits_has_no_input_ranges(limits):
     closure = closed(symmetric_five_bar(**{'left': '', **limits}))
     assert closure.input_ranges == ()
     assert closure.bounds.inputs or closure.bounds.joints

@@ -57,7 +57,7 @@ def off_by(found, wanted, name):
         ('rssr', 'B.z'),
     ],
 )
-def test_input_has_its_value_wherever_the_crank_goes_on_its_branch(name, wanted):
+def test_measured_input_gives_its_value_along_the_branch(name, wanted):
     """The crank that a value asks for brings the linkage's own points there."""
     closure = load(name)
     rng = random.Random(f'{name} {wanted}')
@@ -95,7 +95,7 @@ def test_input_has_its_value_wherever_the_crank_goes_on_its_branch(name, wanted)
         ('delta', ('c1.z', 'x', 'y')),
     ],
 )
-def test_several_inputs_are_there_and_back(name, wanted):
+def test_several_measured_inputs_return_the_motor_joints(name, wanted):
     closure = load(name)
     driven = closure.driven_by(*wanted)
     assert driven.input_names == wanted
@@ -145,7 +145,7 @@ def test_several_inputs_are_there_and_back(name, wanted):
         ('ankle_motors', 'b1.z m1', 'm2 stays free; name a joint that moves with m2'),
     ],
 )
-def test_what_cannot_be_an_input_is_one_line(name, wanted, line):
+def test_driven_by_refuses_wrong_measures_in_one_line(name, wanted, line):
     with pytest.raises(DefinitionError) as error:
         load(name).driven_by(*wanted.split())
     assert line in str(error.value)
@@ -153,7 +153,7 @@ def test_what_cannot_be_an_input_is_one_line(name, wanted, line):
 
 
 @pytest.mark.parametrize('side', ['left', 'right'])
-def test_random_four_bars_are_driven_by_any_distance_coordinate_and_angle(side):
+def test_coordinates_and_angles_drive_random_four_bars(side):
     rng = random.Random(side)
     for _ in range(4):
         lengths = tuple(rng.uniform(0.3, 1.0) for _ in range(4))

@@ -96,7 +96,7 @@ CLOSURES = {
 
 @pytest.mark.parametrize('kind', CLOSURES)
 @pytest.mark.parametrize('name', NUMBERS)
-def test_a_number_of_any_type_is_that_double(name, kind):
+def test_closure_accepts_any_number_type_as_double(name, kind):
     value, double = NUMBERS[name]
     closure = CLOSURES[kind]
     found, expected = closure.position(value), closure.position(double)
@@ -121,7 +121,7 @@ def test_a_number_of_any_type_is_that_double(name, kind):
 
 
 @pytest.mark.parametrize('name', WRONG)
-def test_what_is_no_number_is_refused_alike(name):
+def test_closure_refuses_values_that_are_no_numbers(name):
     value = WRONG[name]
     position = FOUR_BAR.position(1.0)
     velocity = FOUR_BAR.velocity(position, 1.0)
@@ -166,7 +166,7 @@ ARRAYS = {
 
 
 @pytest.mark.parametrize('name', ARRAYS)
-def test_arrays_of_any_kind_are_those_doubles(name):
+def test_solve_accepts_any_array_type_as_doubles(name):
     given = ARRAYS[name]
     doubles = [
         inf if isinstance(value, int) and value > 1e300 else float(value) for value in given
@@ -191,7 +191,7 @@ WRONG_ARRAYS = {
 
 
 @pytest.mark.parametrize('name', WRONG_ARRAYS)
-def test_arrays_of_something_else_are_refused(name):
+def test_solve_refuses_arrays_that_hold_no_numbers(name):
     given, kind, text = WRONG_ARRAYS[name]
     for what, call in (
         ('inputs', lambda: FOUR_BAR.solve(given)),
@@ -202,7 +202,7 @@ def test_arrays_of_something_else_are_refused(name):
             call()
 
 
-def test_a_masked_number_is_refused():
+def test_position_refuses_a_masked_number():
     with pytest.raises(ValueError, match=r'^inputs: some values are masked'):
         FOUR_BAR.position(np.ma.masked)
 
@@ -218,7 +218,7 @@ def zeros():
 
 
 @pytest.mark.parametrize('name', zeros())
-def test_both_zeros_give_the_same_bits(name):
+def test_positive_and_negative_zero_give_the_same_bits(name):
     closure = lr.load(name)
     one, other = closure.position(0.0), closure.position(-0.0)
     assert (one.status, repr(one.joints)) == (other.status, repr(other.joints))
@@ -268,7 +268,7 @@ def agrees(found, true):
 @pytest.mark.parametrize('rate', HUGE)
 @pytest.mark.parametrize('name', MACHINES)
 @pytest.mark.parametrize('change', [0.0, -1.7e308])
-def test_rates_that_overflow_are_infinite_everywhere(name, rate, change):
+def test_overflowing_rates_are_infinite_in_all_solvers(name, rate, change):
     closure = lr.load(name)
     x = 0.7
     true = exact(closure, x, rate, change)
@@ -288,7 +288,7 @@ def test_rates_that_overflow_are_infinite_everywhere(name, rate, change):
                     assert agrees(one, other), (name, rate, change, one, other)
 
 
-def test_huge_and_usual_rates_side_by_side():
+def test_huge_rates_do_not_change_usual_rates_beside_them():
     rates = np.array([1.0, 1e160, nan, inf, 2.0])
     inputs = np.full(5, 0.7)
     many = FOUR_BAR.solve(inputs, rates=rates)
@@ -303,7 +303,7 @@ def test_huge_and_usual_rates_side_by_side():
 
 @pytest.mark.parametrize('name', MACHINES)
 @pytest.mark.parametrize('other', [nan, inf, -inf])
-def test_a_rate_that_is_not_finite_leaves_huge_ones_beside_it_alone(name, other):
+def test_infinite_rates_do_not_change_huge_rates_beside_them(name, other):
     closure = lr.load(name)
     many = closure.solve([0.7, 0.7], rates=[1e160, other], accelerations=[1.0, other])
     rates, changes = exact(closure, 0.7, 1e160, 1.0)
@@ -311,7 +311,7 @@ def test_a_rate_that_is_not_finite_leaves_huge_ones_beside_it_alone(name, other)
         assert all(map(agrees, found[:, 0], true))
 
 
-def test_a_slider_whose_rate_overflows_in_the_unit_of_the_steps():
+def test_slider_acceleration_stays_right_at_overflowing_rates():
     trammel = lr.load('elliptic_trammel')
     position = trammel.position(0.05)
     assert trammel.scale < 1.0
@@ -321,7 +321,7 @@ def test_a_slider_whose_rate_overflows_in_the_unit_of_the_steps():
         assert agrees(one, true)
 
 
-def test_points_move_at_huge_rates_too():
+def test_point_motion_stays_right_at_huge_rates():
     position = FOUR_BAR.position(0.7)
     velocity = FOUR_BAR.velocity(position, 1e160)
     moved = FOUR_BAR.point_motion(position, velocity, FOUR_BAR.acceleration(position, velocity, 0))

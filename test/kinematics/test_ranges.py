@@ -84,11 +84,11 @@ def end_of_range(a: float, b: float, c: float, d: float, span: str) -> tuple[mpf
 
 
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_four_bar_s_range_ends_where_it_folds_and_stretches(name):
+def test_four_bar_range_ends_at_fold_and_stretch(name):
     check_ranges(FOUR_BARS[name])
 
 
-def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch():
+def test_random_four_bar_ranges_end_at_fold_and_stretch():
     rng = random.Random(4)
     kinds = set()
     while len(kinds) < 4 or rng.random() > 1e-3:
@@ -123,7 +123,7 @@ def check_ranges(lengths: tuple[float, float, float, float]) -> tuple[bool, bool
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name):
+def test_four_bar_closes_only_inside_its_ranges(name):
     lengths = FOUR_BARS[name]
     closure = Closure(four_bar_linkage(lengths, 'right'))
     for i in range(1, 400):
@@ -136,7 +136,7 @@ def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name):
 
 
 @pytest.mark.parametrize('reach', [0.66, 0.68, 0.7])
-def test_a_dyad_behind_an_iterated_group_ends_the_range(reach):
+def test_dyad_behind_a_platform_limits_the_range(reach):
     """Its pin is a pin of a platform on three arms, whose branch closes farther."""
     platform = class_3_linkage()
     linkage = replace(
@@ -173,7 +173,7 @@ def test_a_dyad_behind_an_iterated_group_ends_the_range(reach):
         ((0.2, 0.2, 0.0), True),
     ],
 )
-def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(lengths, whole):
+def test_inverted_slider_crank_range_ends_at_its_reach(lengths, whole):
     closure = Closure(inverted_slider_crank_linkage(lengths, 'ahead'))
     ((low, high, *_),) = closure.input_ranges
     if whole:
@@ -189,7 +189,7 @@ def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(lengths, whole):
 
 
 @pytest.mark.parametrize('angle', [0.7, -2.0])
-def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle):
+def test_input_range_shifts_with_the_crank_frame(angle):
     lengths = FOUR_BARS['both']
     plain = Closure(four_bar_linkage(lengths, 'left')).input_ranges
     turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).input_ranges
@@ -197,7 +197,7 @@ def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle):
         assert (turned_low, turned_high) == pytest.approx((low - angle, high - angle), abs=1e-14)
 
 
-def test_ranges_are_told_in_words():
+def test_ranges_are_described_in_words():
     words = {
         name: describe_ranges(Closure(four_bar_linkage(lengths, 'left')).input_ranges)
         for name, lengths in FOUR_BARS.items()
@@ -241,7 +241,7 @@ def chain(one: float, other: float) -> Linkage:
 
 @pytest.mark.parametrize('narrow', [1e-4, 1e-8, 1e-10])
 @pytest.mark.parametrize('gap', [False, True], ids=['a part', 'a gap'])
-def test_what_is_narrower_than_the_samples_is_found(narrow, gap):
+def test_range_search_finds_parts_narrower_than_its_samples(narrow, gap):
     # The distance from the rocker's point to the ground's has one summit over the turn. A dyad
     # that reaches all but the last of it leaves a gap there; one that needs it closes only there.
     def distance(phi: float) -> float:
@@ -277,11 +277,11 @@ def of_lengths(a: float, b: float, c: float, d: float) -> InputSweep:
     return InputSweep(Closure(four_bar_linkage((a, b, c, d), 'left')))
 
 
-def test_a_full_turn_begins_at_0():
+def test_full_turn_range_begins_at_zero():
     assert of_lengths(2.0, 7.0, 9.0, 6.0).ranges == (InputRange(0.0, tau),)
 
 
-def test_a_single_change_point_needs_two_turns():
+def test_single_change_point_range_covers_two_turns():
     assert of_lengths(1.0, 4.0, 3.0, 2.0).ranges == (InputRange(0.0, 2.0 * tau),)
     assert of_lengths(1.0, 2.0, 1.0, 2.0).ranges == (InputRange(0.0, tau),)  # a parallelogram: one
 
@@ -295,9 +295,7 @@ MOST_TURNS = 8
     st.sampled_from(['both', 'lower', 'upper']),
     st.floats(0.0, 0.999),
 )
-def test_of_a_range_within_wide_limits_the_turns_about_their_middle_are_listed(
-    turns, given_limits, fraction
-):
+def test_wide_limits_list_the_turns_about_their_middle(turns, given_limits, fraction):
     # The crank swings about 0, so a range lies in each turn.
     lengths = 4.0, 8.0, 3.0, 6.0
     (whole,) = of_lengths(*lengths).ranges
@@ -327,7 +325,7 @@ def test_of_a_range_within_wide_limits_the_turns_about_their_middle_are_listed(
         assert abs((listed[0] + listed[-1]) - (within[0] + within[-1])) <= 2
 
 
-def test_a_limited_range_lies_about_its_middle():
+def test_peaucellier_range_is_symmetric_about_zero():
     """Its limit follows from one triangle: O, B and a point that is 0.075 m from B."""
     ((low, high, *_),) = InputSweep(shipped('peaucellier')).ranges
     # The arms close where |OB| = 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
@@ -337,7 +335,7 @@ def test_a_limited_range_lies_about_its_middle():
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file):
+def test_gallery_linkage_has_its_usual_pose_inside_its_range(file):
     closure = shipped(file.stem)
     inputs = usual_inputs(closure)
     assert closure.position(*inputs).status is Status.CLOSED
@@ -347,7 +345,7 @@ def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file):
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file):
+def test_worst_state_of_gallery_linkages_closes_to_rounding(file):
     closure = shipped(file.stem)
     worst = find_worst_states(closure)
     assert worst is not None
@@ -379,7 +377,7 @@ joints:
 """
 
 
-def test_the_worst_states_of_a_cylinder_among_several_inputs_are_those_of_the_positions(tmp_path):
+def test_worst_states_of_a_loader_equal_a_grid_scan(tmp_path):
     file = tmp_path / 'loader.yaml'
     file.write_text(LOADER)
     closure = load(file)
@@ -392,7 +390,7 @@ def test_the_worst_states_of_a_cylinder_among_several_inputs_are_those_of_the_po
     assert worst.margin.conditioning == pytest.approx(least, abs=1e-9)
 
 
-def test_the_nearest_singularity_of_several_inputs_is_where_the_forearms_are_straightest():
+def test_five_bar_is_nearest_singular_at_straightest_forearms():
     closure = shipped('five_bar')
     worst = find_worst_states(closure)
     assert worst is not None
@@ -425,7 +423,7 @@ POSES = {
 
 
 @pytest.mark.parametrize('kind', POSES)
-def test_a_pose_says_where_a_linkage_starts(kind):
+def test_linkage_starts_at_the_inputs_of_its_pose(kind):
     lengths, pose, expected = POSES[kind]
     linkage = replace(four_bar_linkage(lengths, 'left'), pose=pose)
     assert usual_inputs(Closure(linkage)) == (pytest.approx(expected, abs=1e-14),)
@@ -436,12 +434,12 @@ def test_a_pose_says_where_a_linkage_starts(kind):
     [((1.3, 1.7), (1.3, 1.7)), ((pi, 0.0), (radians(60.0), radians(60.0)))],
     ids=['closes', 'open: the elbows are 0.3 m apart, 0.22 at most'],
 )
-def test_several_inputs_start_from_their_pose(inputs, expected):
+def test_five_bar_starts_at_the_inputs_of_its_pose(inputs, expected):
     linkage = replace(shipped('five_bar').linkage, pose=AssemblyPose(inputs, {}))
     assert usual_inputs(Closure(linkage)) == pytest.approx(expected)
 
 
-def test_the_other_inputs_are_held_along_a_way():
+def test_input_sweep_holds_the_other_inputs():
     """The elbows of the five-bar are 0.22 m apart at the ends of the left crank's way."""
     closure = shipped('five_bar')
     way = InputSweep(closure, (radians(60.0), radians(60.0)))
@@ -465,7 +463,7 @@ def test_a_range_is_found_from_any_turn():
 
 
 @pytest.mark.parametrize('whole', [True, False])
-def test_samples_go_from_end_to_end(whole):
+def test_samples_cover_the_range_from_end_to_end(whole):
     interval = InputRange(0.0, tau) if whole else InputRange(-0.7, 1.1)
     values = sample_inputs(interval, 50)
     assert values[0] == interval.lowest
@@ -475,7 +473,7 @@ def test_samples_go_from_end_to_end(whole):
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.05, 2.0), st.floats(0.0, 0.9), st.integers(1, 7))
-def test_extremes_are_found_wherever_they_lie(place, size, other, times):
+def test_extremes_of_a_periodic_function_are_found(place, size, other, times):
     """A cosine with a smaller one of a higher order: lowest value known where they agree."""
 
     def function(x: float) -> float:
@@ -488,17 +486,17 @@ def test_extremes_are_found_wherever_they_lie(place, size, other, times):
     assert any(abs(remainder(at - place, tau)) < 1.1 * off for at in found.lowest.at)
 
 
-def test_what_does_not_change_has_its_extreme_nowhere():
+def test_constant_function_has_extremes_at_no_input():
     found = find_extremes(lambda _: 1.25, [InputRange(0.0, tau)])
     assert found == ((1.25, ()), (1.25, ()))
 
 
-def test_the_ends_of_a_limited_range_count():
+def test_extremes_include_the_ends_of_a_range():
     found = find_extremes(lambda x: x, [InputRange(-0.5, 2.0)])
     assert found == ((-0.5, (-0.5,)), (2.0, (2.0,)))
 
 
-def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook():
+def test_crank_rocker_transmission_angle_equals_the_textbook_formula():
     """It is met where the crank lies along the ground: cos μ = (b² + c² − (d ∓ a)²)/(2bc)."""
     rng = random.Random(7)
     for _ in range(20):
@@ -515,13 +513,13 @@ def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook(
             assert found.highest.value == pytest.approx(pi / 2.0, abs=1e-12)
 
 
-def test_a_slider_crank_s_is_least_where_the_crank_pin_is_farthest_from_the_line():
+def test_slider_crank_transmission_angle_equals_the_textbook_formula():
     ((_, found),) = transmission_angles(InputSweep(shipped('slider_crank'))).items()
     assert degrees(found.lowest.value) == pytest.approx(degrees(acos(0.05 / 0.14)), abs=1e-9)
     assert [degrees(at) for at in found.lowest.at] == [pytest.approx(270.0, abs=1e-5)]
 
 
-def test_a_chain_s_four_bars_are_seen_from_what_is_known_first():
+def test_watt_linkage_lists_both_of_its_four_bars():
     first, second = four_bars(shipped('watt_1').structure)
     assert first.links == ('crank', 'coupler', 'rocker', 'ground')
     assert first.kind == four_bar_type(*first.lengths)
@@ -534,16 +532,16 @@ def test_a_chain_s_four_bars_are_seen_from_what_is_known_first():
 @pytest.mark.parametrize(
     ('name', 'count'), [('klann_leg', 1), ('stephenson_3', 1), ('five_bar', 0)]
 )
-def test_a_loop_of_five_links_is_no_four_bar(name, count):
+def test_five_link_loops_do_not_count_as_four_bars(name, count):
     assert len(list(four_bars(shipped(name).structure))) == count
 
 
-def test_a_dyad_that_an_input_stretches_is_no_four_bar():
+def test_cylinder_loop_does_not_count_as_four_bar():
     (bar,) = four_bars(shipped('excavator_bucket').structure)
     assert bar.links == ('rocker', 'bucket_link', 'bucket', 'ground')
 
 
-def test_a_grid_goes_over_all_inputs():
+def test_position_grid_covers_all_inputs():
     found = list(grid_positions(shipped('five_bar'), 6))
     assert len({inputs for inputs, _ in found}) == len(found) == 36
 
@@ -572,7 +570,7 @@ BARKER = {
 
 
 @pytest.mark.parametrize('code', BARKER)
-def test_each_of_barkers_types_is_named(code):
+def test_four_bar_type_names_each_barker_type(code):
     assert four_bar_type(*BARKER[code]).code == code
 
 
@@ -589,21 +587,21 @@ def test_each_of_barkers_types_is_named(code):
         ((0.1, 0.1, 0.1, 0.1), 'rhombus'),
     ],
 )
-def test_an_engineer_s_word_is_in_the_name(lengths, word):
+def test_four_bar_type_contains_the_common_name(lengths, word):
     assert word in four_bar_type(*lengths).name
 
 
-def test_lengths_in_decimals_that_are_meant_to_cancel_do():
+def test_decimal_lengths_that_cancel_give_a_change_point():
     assert 0.1 + 0.7 != 0.3 + 0.5  # in floats
     assert four_bar_type(0.1, 0.7, 0.5, 0.3) == ('SCRR', 'change-point crank-rocker', 0.0)
 
 
-def test_the_margin_says_how_far_it_is_from_a_change_point():
+def test_four_bar_type_margin_equals_the_grashof_difference():
     assert four_bar_type(2.0, 4.0, 3.5, 3.0).margin == 0.5
     assert four_bar_type(4.0, 3.0, 2.5, 2.0).margin == -0.5
 
 
-def test_what_does_not_close_has_no_name():
+def test_four_bar_that_never_closes_has_no_type():
     no_loop = four_bar_type(1.0, 2.0, 3.0, 7.0)
     assert no_loop.code == ''
     assert no_loop.name.startswith('no loop')
@@ -615,7 +613,7 @@ sides = st.floats(0.1, 10.0)
 
 
 @given(sides, sides, sides, sides)
-def test_seen_from_the_other_end_input_and_output_change_places(a, b, c, d):
+def test_reversed_four_bar_swaps_input_and_output_types(a, b, c, d):
     assume(2.0 * max(a, b, c, d) < 0.999 * (a + b + c + d))
     here, there = four_bar_type(a, b, c, d).code, four_bar_type(c, b, a, d).code
     swapped = {'GCRR': 'GRRC', 'SCRR': 'SRRC', 'RRR2': 'RRR4'}
@@ -624,7 +622,7 @@ def test_seen_from_the_other_end_input_and_output_change_places(a, b, c, d):
 
 
 @given(sides, sides, sides, sides)
-def test_the_input_turns_fully_where_its_letter_is_c(a, b, c, d):
+def test_four_bar_type_predicts_full_turns_of_the_input(a, b, c, d):
     """Against the closure, whose ranges know nothing of Grashof."""
     assume(2.0 * max(a, b, c, d) < 0.999 * (a + b + c + d))
     kind = four_bar_type(a, b, c, d)

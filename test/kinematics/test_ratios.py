@@ -131,7 +131,9 @@ def same_angles(one: Any, other: Any, error: float = 1e-12) -> bool:
 @pytest.mark.parametrize(
     ('side', 'theta3', 'theta4'), [('right', 173.642, -177.715), ('left', -115.407, -124.050)]
 )
-def test_geared_five_bar_of_the_textbook(side: str, theta3: float, theta4: float) -> None:
+def test_geared_five_bar_equals_the_textbook_example(
+    side: str, theta3: float, theta4: float
+) -> None:
     """Norton, Design of Machinery: L 6, 1, 7, 9, 4; ratio 2, phase angle 30°, crank 60°."""
     linkage = geared_five_bar((6.0, 1.0, 7.0, 9.0, 4.0), Ratio('theta2', 2.0, radians(30)), side)
     found = Closure(linkage).position(radians(60.0)).joints
@@ -147,7 +149,7 @@ def five_bar_angles(lengths: Any, ratio: Ratio, side: int, crank: Any) -> Any:
     return None if pin_b is None else (geared, mp.arg(pin_b - pin_a), mp.arg(pin_b - pin_c))
 
 
-def test_random_geared_five_bars() -> None:
+def test_random_geared_five_bars_equal_the_reference() -> None:
     """Positions, rates and accelerations, of the steps and of the compiled steps."""
     random = Random(33)
     compared = 0
@@ -236,7 +238,7 @@ def posed_five_bar(
     return closure, given, [geared, theta3, theta4]
 
 
-def test_random_gears_on_moving_links() -> None:
+def test_random_gears_on_moving_links_equal_the_reference() -> None:
     """No dyad covers them; positions and rates."""
     random = Random(34)
     compared = 0
@@ -275,7 +277,7 @@ CAME_BACK_EARLY = (
 @pytest.mark.parametrize(
     ('ratio', 'case'), [*((1.25, n) for n in range(4)), (-2.0, 3), (0.5, 3), (17 / 43, 3)]
 )
-def test_gears_on_moving_links_over_whole_turns(ratio: float, case: int) -> None:
+def test_gears_on_moving_links_keep_mesh_over_whole_turns(ratio: float, case: int) -> None:
     """Teeth keep their mesh turn after turn, against a loop that is followed in small steps."""
     random = Random(case)
     for index in range(200):
@@ -332,7 +334,7 @@ def geared_rocker(rng: Random, ratio: float) -> tuple[Closure, float]:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('ratio', [-0.5, 0.25, -1.0, 3.0, 0.5, 0.37])
-def test_implicit_ratio_turns_its_link_by_whole_turns_of_the_input(ratio: float) -> None:
+def test_implicit_ratio_turns_its_link_by_whole_input_turns(ratio: float) -> None:
     random = Random(8)
     closed = 0
     for _ in range(8):
@@ -408,7 +410,7 @@ def geared_train(rng: Random) -> tuple[Linkage, Any]:
     return linkage, exact
 
 
-def test_random_links_that_ratios_turn_over_whole_turns() -> None:
+def test_geared_trains_follow_the_crank_over_whole_turns() -> None:
     """They follow the crank turn after turn, also where another loop was open in between."""
     rng = Random(11)
     compared, opened = 0, 0
@@ -441,7 +443,7 @@ def test_random_links_that_ratios_turn_over_whole_turns() -> None:
 
 
 @pytest.mark.parametrize('ratio', [1.0, -1.5, 0.37, -2.0])
-def test_ratio_of_a_joint_solved_before(ratio: float) -> None:
+def test_ratio_follows_a_rocker_of_another_four_bar(ratio: float) -> None:
     """A rocker drives the crank of another four-bar."""
     closure = Closure(two_four_bars(Ratio('rocker_joint', ratio, 0.3)))
     for k in range(-20, 20):
@@ -457,7 +459,7 @@ def test_ratio_of_a_joint_solved_before(ratio: float) -> None:
             assert same_angles(position.joints, right)
 
 
-def test_turns_of_a_joint_solved_before_are_those_of_its_limits() -> None:
+def test_limited_rocker_drives_a_gear_without_jumps() -> None:
     """A rocker that swings through 180° drives a gear by 0.5 without a jump."""
     linkage = two_four_bars(Ratio('rocker_joint', 0.5))
     # Turn the ground by 90°, so that the rocker swings about 180°.
@@ -474,7 +476,7 @@ def test_turns_of_a_joint_solved_before_are_those_of_its_limits() -> None:
 
 
 @pytest.mark.parametrize('ratio', [0.5, -1.5])
-def test_joint_whose_turns_are_not_known(ratio: float) -> None:
+def test_ratio_of_a_joint_with_unknown_turns_is_refused(ratio: float) -> None:
     """A rocker that swings through 180° without limits, and one that turns fully: refused."""
     swinging = two_four_bars(Ratio('rocker_joint', ratio))
     points = dict(swinging.links['ground']) | {'D': (0.0, 0.08)}
@@ -493,7 +495,7 @@ def test_joint_whose_turns_are_not_known(ratio: float) -> None:
         check_turns(Closure(whole))
 
 
-def test_rack_and_pinion() -> None:
+def test_pinion_moves_its_rack_by_radius_times_angle() -> None:
     """A rack that a pinion moves: radius times angle, over turns, within its limits."""
     closure = Closure(rack_and_pinion(0.012))
     for angle in (-30.0, -1.0, 0.0, 0.5, 11.0):
@@ -513,7 +515,7 @@ def test_rack_and_pinion() -> None:
 
 
 @pytest.mark.parametrize('ratio', [Fraction(-1), Fraction(1, 2), Fraction(-2, 3), Fraction(5, 4)])
-def test_ranges_are_those_of_a_scan(ratio: Fraction) -> None:
+def test_geared_five_bar_ranges_equal_a_scan(ratio: Fraction) -> None:
     """Where a geared five-bar closes, over as many turns as it takes to repeat."""
     lengths, given = (6.0, 1.5, 5.0, 4.0, 2.5), Ratio('theta2', float(ratio), 0.4)
     closure = Closure(geared_five_bar(lengths, given))
@@ -536,7 +538,7 @@ def test_ranges_are_those_of_a_scan(ratio: Fraction) -> None:
     assert InputSweep(closure).ranges
 
 
-def test_limits_of_a_joint_that_follows() -> None:
+def test_follower_limits_cut_the_input_range() -> None:
     """They cut the range of the input, by the ratio."""
     linkage = geared_five_bar((1.0, 0.1, 1.0, 1.0, 0.1), Ratio('theta2', -1.0))
     joints = dict(linkage.joints) | {'theta5': RevoluteJoint('ground', 'link5', Limits(-0.5, 0.2))}
@@ -544,7 +546,7 @@ def test_limits_of_a_joint_that_follows() -> None:
     assert interval[:2] == pytest.approx((-0.2, 0.5), rel=1e-14)
 
 
-def test_gripper_of_the_gallery_is_symmetric() -> None:
+def test_gallery_gripper_fingers_are_mirror_images() -> None:
     """The right finger follows the motor of the left one: each is the other one's mirror."""
     closure = load('gripper')
     for k in range(8):
@@ -572,7 +574,9 @@ WRONG: list[tuple[str, str, dict[str, Ratio], str]] = [
 
 
 @pytest.mark.parametrize(('_', 'key', 'ratios', 'reason'), WRONG, ids=[one[0] for one in WRONG])
-def test_wrong_ratios(_: str, key: str, ratios: dict[str, Ratio], reason: str) -> None:
+def test_wrong_ratio_error_names_its_key(
+    _: str, key: str, ratios: dict[str, Ratio], reason: str
+) -> None:
     """One line names the key and says what to do."""
     linkage = geared_five_bar((6.0, 1.0, 7.0, 9.0, 4.0), Ratio('theta2', 2.0))
     with pytest.raises(DefinitionError, match=reason) as caught:
@@ -582,7 +586,7 @@ def test_wrong_ratios(_: str, key: str, ratios: dict[str, Ratio], reason: str) -
 
 
 @pytest.mark.parametrize('ratio', [-0.6667, 1.0, 2.0])
-def test_a_joint_follows_no_other_of_its_links(ratio: float) -> None:
+def test_ratio_between_joints_of_the_same_links_is_refused(ratio: float) -> None:
     """A link that turns by a part of its own angle is locked, whatever it is called."""
     linkage = two_four_bars(Ratio('rocker_joint', 1.0))
     gear = linkage.joints['gear_joint']
@@ -598,7 +602,7 @@ def test_a_joint_follows_no_other_of_its_links(ratio: float) -> None:
             assert caught.value.where == 'ratios.gear_joint.of'
 
 
-def test_ratio_that_a_linkage_does_not_need() -> None:
+def test_overconstraining_ratio_is_refused() -> None:
     """A rocker cannot follow its crank: the coupler holds it."""
     linkage = replace(two_four_bars(Ratio('rocker_joint', 1.0)), ratios={})
     for name, of in (('rocker_joint', 'crank_joint'), ('out_joint', 'rocker_joint')):
@@ -609,7 +613,7 @@ def test_ratio_that_a_linkage_does_not_need() -> None:
 
 @pytest.mark.parametrize('ratio', [2.0, 0.5, -1.0, 1.5])
 @pytest.mark.parametrize('name', ['theta3', 'theta4'])
-def test_cranks_of_a_joint_are_those_of_a_scan_turn_after_turn(ratio: float, name: str) -> None:
+def test_geared_five_bar_crank_angles_equal_a_scan(ratio: float, name: str) -> None:
     """Norton's five-bar from the other end; with a ratio of halves it repeats after two turns."""
     closure = Closure(geared_five_bar((6.0, 1.0, 7.0, 9.0, 4.0), Ratio('theta2', ratio, 0.5236)))
     (interval,) = closure.input_ranges
@@ -654,7 +658,7 @@ FOLLOWED = {
 
 
 @pytest.mark.parametrize('name', FOLLOWED)
-def test_the_least_transmission_angle_behind_a_ratio_is_that_of_all_states(name):
+def test_least_transmission_angle_behind_a_ratio_equals_a_scan(name):
     first, side, followed, ratio = FOLLOWED[name]
     text = BEHIND_A_RATIO.replace('FIRST', first).replace('SIDE', side)
     text = text.replace('FOLLOWED', followed).replace('RATIO', ratio)

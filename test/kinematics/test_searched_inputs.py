@@ -34,7 +34,7 @@ def cranks_to(place, pivot, crank, rod):
     return [phase(way) + side * acos(cosine) for side in (1, -1)] if abs(cosine) < 1.0 else []
 
 
-def test_all_cranks_of_a_five_bar_that_bring_its_pin_to_a_place_are_found():
+def test_input_search_finds_all_cranks_of_a_five_bar():
     """Of both elbows on both sides those in which the pin lies right of B→A, as the file says."""
     closure, rng, cases = load('five_bar'), random.Random(1), 0
     for _ in range(STATES):
@@ -55,7 +55,7 @@ def test_all_cranks_of_a_five_bar_that_bring_its_pin_to_a_place_are_found():
     assert cases > STATES
 
 
-def test_all_arms_of_a_delta_that_bring_its_platform_to_a_place_are_found():
+def test_input_search_finds_all_arm_angles_of_a_delta():
     """Each arm has two angles; of the eight robots those that hang below their elbows."""
     closure, rng = load('delta'), random.Random(2)
     for _ in range(STATES):
@@ -101,7 +101,7 @@ CASES = [
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize(('name', 'joints'), CASES)
-def test_each_state_has_the_values_and_is_planned_again_in_its_own_assembly(name, joints):
+def test_searched_inputs_reproduce_the_requested_values(name, joints):
     """The state that a value is taken from is among them; rates are those of the linkage."""
     closure, rng = load(name), random.Random(name)
     measured = closure.measuring(*joints)

@@ -40,7 +40,7 @@ def agree(found: list[float], expected: list[float]) -> bool:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', FLAT)
-def test_change_points_and_pins_that_meet_are_listed(kind):
+def test_singular_inputs_list_change_points_and_coincident_pins(kind):
     for index in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
@@ -49,7 +49,7 @@ def test_change_points_and_pins_that_meet_are_listed(kind):
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_state_says_so_and_moves_on_as_before_and_behind(kind):
+def test_change_point_rates_equal_numerical_derivatives(kind):
     for index in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
@@ -71,7 +71,7 @@ def test_the_state_says_so_and_moves_on_as_before_and_behind(kind):
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind):
+def test_batch_equals_single_states_at_change_points(kind):
     for index in range(COUNT):
         flat = FLAT[kind](random.Random(f'singular/{kind}/{index}'))
         closure = Closure(flat.linkage)
@@ -92,7 +92,7 @@ def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind):
 
 
 @pytest.mark.parametrize('kind', FLAT)
-def test_the_distance_to_the_nearest_counts_down_to_it(kind):
+def test_toggle_distance_equals_the_distance_to_the_change_point(kind):
     flat = FLAT[kind](random.Random(f'singular/{kind}/1'))
     closure = Closure(flat.linkage)
     for at in flat.at:
@@ -101,7 +101,7 @@ def test_the_distance_to_the_nearest_counts_down_to_it(kind):
             assert closure.singularity_margin(position).toggle_distance == pytest.approx(abs(away))
 
 
-def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs():
+def test_second_dyad_of_a_chain_adds_singular_inputs():
     # Two four-bars: the rocker of the first, a parallelogram, is the crank of the second, another
     # parallelogram, which folds flat whenever that rocker lies on the ground line.
     links = {
@@ -125,7 +125,7 @@ def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs():
     assert agree(met(closure, Status.TOGGLE), [0.0])
 
 
-def test_the_ends_of_a_limited_range_are_toggles():
+def test_limited_range_ends_are_listed_as_toggles():
     closure = Closure(four_bar_linkage((6.0, 4.0, 5.0, 4.5), 'left'))
     (interval,) = closure.input_ranges
     assert [one.value for one in closure.singular_inputs] == [interval.lowest, interval.highest]
@@ -143,7 +143,7 @@ def test_the_ends_of_a_limited_range_are_toggles():
         ('straight_rev_ahead', Status.INDETERMINATE, [0.0]),
     ],
 )
-def test_the_files_that_had_none(name, status, places):
+def test_formerly_failing_files_list_their_singular_inputs(name, status, places):
     closure = defect(name)
     assert agree(met(closure, status), places)
     assert closure.singularity_margin(closure.position(places[0] + 1e-3)).toggle_distance < inf
@@ -185,7 +185,7 @@ def statuses_at(solved: Closure, value: float) -> set[Status]:
     }
 
 
-def test_a_rod_as_long_as_the_rocker_goes_on_through_both_of_its_change_points():
+def test_rod_with_rocker_length_passes_both_change_points():
     # C at the height cos φ over the line, the rod 1: it lies flat where the rocker is across, and
     # C and the rod's end are mirrored then: s = 2·cos(φ + π/2).
     solved = closure(
@@ -207,7 +207,7 @@ def test_a_rod_as_long_as_the_rocker_goes_on_through_both_of_its_change_points()
     assert statuses_at(solved, 0.0) == statuses_at(solved, pi) == {Status.CHANGE_POINT}
 
 
-def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told():
+def test_coincident_rod_pins_in_a_chain_are_indeterminate():
     solved = closure(
         '{point: D, along: rod, through: C, direction: [1, 0]}',
         'rod: {C: [0, 0]}',
@@ -221,7 +221,7 @@ def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told():
 
 
 @pytest.mark.parametrize('turn', np.arange(0.1, 1.5, 0.1).tolist())
-def test_where_two_lines_are_parallel_in_a_chain_no_pose_can_be_told(turn):
+def test_parallel_slide_lines_in_a_chain_are_indeterminate(turn):
     solved = closure(
         '{point: E, block: one, along: ground, through: O2, direction: '
         f'[{np.cos(turn)}, {np.sin(turn)}]}}\n'

@@ -333,7 +333,7 @@ def neighbours(closure: Closure, state: tuple[float, ...]) -> list[Position]:
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS, EXCHANGED])
-def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name):
+def test_batch_equals_single_states_inside_and_beyond_the_range(name):
     closure, inputs = case_of(name)
     met = check(closure, samples(inputs, 500))
     assert Status.CLOSED in met
@@ -344,7 +344,7 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name):
 
 
 @pytest.mark.parametrize('name', REACHES)
-def test_links_in_space_that_close_only_together_are_solved_as_state_by_state(name):
+def test_batch_equals_single_states_of_iterated_spatial_linkages(name):
     closure, inputs = case_of(name)
     assert check(closure, samples(inputs, 100)) == {Status.CLOSED}
     (low, high), *others = inputs
@@ -355,7 +355,7 @@ def test_links_in_space_that_close_only_together_are_solved_as_state_by_state(na
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_random_linkages_are_solved_as_state_by_state(family):
+def test_batch_equals_single_states_of_random_linkages(family):
     topology = FAMILIES[family].make(random.Random(f'{SEED}/{family}/0'))
     closure = Closure(topology.linkage)
     rng = np.random.default_rng(SEED)
@@ -367,7 +367,7 @@ def test_random_linkages_are_solved_as_state_by_state(family):
 
 
 @pytest.mark.parametrize('name', [*KINDS, *REACHES])
-def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, monkeypatch):
+def test_batch_rarely_falls_back_to_the_plain_steps(name, monkeypatch):
     closure, inputs = case_of(name)
     asked = []
     answer_of = Compiled.__call__
@@ -382,7 +382,7 @@ def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(name, mon
     assert (batch.status == CLOSED).sum() > 5000
 
 
-def test_every_kind_of_step_is_tested():
+def test_cases_cover_every_kind_of_step():
     steps = [step for name in (*KINDS, *OTHERS, EXCHANGED) for step in case_of(name)[0].steps]
     diagonals, dyads, iterated_step, rail = (
         import_module(f'linkage_ros.kinematics.{name}')
@@ -434,7 +434,7 @@ def linkages(draw: Any) -> tuple[Linkage, float]:
 
 @settings(derandomize=True)
 @given(linkages(), crank_angles)
-def test_any_linkage_of_one_loop_is_solved_as_state_by_state(drawn, angles):
+def test_batch_equals_single_states_of_one_loop_linkages(drawn, angles):
     linkage, slenderness = drawn
     try:
         closure = Closure(linkage)
@@ -444,7 +444,7 @@ def test_any_linkage_of_one_loop_is_solved_as_state_by_state(drawn, angles):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'elliptic_trammel', 'five_bar'])
-def test_how_the_states_are_cut_into_blocks_changes_nothing(name):
+def test_batch_results_do_not_depend_on_block_boundaries(name):
     closure, limits = case_of(name)
     inputs = samples(limits, 2 * BLOCK + 77)
     rates = [1.3] * len(inputs)
@@ -457,7 +457,7 @@ def test_how_the_states_are_cut_into_blocks_changes_nothing(name):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'class_3', 'excavator_bucket'])
-def test_no_state_at_all_is_solved_too(name):
+def test_batch_of_zero_states_returns_empty_arrays(name):
     closure, limits = case_of(name)
     joints = len(closure.linkage.joints)
     batch = closure.solve(*samples(limits, 0), rates=[1.0] * len(limits))
@@ -465,12 +465,12 @@ def test_no_state_at_all_is_solved_too(name):
     assert all(array.shape == (joints, 0) for array in batch[1:])
 
 
-def test_single_state_without_a_cell_is_solved_as_any_other():
+def test_batch_solves_a_single_state_without_a_cell():
     batch = load('ankle_motors').solve(np.array([[3.5, -0.5]]), rates=[1.0, 0.0], derivatives=1)
     assert batch.status.tolist() == [CODES[load('ankle_motors').position(3.5, -0.5).status]]
 
 
-def test_rates_are_numbers_or_arrays_and_1_if_not_given():
+def test_solve_accepts_rates_as_numbers_or_arrays():
     closure, _ = case_of('four_bar')
     phi = np.linspace(0.0, 6.0, 40)
     rates, pulls = np.linspace(-2.0, 3.0, 40), np.linspace(4.0, -1.0, 40)
@@ -488,7 +488,7 @@ def test_rates_are_numbers_or_arrays_and_1_if_not_given():
     np.testing.assert_allclose(varied.accelerations, expected, rtol=1e-12, atol=1e-13)
 
 
-def test_an_input_may_be_one_number_for_all_states():
+def test_solve_broadcasts_a_scalar_input():
     closure, _ = case_of('five_bar')
     phi = np.linspace(1.0, 2.0, 30)
     one = closure.solve(phi, 0.5, rates=(1.0, 0.0))
@@ -498,7 +498,7 @@ def test_an_input_may_be_one_number_for_all_states():
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'ankle', 'ankle_motors', 'hexapod'])
-def test_one_array_of_all_inputs_stands_for_its_columns(name):
+def test_solve_accepts_one_array_of_input_columns(name):
     closure = load(name)
     count = len(closure.linkage.inputs)
     rng = np.random.default_rng(SEED)
@@ -521,14 +521,14 @@ def test_one_array_of_all_inputs_stands_for_its_columns(name):
         closure.solve(np.zeros((4, count + 1)), derivatives=0)
 
 
-def test_one_array_of_the_input_is_taken_by_an_inverse_too():
+def test_inverse_solve_accepts_one_column_of_inputs():
     inverse = load('four_bar').driven_by('rocker_joint', near=1.0)
     values = inverse.position(1.0).inputs[0] + np.linspace(0.0, 0.1, 4)
     wanted = inverse.solve(values)
     assert inverse.solve(values[:, None]).positions.tobytes() == wanted.positions.tobytes()
 
 
-def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same():
+def test_solve_returns_none_for_derivatives_not_requested():
     for name in ('four_bar', 'whitworth_quick_return', 'class_3'):
         closure, limits = case_of(name)
         inputs = samples(limits, 50)
@@ -542,7 +542,7 @@ def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same():
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
-def test_results_go_where_they_are_wanted(name):
+def test_solve_writes_results_into_given_arrays(name):
     closure, limits = case_of(name)
     inputs = samples(limits, 100)
     expected = closure.solve(*inputs)
@@ -562,7 +562,7 @@ def test_results_go_where_they_are_wanted(name):
     assert (table[:, 2:] == 777.0).all()
 
 
-def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that():
+def test_batch_marks_only_the_nan_states_indeterminate():
     for name in ('four_bar', 'slider_crank', 'class_3', 'jansen_leg', 'excavator_bucket'):
         closure, ((low, high),) = case_of(name)
         values = np.array([0.5 * (low + high), nan, inf, -inf, 0.5 * (low + high)])
@@ -572,7 +572,7 @@ def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that():
             assert np.isnan(array).tolist() == [[False, True, True, True, False]] * len(array)
 
 
-def test_a_toggle_has_a_position_and_no_rate():
+def test_batch_toggle_has_a_position_and_no_rate():
     # Stretched: the bar of the trammel lies in the driven slot.
     closure, _ = case_of('elliptic_trammel')
     batch = closure.solve(np.array([0.12, 0.1, 0.13]))
@@ -583,7 +583,7 @@ def test_a_toggle_has_a_position_and_no_rate():
     assert batch.positions[:, 0].tolist() == pytest.approx(position.joints, abs=1e-15)
 
 
-def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other():
+def test_batch_handles_parallel_and_coincident_slide_lines():
     linkage, _ = OTHERS['pin in two slots']
     sliders = {
         's1': Slider('P', 'one', 'A', (1.0, 0.0), 'b1'),
@@ -599,7 +599,7 @@ def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other():
 
 # Shorter ones than 2⁻⁵¹¹ m are refused.
 @pytest.mark.parametrize('exponent', [-500, -300, 3, 900])
-def test_the_unit_of_the_lengths_changes_no_bit(exponent):
+def test_length_unit_does_not_change_batch_bits(exponent):
     unit = 2.0**exponent
     phi = np.linspace(-3.0, 3.0, 50)
     for lengths in ((0.04, 0.12, 0.08, 0.1), (4.0, 2.0, 4.5, 5.0), (0.04, 0.12, 0.04, 0.12)):
@@ -612,7 +612,7 @@ def test_the_unit_of_the_lengths_changes_no_bit(exponent):
 
 
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS, EXCHANGED])
-def test_nothing_makes_numpy_warn(name):
+def test_solve_emits_no_numpy_warning(name):
     closure, limits = case_of(name)
     angles = np.array([0.0, -0.0, pi, 1e-310, -1e5, nan, inf, limits[0][0], limits[0][1]])
     with warnings.catch_warnings(), np.errstate(all='warn'):
@@ -637,7 +637,7 @@ def test_nothing_makes_numpy_warn(name):
          'out.positions: is float64 (5, 2), not float64 (2, 5)'),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_said_in_one_line(name, inputs, more, text):
+def test_solve_refuses_wrong_argument_shapes_in_one_line(name, inputs, more, text):
     with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
         case_of(name)[0].solve(*[np.ones(5)] * inputs, **more)
 
@@ -650,12 +650,12 @@ def test_what_does_not_fit_is_said_in_one_line(name, inputs, more, text):
         ((np.ones((2, 3)), 1.0), 'inputs: shapes (2, 3), () do not broadcast to one (N,)'),
     ],
 )
-def test_inputs_are_arrays_of_one_length(arrays, text):
+def test_solve_refuses_input_arrays_of_different_lengths(arrays, text):
     with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
         case_of('five_bar')[0].solve(*arrays, rates=(1.0, 1.0))
 
 
-def test_memory_does_not_grow_with_the_states():
+def test_solve_memory_does_not_grow_with_the_states():
     for name in ('four_bar', 'klann_leg', 'slider_crank'):
         closure, limits = case_of(name)
         peaks = []
@@ -672,7 +672,7 @@ def test_memory_does_not_grow_with_the_states():
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['rail_on_coupler', 'standing_rpr'])
-def test_rails_on_links_that_follow_and_links_that_never_turn(name):
+def test_batch_solves_rails_on_moving_and_non_turning_links(name):
     closure = defect(name)
     (interval,) = closure.input_ranges
     check(closure, [np.linspace(interval.lowest, interval.highest, 97)[1:-1]])

@@ -45,7 +45,7 @@ FOUR_BARS = {
         ('behind', -0.17753658182601928364, 170.3030180128789738),
     ],
 )
-def test_the_slider_crank_of_the_first_text_is_solved(side, slide, degree):
+def test_slider_crank_equals_the_worked_textbook_example(side, slide, degree):
     linkage = Linkage(
         links={
             'ground': {'A': (0.0, 0.0), 'C': (0.25, 0.10)},
@@ -67,7 +67,7 @@ def test_the_slider_crank_of_the_first_text_is_solved(side, slide, degree):
 
 
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_the_pin_of_the_second_text_is_where_both_its_roots_say(name):
+def test_four_bar_pin_equals_the_textbook_quadratic_roots(name):
     # K1…K4 at 60 digits: what fails in them at sixteen does not matter there.
     a, b, c, d = FOUR_BARS[name]
     compared = 0
@@ -104,7 +104,7 @@ def _pin_error(angle, link: float, ground: float) -> float:
 
 @pytest.mark.parametrize('name', FOUR_BARS)
 @pytest.mark.parametrize('side', [1, -1])
-def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name, side):
+def test_four_bar_rates_equal_the_textbook_loop_equation(name, side):
     a, b, c, d = FOUR_BARS[name]
     dyad = FourBar(a, b, c, d, side)
     compared = 0
@@ -129,7 +129,7 @@ def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name, side)
 @pytest.mark.parametrize('side', [1, -1])
 @pytest.mark.parametrize('offset', [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3])
 @pytest.mark.parametrize('direction', [1, -1])
-def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(side, offset, direction):
+def test_crank_pin_above_the_ground_pivot_closes_exactly(side, offset, direction):
     # d = Ax, by which the second text divides: near it, its roots are of the other assembly.
     lengths = (2.0, 3.0, 3.0, 1.0)
     for turn in (1, -1):
@@ -153,7 +153,7 @@ def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(side, off
     ],
 )
 @pytest.mark.parametrize('offset', [0.0, 1e-15, -1e-15, 1e-9, -1e-9, 1e-3, -1e-3])
-def test_a_rocker_along_the_ground_has_a_rate(lengths, side, rocker, offset):
+def test_rocker_along_the_ground_has_exact_rates(lengths, side, rocker, offset):
     # A = (0, 3) and B = (4, 0): a triangle 3-4-5, and the third text divides by sin θ4.
     phi = pi / 2 + offset
     dyad = FourBar(*lengths, side)
@@ -170,7 +170,7 @@ def test_a_rocker_along_the_ground_has_a_rate(lengths, side, rocker, offset):
 # Pins nearer than 1e-153 of the crank have no square of their distance.
 @pytest.mark.parametrize('zero', [0.0, -0.0, 5e-324, 1e-310, 1e-300, -1e-160])
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(zero, side):
+def test_crank_pin_on_the_swivel_is_indeterminate(zero, side):
     # And not the angle 0, which a formula might give out.
     assert InvertedSliderCrank(1.5, 1.5, 0.0, side).close(zero).status is Status.INDETERMINATE
 
@@ -178,7 +178,7 @@ def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(zero, side
 @pytest.mark.parametrize('exponent', [-3, -6, -8, -9, -12, -15, -50, -150])
 @pytest.mark.parametrize('direction', [1, -1])
 @pytest.mark.parametrize('side', [1, -1])
-def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(exponent, direction, side):
+def test_crank_pin_beside_the_swivel_closes_exactly(exponent, direction, side):
     # a = d: the rod turns at half the crank's rate, through the swivel and on.
     a, phi = 1.5, direction * 10.0**exponent
     dyad = InvertedSliderCrank(a, a, 0.0, side)
@@ -193,7 +193,7 @@ def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(exponent, direction,
     assert slide_rate == pytest.approx(side * 2.0 * a * cos(phi / 2), rel=1e-15)
 
 
-def test_a_rod_straight_up_is_no_special_case():
+def test_vertical_rod_has_an_exact_rail_angle():
     # cos θ3 = 0: the swivel is square above the crank pin, between two neighbouring floats.
     a, d = 1.0, 0.5
     phi = acos(0.5)

@@ -75,7 +75,7 @@ TURNS = {
 
 
 @pytest.mark.parametrize('name', TURNS)
-def test_joints_turn_back_where_the_books_say(name):
+def test_joint_turning_points_equal_the_textbook_formulas(name):
     found, expected = turning_points(lr.load(name)), TURNS[name]
     assert found.keys() == expected.keys()
     for joint, places in expected.items():
@@ -84,7 +84,7 @@ def test_joints_turn_back_where_the_books_say(name):
             assert min(abs(remainder(place - one, tau)) for one in found[joint]) < 1e-12
 
 
-def test_turning_points_beyond_limits_are_left_out(tmp_path):
+def test_turning_points_beyond_limits_are_not_listed(tmp_path):
     file = tmp_path / 'limited.yaml'
     drawn = named_file('rssr', 'linkages').read_text()
     for low, high, count in ((-0.1, 0.1, 0), (-0.1, 3.5, 1), (-2.7, 0.1, 1), (-2.7, 0.3, 2)):
@@ -131,7 +131,7 @@ STANDING = {'ankle': ankle_margin, 'five_bar': five_bar_margin, 'delta': delta_m
 
 
 @pytest.mark.parametrize('name', STANDING)
-def test_of_several_inputs_a_state_in_which_the_joints_stand_is_found(name):
+def test_standing_state_search_finds_a_singular_jacobian(name):
     closure = lr.load(name)
     inputs = find_standing_state(closure)
     position = closure.position(*inputs)
@@ -143,5 +143,5 @@ def test_of_several_inputs_a_state_in_which_the_joints_stand_is_found(name):
 
 
 @pytest.mark.parametrize('name', ['ankle_motors', 'hexapod', 'rssr'])
-def test_nothing_is_found_where_the_joints_follow_and_of_a_single_or_many_inputs(name):
+def test_standing_state_search_returns_none_without_such_a_state(name):
     assert find_standing_state(lr.load(name)) is None

@@ -56,7 +56,7 @@ def test_an_input_that_is_not_finite_has_no_pose(value):
     (ONE.solve, ValueError, 'inputs: 0 given; give 1, one for each driven joint'),
     (lambda: ONE.solve(['a']), TypeError, "inputs: 'a' is not a number"),
 ])  # fmt: skip
-def test_what_is_no_input(call, kind, text):
+def test_position_refuses_wrong_inputs_in_one_line(call, kind, text):
     with pytest.raises(kind, match=f'^{re.escape(text)}$'):
         call()
 
@@ -71,7 +71,7 @@ def test_what_is_no_input(call, kind, text):
         (('a',), TypeError, "{what}: 'a' is not a number; solve() takes arrays"),
     ],
 )
-def test_what_is_no_rate_and_no_acceleration(given, kind, text):
+def test_velocity_and_acceleration_refuse_wrong_rates_in_one_line(given, kind, text):
     position = ONE.position(1.0)
     velocity = ONE.velocity(position, 1.0)
     with pytest.raises(kind, match=f'^{re.escape(text.format(what="rates"))}$'):
@@ -80,7 +80,7 @@ def test_what_is_no_rate_and_no_acceleration(given, kind, text):
         ONE.acceleration(position, velocity, *given)
 
 
-def test_a_position_without_rates_has_none():
+def test_velocity_refuses_a_position_without_rates():
     closure = shipped('double_rocker')
     end = closure.input_ranges[0].highest
     for value, status in ((end, 'toggle'), (end + 0.1, 'open'), (nan, 'indeterminate')):
@@ -106,7 +106,7 @@ ALIKE = {**YOKE.sliders, 'slot': Slider('A', 'yoke', 'U', (1.0, 0.0))}
      "pose.points: does not say where 'platform' lies; give two of its points: P1, P2, P3"),
     (replace(YOKE, sliders=ALIKE), 'sliders.slot.direction: is parallel to the direction of'),
 ])  # fmt: skip
-def test_a_malformed_linkage_is_refused_with_its_key_and_a_remedy(linkage, line):
+def test_malformed_linkage_error_names_key_and_remedy(linkage, line):
     with pytest.raises(DefinitionError) as caught:
         Closure(linkage)
     error = caught.value
@@ -115,7 +115,7 @@ def test_a_malformed_linkage_is_refused_with_its_key_and_a_remedy(linkage, line)
     assert '\n' not in str(error)
 
 
-def test_links_may_stand_in_any_order_and_points_of_one_link_are_no_pins():
+def test_link_order_and_extra_points_do_not_change_joints():
     expected = Closure(FOUR_BAR).position(1.0).joints
     links = {link: dict(points) for link, points in reversed(FOUR_BAR.links.items())}
     links['coupler']['P'] = (0.06, 0.03)

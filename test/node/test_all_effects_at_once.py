@@ -184,7 +184,7 @@ def named_in(folder):
     return effects, drives, {fault.kind for fault in scene.faults.values()}
 
 
-def test_nothing_on_the_page_is_missing(recorded):
+def test_full_scenes_use_every_effect_drive_and_fault(recorded):
     effects, drives, faults = named_in(recorded('measured')[0])
     assert effects == [set(EFFECTS)]
     assert (drives, faults) == ({'topic'}, set(FAULTS))
@@ -198,7 +198,7 @@ def test_nothing_on_the_page_is_missing(recorded):
 
 
 @pytest.mark.parametrize('name', SCENES)
-def test_they_replay_to_the_last_bit(recorded, name):
+def test_runs_with_every_effect_replay_to_the_same_bytes(recorded, name):
     _, done = recorded(name)
     assert len(set(done.published)) > 500, 'it has published, and not the same again and again'
     assert set(done.loop.injection.injected.values()) >= {1}, 'every fault has been on'
@@ -231,7 +231,7 @@ print(digest.hexdigest())
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
-def test_they_replay_so_in_another_process(recorded, name):
+def test_full_runs_replay_to_same_bytes_in_another_process(recorded, name):
     folder, done = recorded(name)
     digest = hashlib.sha256()
     for each in replay_ticks(done.bag, recorded_scene(done.bag)):
@@ -250,7 +250,7 @@ def test_they_replay_so_in_another_process(recorded, name):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENES)
-def test_another_seed_replays_to_other_bytes(recorded, name):
+def test_full_runs_replay_differently_with_another_seed(recorded, name):
     # What is equal above is not so by chance.
     folder, done = recorded(name)
     other = folder / 'other.yaml'

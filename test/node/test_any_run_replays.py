@@ -195,12 +195,12 @@ FOUND['readings that arrive before there is one of each joint'] = (
 
 
 @pytest.mark.parametrize('name', FOUND)
-def test_what_was_found_to_differ(name):
+def test_runs_that_once_differed_replay_to_the_same_bytes(name):
     text, plan = FOUND[name]
     assert compare(text, moments(plan)) > 20
 
 
-def test_a_clock_that_jumps_back_while_nothing_is_recorded():
+def test_clock_jump_between_recordings_replays_to_the_same_bytes():
     # The ticks without a crank leave nothing in the bag: its times go on, though the clock's do
     # not, and the turns before the jump have to be forgotten nevertheless.
     write = JointStateWriter(['crank_joint']).write
@@ -217,12 +217,12 @@ def test_a_clock_that_jumps_back_while_nothing_is_recorded():
 
 
 @given(runs())
-def test_any_run_replays_to_the_same_bytes(drawn):
+def test_random_run_replays_to_the_same_bytes(drawn):
     text, plan = drawn
     compare(text, moments(plan))
 
 
-def test_a_torque_that_is_made_up_for_while_a_link_is_broken(tmp_path):
+def test_torque_run_with_a_broken_link_replays_identically(tmp_path):
     # A tick makes up for a second at most: of those with a broken link a replay has to know.
     (tmp_path / 'scene.yaml').write_text(
         f'linkage: {LINKAGES}/four_bar.yaml\nrate: 100\ndrive: {{torque: {{start: 0.5}}}}\n'

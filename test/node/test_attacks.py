@@ -23,7 +23,7 @@ from .graph import crank, wait_for
 REAL_STARTS = True
 
 
-def test_floods_and_storms_end_nothing_and_every_message_is_accounted_for():
+def test_message_floods_and_call_storms_leave_counts_exact():
     tried, findings = attack(12.0, 7)
     assert findings == []
     assert tried['of these received'] > 100
@@ -32,7 +32,7 @@ def test_floods_and_storms_end_nothing_and_every_message_is_accounted_for():
     assert tried['set_parameters'] > 0
 
 
-def test_a_parameter_of_no_known_type_does_not_end_the_node(graph, write_scene, start):
+def test_parameter_of_unknown_type_does_not_end_the_node(graph, write_scene, start):
     # rclpy raises in its service, and would end the executor.
     node = start(write_scene('no_type', 'rate: 100'))
     client = graph.node.create_client(SetParameters, '/linkage_node/set_parameters')
@@ -86,7 +86,7 @@ def peer(graph):
     return set_scene
 
 
-def test_a_peer_reads_writes_and_imports_nothing_of_the_machine(
+def test_remote_parameters_read_and_import_no_local_files(
     peer, write_scene, start, folder, tmp_path, monkeypatch
 ):
     secret = 'hunter2'
@@ -118,7 +118,7 @@ def test_a_peer_reads_writes_and_imports_nothing_of_the_machine(
     assert secret not in node.log
 
 
-def test_what_huge_messages_are_for_is_not_remembered():
+def test_router_caches_no_routes_of_huge_messages():
     routes = SampleRouter({'left': ['crank_joint'], 'right': ['other']})
     for index in range(3):
         names = ['crank_joint', f'of_message_{index}', *(f'joint_{n}' for n in range(20_000))]

@@ -131,7 +131,7 @@ def rig(domain, folder, write_scene):
 
 
 @pytest.mark.parametrize('kind', BAD)
-def test_rejected_and_counted_while_the_state_stays(rig, kind):
+def test_bad_message_is_counted_and_the_state_stays(rig, kind):
     make, reason = BAD[kind]
     rig.hold(0.5)
     before = wait_for(rig.graph.diagnostics.copy, 'diagnostics') and rig.rejected()
@@ -154,7 +154,7 @@ WITHOUT = {
 
 
 @pytest.mark.parametrize('kind', WITHOUT)
-def test_messages_of_other_joints_are_ignored_and_counted_apart(rig, kind):
+def test_messages_of_other_joints_are_counted_as_ignored(rig, kind):
     # A joint_states that all robots' nodes share: these are not errors.
     rig.hold(0.5)
     rig.graph.next_status('crank')
@@ -174,7 +174,7 @@ def ignored_by(rig):
     return int(rig.graph.value('crank', 'Messages without the crank') or 0)
 
 
-def test_where_no_message_ever_had_the_crank_it_says_so(rig, write_scene, start):
+def test_node_warns_of_a_misnamed_crank(rig, write_scene, start):
     node = start(write_scene('misnamed', 'rate: 50'), '-r', 'crank_states:=misnamed')
     publisher = rig.graph.publisher(JointState, '/misnamed')
     wait_for(
@@ -189,7 +189,7 @@ def test_where_no_message_ever_had_the_crank_it_says_so(rig, write_scene, start)
     )
 
 
-def test_the_warning_is_throttled_and_names_reason_and_remedy(rig):
+def test_rejection_warning_is_throttled_with_reason_and_remedy(rig):
     rig.hold(0.5)
     count = len(warnings(rig))
     for _ in range(20):
@@ -205,14 +205,14 @@ def test_the_warning_is_throttled_and_names_reason_and_remedy(rig):
     assert sum(map(int, re.findall(r'not finite \((\d+)\)', last))) == 20
 
 
-def test_diagnostics_warn_and_recover(rig):
+def test_crank_diagnostics_warn_and_recover(rig):
     rig.hold(0.5)
     rig.publisher.publish(crank(nan))
     assert 'rejected' in rig.graph.wait_for_level('crank', WARN).message
     rig.graph.wait_for_level('crank', OK)
 
 
-def test_in_the_end_all_is_well(rig):
+def test_node_works_after_all_bad_messages(rig):
     rig.hold(0.7)
     assert rig.node.end() == 0
     assert 'Traceback' not in rig.node.log

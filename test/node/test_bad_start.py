@@ -63,7 +63,7 @@ def stderr_of(domain, tmp_path):
 
 
 @pytest.mark.parametrize('kind', FILES)
-def test_a_bad_file(stderr_of, write_scene, tmp_path, kind):
+def test_bad_scene_file_is_reported_in_one_line(stderr_of, write_scene, tmp_path, kind):
     content, expected = FILES[kind]
     scene = tmp_path / ('nowhere.yaml' if content is None else 'scene.yaml')
     if content is not None:
@@ -75,13 +75,13 @@ def test_a_bad_file(stderr_of, write_scene, tmp_path, kind):
 
 
 @pytest.mark.parametrize('kind', ARGUMENTS)
-def test_a_bad_argument(stderr_of, kind):
+def test_bad_node_argument_is_reported_in_one_line(stderr_of, kind):
     arguments, expected = ARGUMENTS[kind]
     (line,) = stderr_of(*arguments).splitlines()
     assert expected in line
 
 
-def test_lengths_and_angles_of_another_unit_are_warned_of(start, write_scene):
+def test_node_warns_of_lengths_and_angles_in_other_units(start, write_scene):
     sine = 'rate: 100\ndrive: {sine: {amplitude: 45, frequency: 1}}'
     scene = write_scene('odd_units', sine, LONG_COUPLER.lstrip())
     log = start(scene).log

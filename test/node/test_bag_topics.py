@@ -24,7 +24,7 @@ from sensor_msgs.msg import MultiDOFJointState
 from trajectory_msgs.msg import JointTrajectory
 
 
-def test_what_a_type_needs_follows_by_full_name():
+def test_topic_definition_lists_nested_messages_by_full_name():
     # As rosbag2_cpp's LocalMessageDefinitionSource, which keeps them in a std::set.
     needed = re.findall(
         r'^MSG: (.+)$',
@@ -44,7 +44,7 @@ def test_what_a_type_needs_follows_by_full_name():
     assert trajectory.index('MSG: std_msgs/Header') < trajectory.index('MSG: trajectory_msgs/')
 
 
-def test_every_policy_of_a_publisher_is_kept():
+def test_recorded_qos_keeps_every_policy_of_a_publisher():
     qos = recorded_qos(
         QoSProfile(
             depth=7,
@@ -62,7 +62,7 @@ def test_every_policy_of_a_publisher_is_kept():
     assert qos.avoid_ros_namespace_conventions
 
 
-def test_what_a_publisher_leaves_open_has_no_limit():
+def test_recorded_qos_without_limits_is_infinite():
     qos = recorded_qos(qos_profile_sensor_data)
     assert {qos.deadline, qos.lifespan, qos.liveliness_lease_duration} == {INFINITE}
     assert qos.liveliness == 'automatic'

@@ -39,7 +39,7 @@ def run(loop, begin, end):
         loop.tick_at(BEGIN + time_ms * 1_000_000)
 
 
-def test_it_is_told_once_for_each_new_step():
+def test_node_warns_once_of_each_step_with_chatter():
     loop, lines = loop_of(), Said()
     before = loop.read_counts(BEGIN)
     warnings = Warnings(lines, before)
@@ -73,7 +73,7 @@ def test_it_is_told_once_for_each_new_step():
     assert len(lines) == 2
 
 
-def test_a_run_that_ends_says_why_in_a_line():
+def test_run_ended_by_chatter_names_the_cause():
     ends = SCENE.replace('restitution: 0.5', 'restitution: 0.5, on_chatter: end')
     loop = loop_of(ends)
     loop.start(lambda loop, _stopping: run(loop, 0, 2000))
@@ -82,7 +82,7 @@ def test_a_run_that_ends_says_why_in_a_line():
     assert 'on_chatter: close' in loop.failure
 
 
-def test_a_node_ticks_on_and_claims_no_silence(graph, write_scene, start):
+def test_node_keeps_ticking_under_chatter(graph, write_scene, start):
     scene = SCENE.partition('\n')[2]
     node = start(write_scene('chatter', scene, 'four_bar'))
     publisher = graph.publisher(JointState, '/crank_commands')

@@ -23,7 +23,7 @@ CRANKS = JointStateWriter(['left_crank_joint', 'right_crank_joint'])
     ('residuals', 'said'),
     [((2e-9, 3e-12), '2e-09 (left)'), ((3e-12, 2e-9), '2e-09 (right)')],
 )
-def test_the_worst_residual_is_said_with_its_linkage(residuals, said, monkeypatch):
+def test_diagnostics_name_the_linkage_of_the_worst_residual(residuals, said, monkeypatch):
     text = 'linkages: [{name: left, linkage: l.yaml}, {name: right, linkage: r.yaml}]\n'
     files = {'scene.yaml': text, 'l.yaml': FOUR_BAR, 'r.yaml': FOUR_BAR}
     scene = parse_scene('s', 's', {name: content.encode() for name, content in files.items()})

@@ -52,7 +52,7 @@ def echo(graph, tmp_path):
     return echo
 
 
-def test_joint_states_are_printed_as_yaml_with_their_units(say, echo):
+def test_echo_prints_joint_states_as_yaml_with_units(say, echo):
     say('/joint_states', JointState(name=['a', 'b'], position=[0.5, -1.25], velocity=[2.0, 0.0]))
     answer = echo('--count', '2')
     assert answer.returncode == 0, answer.stderr
@@ -72,7 +72,7 @@ def test_joint_states_are_printed_as_yaml_with_their_units(say, echo):
     )
 
 
-def test_the_rate_is_printed_instead_of_messages(say, echo):
+def test_echo_prints_the_rate_instead_of_messages(say, echo):
     say('/words', String(data='x'))
     answer = echo('words', '--rate', '--seconds', '6')
     assert answer.returncode == 0, answer.stderr
@@ -82,7 +82,7 @@ def test_the_rate_is_printed_instead_of_messages(say, echo):
         assert re.fullmatch(r'/words: [\d.]+ Hz, period [\d.]+ to [\d.]+ ms', line)
 
 
-def test_in_silence_the_nearest_topic_is_named(say, echo):
+def test_echo_names_the_nearest_topic_in_silence(say, echo):
     say('/joint_states', JointState())
     answer = echo('/joint_stats', '--seconds', '3')
     assert (answer.returncode, answer.stdout) == (1, '')
@@ -92,7 +92,7 @@ def test_in_silence_the_nearest_topic_is_named(say, echo):
     )
 
 
-def test_in_silence_the_topics_that_exist_are_listed(say, echo, graph):
+def test_echo_lists_existing_topics_in_silence(say, echo, graph):
     graph.publisher(String, '/silent')
     say('/words', String(data='x'))
     answer = echo('/silent', '--seconds', '4')
@@ -130,7 +130,7 @@ SILENCES = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', SILENCES)
-def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
+def test_silence_ends_echo_after_its_limit(graph, echo, kind):
     latched = graph.node.create_publisher(String, '/two', LATCHED)
     for word in ('one', 'other'):
         latched.publish(String(data=word))
@@ -142,14 +142,14 @@ def test_a_silence_that_is_too_long_ends_it(graph, echo, kind):
         assert line.startswith(f'linkage echo: {beginning}')
 
 
-def test_a_count_that_is_not_reached_in_time_is_1(say, echo):
+def test_unreached_count_ends_echo_with_code_1(say, echo):
     say('/words', String(data='x'))
     answer = echo('/words', '--count', '1000000', '--seconds', '5')
     assert answer.returncode == 1
     assert answer.stdout
 
 
-def test_a_signal_ends_it_with_0(graph, tmp_path):
+def test_signal_ends_echo_with_code_0(graph, tmp_path):
     process = subprocess.Popen(
         [sys.executable, '-m', 'linkage_ros.cli.main', 'echo', '/nothing'],
         env=commands.environment(tmp_path) | {'ROS_DOMAIN_ID': str(graph.domain)},
@@ -167,7 +167,7 @@ def test_a_signal_ends_it_with_0(graph, tmp_path):
     assert (process.returncode, out, err) == (0, '', '')
 
 
-def test_a_long_field_is_cut():
+def test_echo_cuts_long_fields():
     shown = yaml.safe_load(as_yaml(String(data='x' * 5000), TEXT))
     assert len(shown['data']) <= 1000
     long = JointState(position=array('d', range(1000)))
@@ -175,5 +175,5 @@ def test_a_long_field_is_cut():
     assert shown['position'] == [*range(128), '… and 872 more']
 
 
-def test_the_rate_is_that_of_the_arrivals():
+def test_echo_rate_equals_the_rate_of_arrivals():
     assert rate_text([0.0, 0.1, 0.3, 0.4]) == '7.5 Hz, period 100.00 to 200.00 ms'

@@ -113,7 +113,7 @@ def changes(graph):
     ]
 
 
-def test_by_service(graph, folder, drill):
+def test_faults_by_service_are_recorded_and_replayed(graph, folder, drill):
     # By itself first, and once.
     wait_for(lambda: graph.value('faults', 'Times injected: pulled') == '1', 'the timeline')
     graph.wait_for_level('faults', OK)
@@ -147,7 +147,7 @@ def test_by_service(graph, folder, drill):
     assert all(each.recorded == each.tick.message for each in again)
 
 
-def test_nothing_is_injected_while_nothing_runs(graph, write_scene, start):
+def test_inactive_node_refuses_to_inject_a_fault(graph, write_scene, start):
     node = start(write_scene('still', SCENE), '-p', 'autostart:=false', ready='')
     change = ChangeState.Request()
     change.transition.id = Transition.TRANSITION_CONFIGURE

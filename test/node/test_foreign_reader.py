@@ -58,7 +58,7 @@ def running(graph, tmp_path, write_scene, start):
     return node
 
 
-def test_a_bag_of_a_node(graph, tmp_path, running):
+def test_node_bag_agrees_with_a_foreign_reader(graph, tmp_path, running):
     offered = {
         topic: graph.node.get_publishers_info_by_topic(topic)
         for topic in (*TOPICS, '/linkage_node/faults')
@@ -84,7 +84,7 @@ def test_a_bag_of_a_node(graph, tmp_path, running):
                 assert topic.qos.durability == qos.durability.name.lower()
 
 
-def test_a_bag_of_a_node_that_was_killed(tmp_path, running):
+def test_recovered_bag_of_a_killed_node_passes_foreign_reader(tmp_path, running):
     time.sleep(0.3)  # three periods of flushing
     running.end(signal.SIGKILL)
     (file,) = (tmp_path / 'bag').glob('*.mcap')

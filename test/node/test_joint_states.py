@@ -45,7 +45,7 @@ def drop_until_quiet(heard):
         time.sleep(0.3)
 
 
-def test_ticks_are_solved_at_their_own_stamp(graph, write_scene, start):
+def test_joint_states_are_solved_at_their_own_stamp(graph, write_scene, start):
     node = start(write_scene('ticks', 'rate: 200\neffects: {velocity: {}}'))
     heard = graph.listen(JointState, '/joint_states')
     publisher = graph.publisher(JointState, '/crank_states')
@@ -76,7 +76,7 @@ def test_ticks_are_solved_at_their_own_stamp(graph, write_scene, start):
     assert node.end() == 0
 
 
-def test_rate_0_answers_every_sample_with_its_own_stamp(graph, write_scene, start):
+def test_rate_0_publishes_each_sample_with_its_stamp(graph, write_scene, start):
     text = 'rate: 0\nangles: wrapped\neffects: {velocity: {}}'
     node = start(write_scene('every_sample', text, 'inverted_slider_crank'))
     heard = graph.listen(JointState, '/joint_states')
@@ -103,7 +103,7 @@ def test_rate_0_answers_every_sample_with_its_own_stamp(graph, write_scene, star
 
 
 @pytest.mark.parametrize('rate', [0, 100])
-def test_on_a_shared_topic_its_own_messages_are_ignored(graph, write_scene, start, rate):
+def test_node_ignores_its_own_messages_on_a_shared_topic(graph, write_scene, start, rate):
     scene = write_scene(f'shared_{rate}', f'rate: {rate}\neffects: {{velocity: {{}}}}')
     node = start(scene, '-r', 'crank_states:=joint_states')
     heard = graph.listen(JointState, '/joint_states')

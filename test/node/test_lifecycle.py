@@ -82,7 +82,9 @@ def counts(bag):
         return {topic: info.msgcount for topic, info in reader.topics.items()}
 
 
-def test_a_managed_life_with_two_bags(write_scene, start, folder, change, state, turn):
+def test_managed_node_records_one_bag_per_activation(
+    write_scene, start, folder, change, state, turn
+):
     runs = folder / 'two_bags'
     scene = write_scene('managed', f'rate: 100\nrecord: {{directory: {runs}}}')
     node = start(scene, *BY_HAND, ready='')
@@ -111,7 +113,7 @@ def test_a_managed_life_with_two_bags(write_scene, start, folder, change, state,
         assert min(found.values()) > 0
 
 
-def test_a_bad_scene_cannot_be_configured(write_scene, start, change, state):
+def test_bad_scene_fails_the_configure_transition(write_scene, start, change, state):
     node = start(write_scene('bad', 'rtae: 100'), *BY_HAND, ready='')
     assert not change(Transition.TRANSITION_CONFIGURE)
     assert state() == State.PRIMARY_STATE_UNCONFIGURED
@@ -121,7 +123,7 @@ def test_a_bad_scene_cannot_be_configured(write_scene, start, change, state):
     assert 'Traceback' not in node.log
 
 
-def test_an_unconfigured_node_takes_another_scene(graph, write_scene, start, change, turn):
+def test_unconfigured_node_takes_another_scene(graph, write_scene, start, change, turn):
     """Whichever scene it is set up with is the one that it runs."""
     node = start(write_scene('absent', 'rtae: 100'), *BY_HAND, ready='')
     assert not change(Transition.TRANSITION_CONFIGURE)
@@ -149,7 +151,9 @@ def test_an_unconfigured_node_takes_another_scene(graph, write_scene, start, cha
     assert node.end() == 0
 
 
-def test_what_is_not_possible_is_refused(write_scene, start, change, state, trigger):
+def test_impossible_transitions_and_services_are_refused(
+    write_scene, start, change, state, trigger
+):
     node = start(write_scene('refused', 'rate: 100'), *BY_HAND, ready='')
     for transition in ('ACTIVATE', 'DEACTIVATE', 'CLEANUP', 'ACTIVE_SHUTDOWN'):
         assert not change(getattr(Transition, f'TRANSITION_{transition}'))
@@ -164,7 +168,7 @@ def test_what_is_not_possible_is_refused(write_scene, start, change, state, trig
     assert 'Traceback' not in node.log
 
 
-def test_shutdown_by_service_closes_the_bag(write_scene, start, folder, change, state, turn):
+def test_shutdown_service_closes_the_bag(write_scene, start, folder, change, state, turn):
     runs = folder / 'shut'
     node = start(write_scene('shut', f'rate: 100\nrecord: {{directory: {runs}}}'))
     turn()
@@ -175,7 +179,7 @@ def test_shutdown_by_service_closes_the_bag(write_scene, start, folder, change, 
     assert node.end() == 0
 
 
-def test_reset_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn):
+def test_reset_service_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn):
     start(write_scene('reset', 'rate: 100\ndrive: {topic: {max_age: 60, carry_forward: false}}'))
     # Three turns, a third at a time: the coupler unwinds against the crank.
     heard = turn(angle=0.0)
@@ -194,7 +198,7 @@ def test_reset_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn
     wait_for(lambda: graph.value('tick', 'Resets') == '1', 'the count of resets')
 
 
-def test_recording_by_service(write_scene, start, folder, trigger, turn):
+def test_services_start_and_stop_a_recording(write_scene, start, folder, trigger, turn):
     runs = folder / 'asked'
     # Who asks runs elsewhere: what is relative to the node's own folder is answered as absolute.
     node = start(write_scene('asked', 'rate: 100'), '-p', 'runs_directory:=asked')
@@ -219,7 +223,7 @@ def test_recording_by_service(write_scene, start, folder, trigger, turn):
     assert node.end() == 0
 
 
-def test_a_snapshot_answers_an_absolute_folder(write_scene, start, folder, trigger, turn):
+def test_snapshot_service_returns_an_absolute_folder(write_scene, start, folder, trigger, turn):
     scene = write_scene('kept', 'rate: 100\nrecord: {snapshot_seconds: 5, directory: kept}')
     start(scene)
     turn()
@@ -237,7 +241,7 @@ def parameter(name, **value):
     return Parameter(name=name, value=ParameterValue(type=kind, **value))
 
 
-def test_a_refused_parameter_says_why(graph, write_scene, start):
+def test_refused_parameter_names_the_reason(graph, write_scene, start):
     node = start(write_scene('parameters', 'rate: 100'))
 
     def change(changed):
@@ -272,7 +276,7 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
     assert 'Traceback' not in node.log
 
 
-def test_a_second_activation_warns_of_its_own_ticks(write_scene, start, change, turn):
+def test_second_activation_counts_its_own_open_ticks(write_scene, start, change, turn):
     # Reachable within 1.32 rad only; the first run is open for longer than the second.
     linkage = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 2.0}'
     scene = write_scene('again', 'rate: 200', linkage)

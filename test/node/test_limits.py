@@ -45,7 +45,7 @@ def at(pipeline, angle, number=0, rate=1.0):
     return pipeline.tick(now)
 
 
-def test_by_default_the_same_is_published_as_within():
+def test_states_beyond_limits_are_published_by_default():
     tick = at(Pipeline(scene('effects: {velocity: {}}')), 2.0)
     free = LIMITED.replace(', input: {limits: [0.5, 1.5]}', '')
     other = at(Pipeline(scene('effects: {velocity: {}}', free)), 2.0)
@@ -54,7 +54,7 @@ def test_by_default_the_same_is_published_as_within():
 
 
 @pytest.mark.parametrize('effects', ['{}', '{velocity: {}}', '{acceleration: {}}'])
-def test_silent_is_silent_beyond_and_within_the_same(effects):
+def test_silent_beyond_limits_publishes_only_within_limits(effects):
     said = f'effects: {effects}\n'
     silent = Pipeline(scene(said + 'beyond_limits: silent'))
     free = Pipeline(scene(said))
@@ -68,7 +68,7 @@ def test_silent_is_silent_beyond_and_within_the_same(effects):
             assert tick.message == other.message
 
 
-def test_silent_at_a_toggle_beyond_the_limits():
+def test_silent_beyond_limits_includes_the_toggle():
     """It has another status, and is beyond the limits all the same."""
     linkage = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05, input: {limits: [-0.5, 0.5]}}'
     silent = Pipeline(scene('beyond_limits: silent', linkage))
@@ -80,7 +80,7 @@ def test_silent_at_a_toggle_beyond_the_limits():
 
 
 @pytest.mark.parametrize('turns', [-2, -1, 0, 1])
-def test_a_published_angle_begins_within_its_limits(turns):
+def test_published_angles_start_within_joint_limits(turns):
     """So a consumer that has the limits from a URDF is never told of another turn."""
     low, high = (end + turns * tau for end in (1.5, 2.0))
     linkage = LIMITED.replace(
@@ -94,7 +94,7 @@ def test_a_published_angle_begins_within_its_limits(turns):
         assert -pi < values['coupler_joint'] <= pi
 
 
-def test_an_input_with_limits_is_published_as_it_is_driven():
+def test_limited_input_is_published_as_driven():
     linkage = LIMITED.replace('[0.5, 1.5]', '[8, 12]')
     pipeline = Pipeline(scene('drive: {sine: {amplitude: 1, mean: 10, frequency: 1}}', linkage))
     message = read(pipeline.tick(BEGIN).message)
@@ -121,7 +121,7 @@ ANGLES = (1.0, 2.0, 2.1, 1.0)
 
 
 @pytest.mark.parametrize(('said', 'published'), [('', 4), ('beyond_limits: silent', 2)])
-def test_what_is_counted_and_told(said, published):
+def test_ticks_beyond_limits_are_counted_and_reported(said, published):
     loop, messages = ran(said, ANGLES)
     counts = loop.counts
     assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
@@ -136,7 +136,7 @@ def test_what_is_counted_and_told(said, published):
     assert values['Reachable'] == '0.5 to 1.5 rad'
 
 
-def test_rates_and_efforts_are_told_by_their_limits():
+def test_diagnostics_compare_rates_with_velocity_limits():
     linkage = LIMITED.replace(
         'input: {limits: [0.5, 1.5]}',
         'input: {velocity: 0.8}, joints: {rocker_joint: {velocity: 100}}',
@@ -162,7 +162,7 @@ def test_rates_and_efforts_are_told_by_their_limits():
     assert not any('rocker_joint, of its limit' in key for key in values)
 
 
-def test_where_nothing_has_limits_nothing_is_told_of_them():
+def test_diagnostics_without_limits_name_no_limits():
     loop, _ = ran('', (1.0,), LIMITED.replace(', input: {limits: [0.5, 1.5]}', ''))
     _, values = status_of(observe(loop), 'loop closure')
     assert [key for key in values if 'limit' in key] == ['Ticks beyond limits']

@@ -86,7 +86,7 @@ class Followed:
         return wait_for(lambda: (node := self.newest('node')) and condition(node), what)
 
 
-def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start, scene):
+def test_view_turns_the_crank_of_a_running_node(graph, start, scene):
     cranks = graph.listen(JointState, '/crank_states')
     states = graph.listen(JointState, '/joint_states')
     start(scene)
@@ -129,7 +129,7 @@ def test_the_linkage_comes_from_the_node_and_a_hand_turns_its_crank(graph, start
         assert stamp_of(cranks[-1]) - stamp_of(cranks[0]) > 0
 
 
-def test_a_hand_turns_the_crank_where_samples_name_a_dependent_joint(graph, start, write_scene):
+def test_view_turns_the_crank_by_rocker_samples(graph, start, write_scene):
     closure = load(LINKAGES / 'four_bar.yaml')
     wanted = closure.position(ANGLE)
     ((branch, _),) = (
@@ -152,7 +152,7 @@ def test_a_hand_turns_the_crank_where_samples_name_a_dependent_joint(graph, star
         assert state['inputs'] == pytest.approx([ANGLE], abs=1e-5)
 
 
-def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
+def test_view_switches_a_fault_and_a_recording(graph, start, scene):
     states = graph.listen(JointState, '/joint_states')
     start(scene)
     with (
@@ -195,7 +195,7 @@ def test_a_fault_and_a_recording_begin_and_end(graph, start, scene):
             assert ';' in followed.ask(do, **content)
 
 
-def test_a_node_that_is_killed_is_said_and_one_that_starts_again_is_found(graph, start, scene):
+def test_view_reports_a_killed_node_and_its_restart(graph, start, scene):
     node = start(scene)
     with bridged(graph, 'linkage_node') as followed:
         followed.wait_for_node(lambda node: node['there'], 'the node')
@@ -209,7 +209,7 @@ def test_a_node_that_is_killed_is_said_and_one_that_starts_again_is_found(graph,
         assert followed.newest('model')['name'] == 'live'
 
 
-def test_which_node_is_asked_for_where_there_are_several(graph, start, scene):
+def test_view_asks_for_one_of_two_nodes(graph, start, scene):
     start(scene)
     start(scene, '-r', '__node:=other')
     scenes = '/linkage_node/scene', '/other/scene'
@@ -224,7 +224,7 @@ def test_which_node_is_asked_for_where_there_are_several(graph, start, scene):
         assert followed.bridge.name == '/other'
 
 
-def test_a_scene_that_is_none_is_refused_in_one_line(graph):
+def test_malformed_scene_topic_is_refused_in_one_line(graph):
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     publisher = graph.node.create_publisher(String, '~/scene', latched)
     try:
@@ -237,7 +237,7 @@ def test_a_scene_that_is_none_is_refused_in_one_line(graph):
         graph.node.destroy_publisher(publisher)
 
 
-def test_a_run_serves_its_page_and_ends_it(graph, scene, folder):
+def test_run_serves_its_page_until_it_ends(graph, scene, folder):
     """Without --view, it says the command that opens the page."""
     environment = os.environ | {'ROS_DOMAIN_ID': str(graph.domain)}
     command = [sys.executable, '-m', 'linkage_ros', 'run', scene, '--plain']
@@ -265,7 +265,7 @@ def test_a_run_serves_its_page_and_ends_it(graph, scene, folder):
     assert f'ROS_DOMAIN_ID={graph.domain} linkage view --node ' in told
 
 
-def test_in_a_browser_a_slider_turns_the_crank_and_a_switch_shows_the_fault(graph, start, scene):
+def test_browser_slider_turns_the_crank_of_the_node(graph, start, scene):
     cranks = graph.listen(JointState, '/crank_states')
     node = start(scene)
     errors = []

@@ -74,7 +74,7 @@ STALLS = {
 
 
 @pytest.mark.parametrize('name', STALLS)
-def test_a_stall_is_named_and_whether_the_rate_can_be_held(run, name):
+def test_lost_ticks_name_the_stall_and_the_remedy(run, name):
     durations, oversleep, line = STALLS[name]
     state = observe(fake_loop(), run(durations, oversleep), rate=0.0)
     assert told(state) == ([line] if line else [])
@@ -125,7 +125,7 @@ def silence_of(monkeypatch, interval, max_age):
 
 
 @pytest.mark.parametrize('name', SILENCES)
-def test_a_tick_that_goes_on_does_not_say_that_no_message_came(monkeypatch, name):
+def test_unfinished_tick_is_not_reported_as_missing_messages(monkeypatch, name):
     interval, timeline, expected = SILENCES[name]
     watch = silence_of(monkeypatch, interval, NANOSECONDS)
     for seconds, ticks, received, used in timeline:
@@ -145,7 +145,7 @@ PATIENCE = {
 
 
 @pytest.mark.parametrize('name', PATIENCE)
-def test_silence_is_warned_of_when_no_sample_holds_any_more(monkeypatch, name):
+def test_silence_is_warned_of_after_max_age(monkeypatch, name):
     max_age, received, first = PATIENCE[name]
     watch = silence_of(monkeypatch, 0.01, round(max_age * NANOSECONDS))
     warned = []

@@ -46,9 +46,7 @@ def shown(arrays):
     return display
 
 
-def test_a_display_shows_the_pose_then_that_it_is_open_then_the_pose(
-    graph, write_scene, start, arrays
-):
+def test_markers_show_pose_then_open_loop_then_pose(graph, write_scene, start, arrays):
     publisher = graph.publisher(JointState, '/crank_states')
     scene = 'rate: 200\ndrive: {topic: {carry_forward: false}}\neffects: {markers: {rate: 50}}'
     node = start(write_scene('seen', scene, 'double_rocker'))
@@ -78,7 +76,7 @@ def test_a_display_shows_the_pose_then_that_it_is_open_then_the_pose(
     assert f'to /joint_states and {MARKERS}' in node.log
 
 
-def test_they_come_at_their_own_rate_with_the_stamps_of_states(graph, write_scene, start, arrays):
+def test_markers_have_their_own_rate_and_stamps_of_states(graph, write_scene, start, arrays):
     scene = 'rate: 500\ndrive: {constant_rate: {rate: 3.0}}\neffects: {markers: {rate: 40}}'
     states = graph.listen(JointState, '/joint_states')
     node = start(write_scene('rates', scene))
@@ -96,7 +94,7 @@ def test_they_come_at_their_own_rate_with_the_stamps_of_states(graph, write_scen
     assert len(states) > 5 * len(arrays)
 
 
-def test_the_bag_holds_them_and_replays_them(folder, graph, write_scene, start, arrays):
+def test_bag_records_and_replays_the_markers(folder, graph, write_scene, start, arrays):
     # Out of its range for a part of each turn: there only the markers tell of a tick.
     scene = (
         'rate: 500\ndrive: {sine: {mean: 1.2, amplitude: 0.9, frequency: 2.0}}\n'
@@ -154,7 +152,7 @@ def topics_of_foxglove():
     return found
 
 
-def test_the_views_are_of_displays_and_panels_that_there_are():
+def test_shipped_views_name_existing_displays_and_panels():
     view = yaml.safe_load(RVIZ.read_text('utf-8'))['Visualization Manager']
     assert [display['Class'] for display in view['Displays']] == [
         'rviz_default_plugins/MarkerArray',
@@ -175,7 +173,7 @@ def test_the_views_are_of_displays_and_panels_that_there_are():
     assert layout['configById']['3D!linkage']['followTf'] == 'ground'
 
 
-def test_every_topic_of_the_views_is_one_of_the_running_node(graph, start, arrays):
+def test_view_topics_are_published_by_the_node(graph, start, arrays):
     node = start(ROOT / 'config' / 'scenes' / 'visible_bucket.yaml')
     wait_for(lambda: arrays, 'markers')
     # What a scene asks for with a key of its own is not in this one.

@@ -60,7 +60,7 @@ STRANGE = [
 
 
 @pytest.mark.parametrize('name', STRANGE, ids=range(len(STRANGE)))
-def test_what_is_not_an_installed_message_is_one_line_and_imports_nothing(name, monkeypatch):
+def test_unknown_message_type_is_refused_without_an_import(name, monkeypatch):
     def refuse(module):
         raise AssertionError(f'{module} is imported')
 
@@ -80,7 +80,7 @@ PIECES = st.sampled_from(
 
 
 @given(name=st.one_of(st.text(max_size=40), st.lists(PIECES, max_size=7).map(''.join)))
-def test_no_name_at_all_imports_more_than_messages(name):
+def test_random_type_name_imports_only_message_packages(name):
     before = set(sys.modules)
     with suppress(LinkageError):
         assert message_type(name, '/x') is JointState
@@ -101,7 +101,7 @@ sys.exit(main(['echo', '--count', '1', '--timeout', '1']))
 
 
 @pytest.mark.parametrize('name', ['this/msg/X', '', 'a/b/c/d', '../msg/X', 'std_srvs/srv/Empty'])
-def test_echo_imports_no_module_that_the_graph_names(name, domain):
+def test_echo_imports_no_module_named_on_the_graph(name, domain):
     done = subprocess.run(
         [sys.executable, '-c', ECHO, name],
         env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
@@ -115,7 +115,7 @@ def test_echo_imports_no_module_that_the_graph_names(name, domain):
     assert re.fullmatch(rf'linkage echo: /joint_states: {reason}; .+\n', done.stderr)
 
 
-def test_no_other_line_of_the_package_makes_a_class_of_a_name():
+def test_one_module_of_the_package_imports_message_types():
     package = Path(linkage_ros.__file__).parent
     named = [
         str(file.relative_to(package))

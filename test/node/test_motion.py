@@ -64,7 +64,7 @@ def turn(publisher, seconds, begin):
     ('linkage', 'loop'),
     [('four_bar', four_bar), ('inverted_slider_crank', inverted_slider_crank)],
 )
-def test_accelerations_of_a_crank_at_a_constant_rate(
+def test_motion_topic_holds_accelerations_of_a_constant_crank(
     graph, write_scene, start, publisher, motions, linkage, loop
 ):
     text = 'rate: 200\neffects: {acceleration: {}}'
@@ -96,7 +96,9 @@ def test_accelerations_of_a_crank_at_a_constant_rate(
     assert f'to /joint_states and {MOTION}' in node.log
 
 
-def test_two_inputs(graph, write_scene, start, publisher, motions):
+def test_motion_topic_solves_a_linkage_of_two_inputs(
+    graph, write_scene, start, publisher, motions
+):
     text = 'rate: 200\neffects: {acceleration: {}}\ndrive: {topic: {max_age: 60}}'
     node = start(write_scene('two_inputs', text, FIVE_BAR))
     begin = time.time_ns()
@@ -134,7 +136,7 @@ def test_two_inputs(graph, write_scene, start, publisher, motions):
     assert 'crank left_crank, right_crank from /crank_states' in node.log
 
 
-def test_two_inputs_of_two_publishers_drive_a_linkage_and_the_silent_one_is_named(
+def test_two_publishers_drive_two_inputs_and_silence_is_named(
     graph, write_scene, start, publisher, motions
 ):
     other = graph.publisher(JointState, '/crank_states')
@@ -159,7 +161,7 @@ def test_two_inputs_of_two_publishers_drive_a_linkage_and_the_silent_one_is_name
     assert node.end() == 0
 
 
-def test_at_a_toggle_positions_alone_and_where_it_is_open_silence(
+def test_motion_topic_holds_positions_only_at_a_toggle(
     graph, write_scene, start, publisher, motions
 ):
     text = 'rate: 100\ndrive: {topic: {carry_forward: false}}\neffects: {acceleration: {}}'
@@ -185,7 +187,9 @@ def test_at_a_toggle_positions_alone_and_where_it_is_open_silence(
     assert node.end() == 0
 
 
-def test_it_comes_and_goes_with_the_scene(graph, folder, write_scene, start, publisher, motions):
+def test_motion_topic_appears_and_disappears_with_the_scene(
+    graph, folder, write_scene, start, publisher, motions
+):
     def change(transition):
         request = ChangeState.Request()
         request.transition.id = transition
@@ -231,7 +235,9 @@ rclpy.shutdown()
 
 
 @pytest.mark.parametrize(('effect', 'imported'), [('velocity', False), ('acceleration', True)])
-def test_its_message_is_imported_only_where_it_is_published(domain, write_scene, effect, imported):
+def test_trajectory_message_is_imported_only_where_published(
+    domain, write_scene, effect, imported
+):
     scene = write_scene(f'imports_{effect}', f'effects: {{{effect}: {{}}}}')
     done = subprocess.run(
         [sys.executable, '-c', PROGRAM, str(scene)],
@@ -245,7 +251,7 @@ def test_its_message_is_imported_only_where_it_is_published(domain, write_scene,
     assert done.stdout.split() == [str(imported)], done.stderr
 
 
-def test_where_its_message_is_not_installed_one_line_says_so(domain, write_scene):
+def test_missing_trajectory_msgs_is_reported_in_one_line(domain, write_scene):
     program = (
         'import sys; sys.modules["trajectory_msgs"] = None; from threading import Event; '
         'from linkage_ros.node.run import run_linkage_node; '

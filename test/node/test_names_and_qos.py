@@ -29,7 +29,7 @@ def gap(state, angle):
     return abs(rect(0.040, angle) + rect(0.120, angle + coupler) - 0.100 - rect(0.080, rocker))
 
 
-def test_two_in_namespaces_do_not_hear_each_other(graph, write_scene, start):
+def test_nodes_in_two_namespaces_do_not_mix(graph, write_scene, start):
     scene = write_scene('two', TICKED)
     heard, publishers = {}, {}
     for side in ('left', 'right'):
@@ -52,7 +52,7 @@ def test_two_in_namespaces_do_not_hear_each_other(graph, write_scene, start):
     assert nowhere == []
 
 
-def test_names_under_its_own_follow_the_node(graph, write_scene, start):
+def test_private_topics_follow_the_name_of_the_node(graph, write_scene, start):
     scene = 'rate: 100\ndrive: {constant_rate: {rate: 3.0}}\neffects: {markers: {rate: 20}}'
     node = start(write_scene('renamed', scene), '-r', '__ns:=/arm', '-r', '__node:=press')
     markers = graph.listen(MarkerArray, '/arm/press/markers')
@@ -64,7 +64,7 @@ def test_names_under_its_own_follow_the_node(graph, write_scene, start):
     assert 'to /arm/joint_states and /arm/press/markers' in node.log
 
 
-def test_remapped_topics_are_heard_recorded_and_replayed(folder, graph, write_scene, start):
+def test_remapped_topics_are_recorded_and_replayed(folder, graph, write_scene, start):
     scene = f'{TICKED}record: {{directory: {folder}, name: remapped}}'
     node = start(
         write_scene('remapped', scene),
@@ -84,7 +84,7 @@ def test_remapped_topics_are_heard_recorded_and_replayed(folder, graph, write_sc
     assert said['verdict'] == 'identical'
 
 
-def test_the_diagnostics_of_two_namespaces_can_be_told_apart(graph, write_scene, start):
+def test_diagnostics_names_contain_the_namespace(graph, write_scene, start):
     scene = write_scene('apart', TICKED)
     for side in ('left', 'right'):
         start(scene, '-r', f'__ns:=/{side}')
@@ -98,9 +98,7 @@ def test_the_diagnostics_of_two_namespaces_can_be_told_apart(graph, write_scene,
     assert named() == expected
 
 
-def test_with_both_remappings_of_the_docs_it_does_not_take_itself_for_the_crank(
-    folder, graph, write_scene, start
-):
+def test_remapped_node_ignores_its_own_joint_states(folder, graph, write_scene, start):
     # docs/how_to/see_it.md: the crank comes from the topic of the broadcaster's joint states.
     scene = f'{TICKED}record: {{directory: {folder}, name: both}}'
     publisher = graph.node.create_publisher(
@@ -130,7 +128,7 @@ def test_with_both_remappings_of_the_docs_it_does_not_take_itself_for_the_crank(
     assert topic.qos.reliability == 'best_effort', 'of the publisher, not of the node'
 
 
-def test_qos_is_what_the_overrides_say(folder, graph, write_scene, start):
+def test_qos_overrides_set_the_published_qos(folder, graph, write_scene, start):
     scene = f'{TICKED}record: {{directory: {folder}, name: overridden}}'
     node = start(
         write_scene('overridden', scene),

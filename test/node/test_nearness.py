@@ -56,7 +56,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, is_open=Fal
     return status_of(observe(fake_loop(pipeline=pipeline), counts, limits=limits), 'loop closure')
 
 
-def test_the_values_are_told():
+def test_loop_closure_diagnostics_list_distances_to_toggles():
     found, values = status((1.25, 0.0625, 3.5))
     assert (found.level, found.message) == (OK, 'Closed')
     assert [values[key] for key in KEYS] == ['1.25', '0.0625', '3.5']
@@ -71,26 +71,26 @@ def test_the_values_are_told():
         ((1.0, 1.0, 9e-4), f'{KEYS[2]} is 0.0009, below warn.toggle_distance of 0.001'),
     ],
 )
-def test_below_a_limit_it_warns_and_names_value_and_limit(nearness, message):
+def test_diagnostics_warn_with_value_and_limit(nearness, message):
     found, _ = status(nearness)
     assert (found.level, found.message) == (WARN, message)
 
 
-def test_all_that_is_below_its_limit_is_named():
+def test_diagnostics_warn_of_every_value_below_its_limit():
     found, _ = status((0.0, 0.0, 0.0))
     assert found.level == WARN
     assert all(f'warn.{name}' in found.message for name in LIMITS)
 
 
-def test_a_limit_of_0_is_off():
+def test_limit_of_0_disables_the_warning():
     assert status((0.0, 0.0, 0.0), limits=dict.fromkeys(LIMITS, 0.0))[0].level == OK
 
 
-def test_at_the_limit_all_is_well():
+def test_value_at_its_limit_causes_no_warning():
     assert status(tuple(LIMITS.values()))[0].level == OK
 
 
-def test_what_is_worse_goes_before():
+def test_open_loop_error_takes_precedence_over_nearness_warning():
     found, values = status((0.0, 0.0, 0.0), is_open=True)
     assert found.level == ERROR
     assert 'nearest' not in found.message
@@ -98,13 +98,13 @@ def test_what_is_worse_goes_before():
 
 
 @pytest.mark.parametrize(('inputs', 'unit'), [((CYLINDER,), 'm'), ((CRANK, CYLINDER), 'm or rad')])
-def test_an_input_that_slides_is_told_in_metres(inputs, unit):
+def test_sliding_input_is_reported_in_metres(inputs, unit):
     _, values = status(inputs=inputs)
     assert values['Input boom_cylinder (m)'] == '0.250000'
     assert values[f'Input to the nearest toggle ({unit})'] == '0.5'
 
 
-def test_over_the_graph_with_a_limit_that_is_changed_as_it_runs(graph, write_scene, start):
+def test_warning_limit_changes_while_the_node_runs(graph, write_scene, start):
     text = 'rate: 100\ndrive: {topic: {max_age: 60, carry_forward: false}}'
     node = start(write_scene('nearness', text))
     publisher = graph.publisher(JointState, '/crank_states')

@@ -83,7 +83,7 @@ def matched(names, patterns):
 
 
 @pytest.mark.parametrize('scene', SCENES, ids=[scene.stem for scene in SCENES])
-def test_a_node_has_what_the_policy_grants_and_nothing_else(graph_of, scene):
+def test_node_has_exactly_the_topics_of_the_policy(graph_of, scene):
     has, may = graph_of(scene), granted()
     if '/crank_commands' in has['subscribe']:
         may['subscribe'] = may['subscribe'] - {'/crank_states'} | {'/crank_commands'}
@@ -102,7 +102,7 @@ WHOLE = (
 )
 
 
-def test_the_policy_grants_nothing_that_no_node_has_and_no_topic_is_left_out(graph_of, tmp_path):
+def test_policy_grants_only_topics_of_some_node(graph_of, tmp_path):
     has = {kind: set() for kind in KINDS}
     for index, text in enumerate(WHOLE):
         scene = tmp_path / f'whole_{index}.yaml'

@@ -44,7 +44,7 @@ def program(folder, name, *arguments, before=''):
 
 
 @pytest.mark.parametrize('name', PROGRAMS)
-def test_help_tells_every_parameter_and_starts_no_node(tmp_path, name):
+def test_help_lists_every_parameter_without_starting_a_node(tmp_path, name):
     answer = program(tmp_path, name, '--help', '--ros-args', '-p', 'rate:=3.0')
     assert (answer.returncode, answer.stderr) == (0, '')
     assert answer.stdout.startswith(f'usage: ros2 run linkage_ros {name} ')
@@ -55,7 +55,7 @@ def test_help_tells_every_parameter_and_starts_no_node(tmp_path, name):
 
 
 @pytest.mark.parametrize('name', PROGRAMS)
-def test_without_ros_each_program_says_in_a_line_how_to_get_it(tmp_path, name):
+def test_programs_without_ros_name_what_to_install(tmp_path, name):
     answer = program(
         tmp_path, name, '--help', before='import sys; sys.modules["rcl_interfaces"] = None; '
     )
@@ -65,14 +65,14 @@ def test_without_ros_each_program_says_in_a_line_how_to_get_it(tmp_path, name):
 
 
 @pytest.mark.parametrize('name', ['crank_source', 'pd_controller'])
-def test_a_demo_node_warns_once_of_an_unknown_parameter(tmp_path, name):
+def test_demo_node_warns_once_of_an_unknown_parameter(tmp_path, name):
     answer = program(tmp_path, name, *('--ros-args', '-p', 'secnds:=9.0', '-p', 'seconds:=0.1'))
     assert answer.returncode == 0
     (line,) = [line for line in answer.stderr.splitlines() if 'WARN' in line]
     assert line.endswith("parameter secnds: unknown, and without effect; did you mean 'seconds'?")
 
 
-def test_the_node_warns_once_of_each_unknown_parameter_and_runs(start, write_scene):
+def test_node_warns_once_of_each_unknown_parameter(start, write_scene):
     node = start(
         write_scene('warned', 'rate: 100'),
         *('-p', 'scnee:=x', '-p', 'warn.condtioning:=0.1', '-p', 'use_sim_time:=false'),
@@ -86,7 +86,7 @@ def test_the_node_warns_once_of_each_unknown_parameter_and_runs(start, write_sce
     ]
 
 
-def test_one_request_for_all_parameters_gets_their_values(graph, start, write_scene, folder):
+def test_dumped_parameters_restart_the_node(graph, start, write_scene, folder):
     """As `ros2 param dump` and rqt_reconfigure ask; a file of the answer starts a node."""
     own = [parameter.name for parameter in LINKAGE_NODE]
     scene = write_scene('dumped', 'rate: 100')
@@ -118,7 +118,7 @@ def test_one_request_for_all_parameters_gets_their_values(graph, start, write_sc
     assert 'WARN' not in node.log
 
 
-def test_the_crank_source_publishes_reliably(graph, domain, folder):
+def test_crank_source_publishes_reliably(graph, domain, folder):
     """A subscriber may ask for it, as joint_state_publisher does for its source_list."""
     heard = graph.listen(JointState, '/crank_states')
     source = NodeProcess(domain, folder, program=('-m', 'linkage_ros.node.crank_source'))
@@ -128,7 +128,7 @@ def test_the_crank_source_publishes_reliably(graph, domain, folder):
         source.kill()
 
 
-def test_a_bag_holds_the_scene_with_the_keys_that_were_set(start, write_scene, folder):
+def test_bag_holds_the_scene_with_set_keys(start, write_scene, folder):
     node = start(
         write_scene('set', "rate: 100\nrecord: {name: set, directory: '.'}"),
         *('-p', "set:=['rate=50', 'drive.topic.max_age=0.1']"),

@@ -82,9 +82,7 @@ def refusals(node):
     ]
 
 
-def test_the_tick_alone_has_priority_and_processor_and_the_process_its_memory(
-    graph, start, write_scene
-):
+def test_real_time_settings_apply_to_the_tick_thread_only(graph, start, write_scene):
     if not has_rights():
         pytest.skip('this user may not ask for priority and memory')
     node = start(write_scene('asked', TURNING), *ALL)
@@ -100,9 +98,7 @@ def test_the_tick_alone_has_priority_and_processor_and_the_process_its_memory(
     assert refusals(node) == []
 
 
-def test_without_the_rights_a_line_for_each_says_what_helps_and_the_run_goes_on(
-    graph, start, write_scene
-):
+def test_missing_real_time_rights_are_reported_and_run_continues(graph, start, write_scene):
     heard = graph.listen(JointState, 'joint_states')
     node = start(write_scene('refused', TURNING), *ALL, preexec_fn=without_rights)
     assert in_force(graph) == ['as others', str(LAST), '0 kB']
@@ -116,13 +112,13 @@ def test_without_the_rights_a_line_for_each_says_what_helps_and_the_run_goes_on(
 
 
 @pytest.mark.parametrize('asked', ['[1000]', '[-2]', f'[{LAST}, 1000]', f'[{2**40}]'])
-def test_a_processor_that_there_is_not_is_told(graph, start, write_scene, asked):
+def test_missing_processor_is_reported(graph, start, write_scene, asked):
     node = start(write_scene('processors', TURNING), '-p', f'cpu_affinity:={asked}')
     node.wait_for_log(f'cpu_affinity {asked}: ticks run on [')
     assert node.end() == 0
 
 
-def test_what_is_not_asked_for_is_neither_done_nor_told(graph, start, write_scene):
+def test_real_time_settings_are_off_by_default(graph, start, write_scene):
     node = start(write_scene('unasked', TURNING))
     assert in_force(graph) == ['', '', '']
     assert {policy for policy, _, _ in threads(node.process)} == {os.SCHED_OTHER}
@@ -132,7 +128,7 @@ def test_what_is_not_asked_for_is_neither_done_nor_told(graph, start, write_scen
 @pytest.mark.parametrize(
     'wrong', ['thread_priority:=100', 'thread_priority:=-1', 'cpu_affinity:=1', 'lock_memory:=1']
 )
-def test_a_value_out_of_bounds_is_refused_at_the_start(graph, start, write_scene, wrong):
+def test_real_time_value_out_of_bounds_is_refused(graph, start, write_scene, wrong):
     node = start(write_scene('wrong', TURNING), '-p', wrong, ready='')
     assert wait_for(lambda: node.process.poll() is not None, 'the end')
     assert node.process.returncode == 2

@@ -83,7 +83,7 @@ def cannot_begin(folder, case):
     ],
     ids=['below a file', 'below a file, dated', 'too long, dated'],
 )
-def test_a_bag_that_cannot_be_made(
+def test_node_publishes_although_its_bag_cannot_be_made(
     graph, tmp_path, write_scene, start, keeps_publishing, case, name
 ):
     directory, reason = cannot_begin(tmp_path, case)
@@ -101,7 +101,9 @@ def test_a_bag_that_cannot_be_made(
     assert 'Traceback' not in node.log
 
 
-def test_a_name_that_is_taken_gets_a_number(graph, tmp_path, write_scene, start, keeps_publishing):
+def test_bag_with_a_taken_name_gets_a_number(
+    graph, tmp_path, write_scene, start, keeps_publishing
+):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'mine').write_text('precious')
     (tmp_path / 'bag_2').symlink_to(tmp_path / 'nowhere')
@@ -138,7 +140,7 @@ def counts_in_info(bag, capsys):
 
 
 @pytest.mark.parametrize('kind', ['a full disk', 'a limit on file sizes'])
-def test_a_full_disk_is_told_alike_by_node_diagnostics_and_bag(
+def test_full_disk_counts_agree_in_log_diagnostics_and_bag(
     graph, request, tmp_path, write_scene, start, keeps_publishing, capsys, kind
 ):
     disk = request.getfixturevalue('small_disk') if kind == 'a full disk' else tmp_path
@@ -177,7 +179,7 @@ def test_a_full_disk_is_told_alike_by_node_diagnostics_and_bag(
     assert reason in reason_in_bag
 
 
-def test_where_there_is_room_again_the_recording_goes_on_in_a_new_file(
+def test_recording_resumes_in_a_new_file_after_full_disk(
     graph, small_disk, write_scene, start, keeps_publishing, capsys
 ):
     node = start(write_scene('again', scene_text(small_disk, rate=2000)))
@@ -206,9 +208,7 @@ def test_where_there_is_room_again_the_recording_goes_on_in_a_new_file(
         assert reader.message_count > 1000
 
 
-def test_a_run_that_dropped_messages_says_how_many_and_does_not_end_with_0(
-    graph, tmp_path, write_scene, start
-):
+def test_run_with_dropped_messages_reports_their_count(graph, tmp_path, write_scene, start):
     # Messages of 13 places each, faster than the recorder's thread looks, for a queue of 100.
     record = f'record: {{directory: {tmp_path}, name: bag, queue: 100}}'
     node = start(write_scene('drops', f'rate: 100\neffects: {{velocity: {{}}}}\n{record}'))
@@ -234,7 +234,7 @@ def test_a_run_that_dropped_messages_says_how_many_and_does_not_end_with_0(
     assert f'{tmp_path}/bag: {dropped:,} of {received:,} messages were dropped: ' in line
 
 
-def test_a_later_bag_does_not_hide_the_first_failure(
+def test_later_bag_does_not_hide_the_first_failure(
     graph, tmp_path, write_scene, start, keeps_publishing
 ):
     directory, _ = cannot_begin(tmp_path, 'below a file')

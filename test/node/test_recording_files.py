@@ -30,7 +30,9 @@ def told(status, word):
 
 
 @pytest.mark.parametrize('compression', ['lz4', 'zstd'])
-def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression):
+def test_ring_of_packed_files_counts_every_message(
+    graph, tmp_path, write_scene, start, compression
+):
     record = f'split_seconds: 1, keep_files: 2, compression: {compression}, flush_period: 0.1'
     node = start(
         write_scene('ring', f'rate: 500\nrecord: {{directory: {tmp_path}, name: bag, {record}}}')
@@ -78,7 +80,7 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
         assert received[topic] == count + dropped[topic] + gone[topic]
 
 
-def test_a_disk_with_less_room_than_is_to_stay(graph, tmp_path, write_scene, start):
+def test_recording_refuses_a_disk_below_min_free_bytes(graph, tmp_path, write_scene, start):
     record = f'record: {{directory: {tmp_path}, name: bag, min_free_bytes: 1000000000000000}}'
     # With an argument it is a process of its own, which has an exit code.
     node = start(write_scene('scarce', f'rate: 100\n{record}'), '-p', 'autostart:=true')

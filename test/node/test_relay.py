@@ -34,7 +34,7 @@ KEYS = ('drive={topic: {joint: rocker_joint, branch: 1}}',)
         ('gripper', ('left_pad-right_pad',), (0.4,)),
     ],
 )
-def test_commands_of_joints_in_plane_and_space_become_those_of_all_inputs(name, joints, start):
+def test_relay_turns_commands_of_joints_into_all_inputs(name, joints, start):
     settings = (f'drive={{topic: {{joint: [{", ".join(joints)}]}}}}',)
     relay = CommandRelay(load_scene(name, settings=settings))
     closure = load(name).measuring(*joints)
@@ -90,7 +90,7 @@ def trajectory(*points, joint='rocker_joint'):
 
 
 @pytest.mark.parametrize('given', [(1.2,), (1.2, 0.5), (1.2, 0.5, -2.0)])
-def test_points_are_turned_with_what_they_have(relay, given):
+def test_relay_turns_every_value_of_trajectory_points(relay, given):
     found = relay.turn_trajectory(trajectory(point(*given), point(*given, seconds=2)))
     assert (found.joint_names, found.header.frame_id) == (['crank_joint'], 'kept')
     assert [one.time_from_start.sec for one in found.points] == [1, 2]
@@ -125,14 +125,14 @@ END = load('four_bar').branches('rocker_joint')[0].high
         ),
     ],
 )
-def test_what_has_no_crank_is_not_sent(relay, message, reason):
+def test_relay_refuses_points_without_a_crank_angle(relay, message, reason):
     with pytest.raises(RefusedError) as error:
         relay.turn_trajectory(message)
     assert reason in str(error.value)
     assert '\n' not in str(error.value)
 
 
-def test_standing_where_the_joint_turns_back_is_a_crank(relay):
+def test_relay_accepts_rest_where_the_joint_turns_back(relay):
     (found,) = relay.turn_trajectory(trajectory(point(END, 0.0, 0.0))).points
     assert list(found.velocities) == [0.0]
 
@@ -159,18 +159,18 @@ def test_efforts_at_a_toggle_of_the_crank_are_not_sent():
         relay.turn_state(message)
 
 
-def test_an_empty_trajectory_stops_the_crank_too(relay):
+def test_relay_passes_an_empty_trajectory(relay):
     assert relay.turn_trajectory(trajectory()).joint_names == ['crank_joint']
 
 
-def test_states_of_other_joints_are_left_alone(relay):
+def test_relay_ignores_states_of_other_joints(relay):
     message = JointState(name=['elbow', 'rocker_joint'], position=[0.1, 1.2], velocity=[nan, nan])
     found = relay.turn_state(message)
     assert (found.name, len(found.position), len(found.velocity)) == (['crank_joint'], 1, 1)
     assert relay.turn_state(JointState(name=['elbow'], position=[0.1])) is None
 
 
-def test_every_linkage_of_a_scene_has_its_crank(tmp_path):
+def test_relay_turns_commands_of_two_linkages(tmp_path):
     drive = 'drive: {topic: {joint: rocker_joint, branch: %d}}'
     (tmp_path / 'two.yaml').write_text(
         'linkages:\n'
@@ -189,12 +189,12 @@ def test_every_linkage_of_a_scene_has_its_crank(tmp_path):
     assert list(found.position) == pytest.approx(cranks, abs=4e-15)
 
 
-def test_a_scene_without_a_dependent_joint_is_refused():
+def test_relay_refuses_a_scene_without_a_dependent_joint():
     with pytest.raises(DefinitionError, match='names no dependent joint'):
         CommandRelay(load_scene('four_bar'))
 
 
-def test_help_and_a_start_without_a_scene(tmp_path):
+def test_relay_without_a_scene_names_the_parameter(tmp_path):
     answer = program(tmp_path, 'linkage_relay', '--help')
     assert all(parameter.name in answer.stdout for parameter in PARAMETERS)
     answer = program(tmp_path, 'linkage_relay')
@@ -202,7 +202,7 @@ def test_help_and_a_start_without_a_scene(tmp_path):
     assert answer.stderr.startswith('linkage_relay: parameter scene: names no file; start with')
 
 
-def test_commands_pass_through_the_node(graph, domain, folder):
+def test_relay_node_publishes_crank_commands_and_trajectories(graph, domain, folder):
     cranks = graph.listen(JointState, '/crank_commands')
     trajectories = graph.listen(JointTrajectory, '/crank_trajectory')
     states = graph.publisher(JointState, '/joint_commands')

@@ -39,7 +39,7 @@ def late(graph):
     return heard
 
 
-def test_a_late_comer_sees_a_linkage_that_moves(graph, write_scene, start):
+def test_late_subscriber_receives_the_robot_description(graph, write_scene, start):
     start(write_scene('described', TURNING + 'robot_description: true'))
     states = graph.listen(JointState, '/joint_states')
     wait_for(lambda: len(states) > 100, 'joint states')
@@ -54,7 +54,7 @@ def test_a_late_comer_sees_a_linkage_that_moves(graph, write_scene, start):
         assert abs(ends[0] - ends[1]) < 1e-12 * 0.12
 
 
-def test_rods_in_space_move_with_their_platform(graph, write_scene, start):
+def test_published_joints_close_the_rods_in_space(graph, write_scene, start):
     """Every joint of the model is published, also those by which rods hang."""
     text = 'rate: 200\ndrive: {sine: {amplitude: 0.2, frequency: 1}}\nrobot_description: true'
     start(write_scene('delta_described', text, 'space/delta'))
@@ -69,7 +69,7 @@ def test_rods_in_space_move_with_their_platform(graph, write_scene, start):
         assert model.gap() < 1e-12
 
 
-def test_a_node_takes_it_on_its_command_line(graph, write_scene, start):
+def test_node_parameter_takes_the_robot_description(graph, write_scene, start):
     """``-p robot_description:="$(cat leg.urdf)"``: rcl reads it as YAML."""
     start(write_scene('as_text', TURNING + 'robot_description: true'))
     heard = late(graph)
@@ -85,7 +85,7 @@ def test_a_node_takes_it_on_its_command_line(graph, write_scene, start):
     assert taken.split() == heard[0].data.split(), 'lines are folded, and that is all'
 
 
-def test_several_linkages_are_one_model(graph, folder, start, request):
+def test_several_linkages_share_one_robot_description(graph, folder, start, request):
     scene = request.config.rootpath / 'config' / 'scenes' / 'two_fingers.yaml'
     text = scene.read_text().replace('../linkages', str(scene.parents[1] / 'linkages'))
     (folder / 'two.yaml').write_text(text + '\nrobot_description: true\n')
@@ -98,7 +98,7 @@ def test_several_linkages_are_one_model(graph, folder, start, request):
     assert model.joints == set(states[-1].name)
 
 
-def test_it_goes_with_the_scene(graph, write_scene, start):
+def test_robot_description_disappears_and_returns_with_the_scene(graph, write_scene, start):
     start(write_scene('gone', TURNING + 'robot_description: true'))
     wait_for(lambda: graph.node.count_publishers(TOPIC) == 1, 'a publisher')
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
@@ -112,7 +112,7 @@ def test_it_goes_with_the_scene(graph, write_scene, start):
     wait_for(lambda: heard, 'a robot model')
 
 
-def test_each_file_of_its_bag_has_it_as_it_was_offered(graph, folder, write_scene, start):
+def test_each_bag_file_holds_the_robot_description(graph, folder, write_scene, start):
     record = f'record: {{directory: {folder}, name: bag, split_seconds: 1}}'
     node = start(write_scene('bagged', TURNING + f'robot_description: true\n{record}'))
     heard = late(graph)
@@ -139,7 +139,7 @@ def replayed(bag):
     return verify_replay(found, recorded_scene(found), found.messages()).verdict == IDENTICAL
 
 
-def test_joints_that_do_not_tell_all_are_said_in_a_line(write_scene, start):
+def test_undetermined_link_of_a_robot_description_is_named(write_scene, start):
     linkage = (
         'links:\n'
         '  ground: {O2: [0, 0], O4: [0.1, 0]}\n'

@@ -221,14 +221,14 @@ def published(graph):
     return found if OF_EVERY_NODE.keys() <= found.keys() else None
 
 
-def test_every_shipped_scene_is_here():
+def test_scene_tests_cover_every_shipped_scene():
     shipped = {file.stem for file in SCENES.glob('*.yaml')}
     assert set(PUBLISHED) == set(SHOWN) == shipped
 
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', PUBLISHED)
-def test_it_publishes_what_it_calls_for_and_no_more(graph, start, name):
+def test_shipped_scene_publishes_exactly_its_topics(graph, start, name):
     joints, arrays, extra_topics, from_topic = PUBLISHED[name]
     states = graph.listen(JointState, '/joint_states')
     extras = {

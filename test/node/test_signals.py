@@ -69,7 +69,7 @@ def closed_bags(runs):
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('moment', range(2))
 @pytest.mark.parametrize('number', SIGNALS)
-def test_at_a_random_moment(start, recorded, number, moment):
+def test_signal_at_a_random_moment_closes_the_bag(start, recorded, number, moment):
     scene, runs = recorded
     node = start(scene, ready='')
     wait_for_handlers(node)
@@ -82,7 +82,7 @@ def test_at_a_random_moment(start, recorded, number, moment):
 
 
 @pytest.mark.parametrize('number', SIGNALS)
-def test_while_it_configures(start, recorded, number):
+def test_signal_during_configuration_ends_with_code_0(start, recorded, number):
     scene, runs = recorded
     stuck = 'node.load_scene = lambda *_: (print("loading", flush=True), time.sleep(600))'
     node = start(scene, ready='loading', program=('-c', PROGRAM.format(stuck)))
@@ -92,7 +92,7 @@ def test_while_it_configures(start, recorded, number):
 
 
 @pytest.mark.parametrize('number', SIGNALS)
-def test_in_the_middle_of_a_run(graph, start, recorded, number):
+def test_signal_during_a_run_closes_the_bag(graph, start, recorded, number):
     scene, runs = recorded
     node = start(scene)
     publisher = graph.publisher(JointState, '/crank_states')
@@ -103,7 +103,7 @@ def test_in_the_middle_of_a_run(graph, start, recorded, number):
     assert messages > 100
 
 
-def test_an_impatient_user(start, recorded):
+def test_repeated_signals_end_the_node_with_code_0(start, recorded):
     scene, runs = recorded
     node = start(scene)
     for number in (*SIGNALS, signal.SIGINT, signal.SIGINT):
@@ -115,7 +115,7 @@ def test_an_impatient_user(start, recorded):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('where', STUCK)
-def test_a_middleware_that_hangs_does_not_keep_the_process(start, recorded, where):
+def test_hanging_middleware_does_not_keep_the_process(start, recorded, where):
     scene, runs = recorded
     node = start(scene, program=('-c', PROGRAM.format(STUCK[where])))
     assert node.end() == -signal.SIGALRM, node.log

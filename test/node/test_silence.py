@@ -66,7 +66,7 @@ def wait_until_taken(graph):
         ('four_bar', 'rate: 0', 'crank_joint'),
     ],
 )
-def test_who_waits_in_vain_says_for_what(write_scene, start, linkage, scene, inputs):
+def test_node_without_messages_names_the_awaited_topic(write_scene, start, linkage, scene, inputs):
     """A linkage file alone, of several inputs, waits for messages too."""
     file = LINKAGES / f'{linkage}.yaml'
     if scene is not None:
@@ -81,7 +81,7 @@ def test_who_waits_in_vain_says_for_what(write_scene, start, linkage, scene, inp
     )
 
 
-def test_who_is_under_torque_moves_and_says_that_no_command_comes(graph, write_scene, start):
+def test_torque_drive_without_commands_reports_the_brake(graph, write_scene, start):
     scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
     _, rate, said = scene.partition('rate:')
     file = write_scene('torque', rate + said.partition('record:')[0], 'four_bar')
@@ -117,9 +117,7 @@ def test_who_is_under_torque_moves_and_says_that_no_command_comes(graph, write_s
     )
 
 
-def test_a_publisher_that_died_is_not_taken_for_a_second_one(
-    graph, domain, folder, write_scene, start
-):
+def test_dead_publisher_is_not_counted_as_a_second_one(graph, domain, folder, write_scene, start):
     # A controller is killed, and started anew: the graph still shows the one that is dead.
     scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
     _, rate, said = scene.partition('rate:')
@@ -143,7 +141,9 @@ def test_a_publisher_that_died_is_not_taken_for_a_second_one(
             node.wait_for_log('several publishers send the crank, among /dead and /tester')
 
 
-def test_silence(graph, write_scene, start, publisher, joint_states):
+def test_silent_crank_publishes_nothing_after_max_age(
+    graph, write_scene, start, publisher, joint_states
+):
     node = start(write_scene('silence', TICKING))
     assert graph.wait_for_level('crank', STALE).message == 'No crank yet'
     assert joint_states == []
@@ -163,7 +163,9 @@ def test_silence(graph, write_scene, start, publisher, joint_states):
     assert node.end() == 0
 
 
-def test_a_publisher_that_hangs_is_silence(graph, write_scene, start, publisher, joint_states):
+def test_repeated_sample_of_a_hung_publisher_is_silence(
+    graph, write_scene, start, publisher, joint_states
+):
     # The same message again and again, as a driver sends it that has lost its sensor.
     start(write_scene('hangs', TICKING))
     message = crank(0.5)
@@ -174,7 +176,7 @@ def test_a_publisher_that_hangs_is_silence(graph, write_scene, start, publisher,
     assert all(stamp_of(state) <= stamp_of(message) + 0.3 * NS for state in joint_states)
 
 
-def test_samples_that_come_too_late_are_silence(
+def test_samples_older_than_max_age_are_silence(
     graph, write_scene, start, publisher, joint_states
 ):
     # As from a machine whose clock lags.
@@ -200,7 +202,7 @@ def test_samples_that_come_too_late_are_silence(
     assert re.search(r'received, 0 used, \d+ superseded, 0 rejected, \d+ stale', node.log)
 
 
-def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(
+def test_rate_0_treats_a_repeated_stamp_as_silence(
     graph, write_scene, start, publisher, joint_states
 ):
     start(write_scene('repeat', 'rate: 0\ndrive: {topic: {max_age: 0.3}}'))
@@ -216,7 +218,7 @@ def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(
     assert {stamp_of(state) for state in joint_states} == {stamp_of(message)}
 
 
-def test_two_publishers_are_named(graph, write_scene, start, publisher):
+def test_node_names_two_publishers_of_the_crank(graph, write_scene, start, publisher):
     node = start(write_scene('two', TICKING))
     impostor = graph.publisher(JointState, '/crank_states', node='impostor')
     with publishing(publisher), publishing(impostor):
@@ -230,7 +232,7 @@ def test_two_publishers_are_named(graph, write_scene, start, publisher):
     assert 'stop all but one' in line
 
 
-def test_where_others_share_the_topic_two_that_send_the_crank_are_told(
+def test_node_names_two_crank_publishers_on_a_shared_topic(
     graph, domain, folder, write_scene, start
 ):
     scene = write_scene('shared', TICKING)

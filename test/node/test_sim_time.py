@@ -62,7 +62,7 @@ def simulation(graph, write_scene, start):
     return Simulation(graph)
 
 
-def test_it_ticks_as_the_clock_does(simulation):
+def test_node_ticks_at_times_of_the_simulated_clock(simulation):
     simulation.run_until_heard()
     begin = simulation.now
     for _ in range(100):
@@ -79,7 +79,7 @@ def test_it_ticks_as_the_clock_does(simulation):
     assert len(simulation.heard) == count, 'a simulation that stands still has no ticks'
 
 
-def test_age_is_measured_in_simulated_time(simulation):
+def test_sample_age_is_measured_in_simulated_time(simulation):
     simulation.run_until_heard()
     time.sleep(0.5)  # an age of 0, though more than max_age has passed on this machine
     simulation.heard.clear()
@@ -96,7 +96,7 @@ def test_age_is_measured_in_simulated_time(simulation):
     assert simulation.heard == []
 
 
-def test_a_jump_back_starts_anew(simulation, graph):
+def test_clock_jump_back_forgets_earlier_samples(simulation, graph):
     simulation.run_until_heard()
     for _ in range(20):
         simulation.step(10_000_000)
@@ -114,7 +114,7 @@ def test_a_jump_back_starts_anew(simulation, graph):
     wait_for(lambda: graph.value('tick', 'Clock jumps back') == '1', 'the count of jumps')
 
 
-def test_rate_0_judges_stamps_by_the_clock(graph, write_scene, start):
+def test_rate_0_judges_stamps_by_the_simulated_clock(graph, write_scene, start):
     start(write_scene('sim_every_sample', 'rate: 0'), '-p', 'use_sim_time:=true')
     simulation = Simulation(graph)
     simulation.run_until_heard()
@@ -144,7 +144,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize('text', SCENES)
-def test_whatever_the_clock_says_the_node_goes_on(graph, folder, write_scene, start, text):
+def test_node_survives_any_clock_message(graph, folder, write_scene, start, text):
     name = text.replace(' ', '_')
     scene = f'{SCENES[text]}\nrecord: {{directory: {folder}, name: {name}}}'
     node = start(write_scene(f'clock_{name}', scene), '-p', 'use_sim_time:=true')
@@ -168,7 +168,7 @@ def test_whatever_the_clock_says_the_node_goes_on(graph, folder, write_scene, st
     assert all(0 <= stamp_of(message) < (LARGEST + 1) * NS for message in simulation.heard)
 
 
-def test_without_a_clock_it_warns_and_is_stale(graph, write_scene, start):
+def test_missing_clock_is_warned_of_and_stale(graph, write_scene, start):
     node = start(
         write_scene('no_clock', 'rate: 50\ndrive: {constant_rate: {rate: 1}}'),
         *('-p', 'use_sim_time:=true', '-p', 'warning_period:=0.5'),

@@ -120,7 +120,7 @@ def told(folder):
     return json.loads(linkage(folder.parent, 'info', folder.name, '--json').stdout)
 
 
-def test_two_snapshots_that_overlap(
+def test_overlapping_snapshots_count_every_message(
     graph, tmp_path, write_scene, start, crank_swings, ask, counts
 ):
     runs = tmp_path / 'runs'
@@ -167,7 +167,7 @@ def test_two_snapshots_that_overlap(
     assert sorted(path.name for path in runs.iterdir()) == ['bag', 'bag_2']
 
 
-def test_a_run_that_ends_without_a_snapshot_says_that_nothing_was_written(
+def test_run_without_a_snapshot_reports_nothing_written(
     tmp_path, write_scene, start, crank_swings, counts
 ):
     node = start(write_scene('none', scene_text(tmp_path / 'runs', 30)))
@@ -178,7 +178,7 @@ def test_a_run_that_ends_without_a_snapshot_says_that_nothing_was_written(
     assert not (tmp_path / 'runs').exists()
 
 
-def test_linkage_run_says_what_became_of_the_memory(tmp_path, domain, write_scene):
+def test_run_prints_counts_of_the_snapshot_memory(tmp_path, domain, write_scene):
     drive = 'drive: {constant_rate: {rate: 2}}'
     scene = write_scene('shown', f'{scene_text(tmp_path / "runs", 1)}\n{drive}')
     command = [sys.executable, '-m', 'linkage_ros.cli.main', 'run', str(scene), '--plain']
@@ -211,7 +211,7 @@ def small_disk(tmp_path):
     subprocess.run(['umount', '--lazy', str(folder)], check=True)
 
 
-def test_a_full_disk_is_said_and_the_next_attempt_succeeds(
+def test_snapshot_succeeds_after_the_disk_has_room_again(
     graph, small_disk, write_scene, start, crank_swings, ask, counts
 ):
     with (small_disk / 'other').open('wb', buffering=0) as other, suppress(OSError):
@@ -240,7 +240,7 @@ def test_a_full_disk_is_said_and_the_next_attempt_succeeds(
     assert 'Traceback' not in node.log
 
 
-def test_a_disk_that_fills_half_way_keeps_what_it_took(
+def test_disk_filled_by_a_snapshot_keeps_its_part(
     small_disk, write_scene, start, crank_swings, ask, counts
 ):
     node = start(write_scene('fills', scene_text(small_disk, 60, rate=2000)))
@@ -256,7 +256,7 @@ def test_a_disk_that_fills_half_way_keeps_what_it_took(
     assert node.end() == INCOMPLETE
 
 
-def test_each_activation_has_a_memory_of_its_own(
+def test_each_activation_has_its_own_snapshot_memory(
     tmp_path, write_scene, start, change, crank_swings, ask, counts
 ):
     node = start(write_scene('lives', scene_text(tmp_path, 30)))
@@ -276,7 +276,7 @@ def test_each_activation_has_a_memory_of_its_own(
     assert node.end() == 0
 
 
-def test_a_reset_leaves_the_memory_alone(tmp_path, write_scene, start, crank_swings, ask, counts):
+def test_reset_keeps_the_snapshot_memory(tmp_path, write_scene, start, crank_swings, ask, counts):
     node = start(write_scene('reset', scene_text(tmp_path, 60)))
     wait_for(lambda: counts('In memory') > 50, 'joint states in memory')
     before = counts('In memory')
@@ -289,9 +289,7 @@ def test_a_reset_leaves_the_memory_alone(tmp_path, write_scene, start, crank_swi
     assert node.end() == 0
 
 
-def test_a_simulation_that_begins_anew_is_kept_with_what_was_before(
-    graph, tmp_path, write_scene, start, ask
-):
+def test_snapshot_keeps_messages_before_a_clock_jump(graph, tmp_path, write_scene, start, ask):
     start(write_scene('sim', scene_text(tmp_path, 3, rate=50)), '-p', 'use_sim_time:=true')
     clock = graph.publisher(Clock, '/clock')
     cranks = graph.publisher(JointState, '/crank_states')
@@ -331,7 +329,7 @@ def test_a_simulation_that_begins_anew_is_kept_with_what_was_before(
     assert replayed(tmp_path / 'bag')['verdict'] == 'identical'
 
 
-def test_the_services_begin_and_end_the_memory_too(
+def test_recording_services_start_and_stop_the_snapshot_memory(
     tmp_path, write_scene, start, crank_swings, ask, counts
 ):
     node = start(write_scene('services', scene_text(tmp_path, 30)))
@@ -351,7 +349,9 @@ def test_the_services_begin_and_end_the_memory_too(
     assert node.end() == 0
 
 
-def test_a_scene_that_keeps_nothing_in_memory(tmp_path, write_scene, start, crank_swings, ask):
+def test_scene_without_snapshot_seconds_refuses_a_snapshot(
+    tmp_path, write_scene, start, crank_swings, ask
+):
     record = f'record: {{directory: {tmp_path}, name: bag}}'
     node = start(write_scene('usual', f'rate: 100\n{record}'))
     success, message = ask()
@@ -361,7 +361,7 @@ def test_a_scene_that_keeps_nothing_in_memory(tmp_path, write_scene, start, cran
     assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == ['bag']
 
 
-def test_where_a_bag_could_not_be_packed_there_is_no_memory(
+def test_missing_lz4_is_reported_before_the_first_snapshot(
     graph, tmp_path, write_scene, start, monkeypatch
 ):
     """What can be known at the start is not found out when the snapshot is needed."""
@@ -387,7 +387,7 @@ def slow_disk(monkeypatch):
     return answer
 
 
-def test_a_run_that_ends_waits_for_its_snapshot_and_answers(tmp_path, write_scene, slow_disk):
+def test_stopping_run_finishes_its_snapshot_and_answers(tmp_path, write_scene, slow_disk):
     loop = SimpleNamespace(is_running=False, recorder=None, pipeline=SimpleNamespace(linkages=()))
     recording = RunRecording(SimpleNamespace(info=lambda _: None, error=lambda _: None))
     scene = load_scene(str(write_scene('ends', scene_text(tmp_path, 30))))

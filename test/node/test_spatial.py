@@ -63,7 +63,7 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize('linkage', RODS)
-def test_the_rods_of_a_spatial_linkage_keep_their_lengths(
+def test_rods_of_a_spatial_linkage_keep_their_lengths(
     graph, write_scene, start, folder, capsys, linkage
 ):
     record = f'record: {{directory: {folder}, name: {linkage}_bag}}'

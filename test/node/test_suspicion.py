@@ -29,7 +29,7 @@ SECOND = 10**9
         ('elliptic_trammel', [0.0, 0.1], 0),
     ],
 )
-def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, said):
+def test_crank_samples_in_degrees_are_warned_of_once(linkage, angles, said):
     pipeline = Pipeline(load_scene(linkage, ['drive={topic: {}}']))
     (line,) = pipeline.linkages
     for index, angle in enumerate(angles):
@@ -44,7 +44,7 @@ def test_a_crank_that_jumps_by_more_than_a_turn_is_told_once(linkage, angles, sa
     assert all('if these are degrees, publish radians' in each for each in lines)
 
 
-def test_messages_without_any_input_are_told():
+def test_messages_without_any_input_are_reported():
     pipeline = Pipeline(load_scene('five_bar', ['drive={topic: {}}']))
     last = JointStateWriter(['left_motor']).write(SECOND, [0.5])
     counts = Counts(chatter=[0], received=9, ignored=9, last_ignored=last)
@@ -59,7 +59,7 @@ def test_messages_without_any_input_are_told():
     )
 
 
-def test_stamps_ahead_of_the_clock_are_not_to_be_let_in_by_max_lead():
+def test_stamps_ahead_of_the_clock_suggest_arrival_stamps():
     # A crank that is let in 0.5 s ahead would be carried back by 0.5 s.
     pipeline = Pipeline(load_scene('four_bar', ['drive={topic: {}}']))
     (line,) = pipeline.linkages
@@ -81,7 +81,7 @@ def test_stamps_ahead_of_the_clock_are_not_to_be_let_in_by_max_lead():
 @pytest.mark.parametrize(
     'other', ['constant_rate: {rate: 1}', 'sine: {amplitude: 1, frequency: 1}']
 )
-def test_beside_a_linkage_under_torque_another_may_have_any_drive(tmp_path, other):
+def test_torque_linkage_shares_a_scene_with_any_drive(tmp_path, other):
     file = tmp_path / 'scene.yaml'
     file.write_text(
         'linkages:\n'

@@ -73,7 +73,7 @@ class Rig:
 
 
 @pytest.mark.parametrize('rate', [50, 0])
-def test_a_sample_that_comes_while_others_are_taken_is_not_of_the_future(rate):
+def test_sample_arriving_during_a_tick_is_not_future(rate):
     rig = Rig(rate=rate)
     for index in range(33):
         rig.send(BEGIN + (index + 1) * MS)  # stamped at the instant at which it is taken
@@ -82,7 +82,7 @@ def test_a_sample_that_comes_while_others_are_taken_is_not_of_the_future(rate):
     assert rig.counts() == ((33, 33, 0, 0, 0) if rate == 0 else (33, 1, 32, 0, 0))
 
 
-def test_the_tick_keeps_the_time_at_which_it_began():
+def test_tick_keeps_its_starting_time():
     rig = Rig()
     rig.send(BEGIN + MS)
     rig.tick(BEGIN, rig.clock)
@@ -92,7 +92,7 @@ def test_the_tick_keeps_the_time_at_which_it_began():
     assert rig.loop.counts.clock_jumps == 0
 
 
-def test_a_clock_that_goes_back_while_messages_are_taken_is_seen_by_the_next_tick():
+def test_clock_jump_during_a_tick_is_counted_next_tick():
     rig = Rig()
     rig.send(BEGIN - 5 * MS)
     rig.tick(BEGIN, lambda: BEGIN - 50 * MS)
@@ -113,7 +113,7 @@ TAKEN = {
 
 
 @pytest.mark.parametrize('kind', TAKEN)
-def test_the_counts_close(kind):
+def test_sample_counts_add_up_to_received(kind):
     messages, counts = TAKEN[kind]
     rig = Rig()
     for names in messages:
@@ -122,7 +122,7 @@ def test_the_counts_close(kind):
     assert rig.counts() == counts
 
 
-def test_of_two_linkages_each_uses_its_newest():
+def test_each_of_two_linkages_uses_its_newest_sample():
     left, right = ('left_crank_joint',), ('right_crank_joint',)
     rig = Rig(TWO)
     for names in (left, left, right, ('elbow',), left + right, right):
@@ -134,7 +134,7 @@ def test_of_two_linkages_each_uses_its_newest():
     assert rig.counts() == (6, 2, 3, 1, 0)
 
 
-def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
+def test_own_messages_of_one_linkage_are_ignored():
     rig = Rig(TWO, is_own=own_joint_states(parse_scene('t', 't', TWO_FILES)))
     rig.send(names=('left_crank_joint',))
     rig.tick(BEGIN)
@@ -149,7 +149,7 @@ def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
     assert rig.counts() == counts == (2, 2, 0, 0, 0)
 
 
-def test_where_played_time_begins_again_no_sample_is_refused():
+def test_looped_playback_rejects_no_sample():
     """As `ros2 bag play --loop --clock`: samples and /clock come a little before one another."""
     rig = Rig()
     rig.send(BEGIN + 900 * MS)
@@ -185,7 +185,7 @@ AGES = {
 
 
 @pytest.mark.parametrize('kind', AGES)
-def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
+def test_sample_too_old_on_arrival_is_counted_stale(kind):
     text, messages, expected = AGES[kind]
     rig = Rig(text)
     for names, age in messages:
@@ -201,7 +201,7 @@ def test_what_is_too_old_when_it_arrives_is_counted_as_stale(kind):
         assert c.stale_age == 100_000 * MS
 
 
-def test_at_rate_0_a_sample_is_solved_for_its_own_stamp_and_never_stale():
+def test_rate_0_uses_an_old_sample_at_its_stamp():
     rig = Rig(rate=0)
     rig.send(BEGIN - 100_000 * MS)
     rig.tick(BEGIN)
@@ -209,7 +209,7 @@ def test_at_rate_0_a_sample_is_solved_for_its_own_stamp_and_never_stale():
 
 
 @pytest.mark.parametrize('stamp', [0, 1, BEGIN - 100_000 * MS, BEGIN + 100_000 * MS])
-def test_by_arrival_no_stamp_matters(stamp):
+def test_arrival_stamps_replace_any_message_stamp(stamp):
     rig = Rig(drive='{stamp: arrival}')
     rig.send(stamp)
     rig.tick(BEGIN)
@@ -220,7 +220,7 @@ def test_by_arrival_no_stamp_matters(stamp):
     assert len(rig.published) == 2
 
 
-def test_a_tick_takes_no_more_than_the_queue_holds():
+def test_tick_takes_at_most_one_queue_of_messages():
     # One that sends faster than messages are read would hold up the tick for ever.
     rig = Rig(depth=10)
     rig.queue = Endless(rig.send)
@@ -252,7 +252,7 @@ NUMBERED = {
 
 
 @pytest.mark.parametrize('kind', NUMBERED)
-def test_what_the_middleware_lost_is_told_by_the_numbers_that_are_missing(kind):
+def test_missing_sequence_numbers_count_lost_messages(kind):
     numbers, missed = NUMBERED[kind]
     rig = Rig()
     for number in numbers:
@@ -287,7 +287,7 @@ PUBLISHERS = {
 
 
 @pytest.mark.parametrize('kind', PUBLISHERS)
-def test_two_publishers_of_one_crank_are_told_by_the_numbers_of_their_messages(kind):
+def test_sequence_numbers_reveal_two_crank_publishers(kind):
     text, messages, expected = PUBLISHERS[kind]
     rig = Rig(text)
     for names, number in messages:
@@ -298,7 +298,7 @@ def test_two_publishers_of_one_crank_are_told_by_the_numbers_of_their_messages(k
 
 
 @pytest.mark.parametrize(('numbers', 'expected'), [([1, 2, 3], 0), ([9, 1, 10, 2, 11], 2)])
-def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, expected):
+def test_sequence_numbers_reveal_another_joint_state_publisher(numbers, expected):
     rig = Rig(is_own=lambda message: b'rocker' in message)
     for number in numbers:
         rig.send(names=('coupler_joint', 'rocker_joint'), number=number)
@@ -309,7 +309,7 @@ def test_another_publisher_of_the_published_joints_is_told_likewise(numbers, exp
     assert rig.counts()[0] == len(numbers)
 
 
-def test_cells_of_many_inputs_are_made_after_the_state_is_published(monkeypatch):
+def test_hexapod_cells_are_computed_after_publishing(monkeypatch):
     closure, done, waiting = load('hexapod'), [], []
     look = Grid.look_ahead
     monkeypatch.setattr(Grid, 'look_ahead', lambda *given: done.append('cells') or look(*given))

@@ -150,9 +150,7 @@ def replays(folder):
     return all(each.recorded == each.tick.message for each in again), len(again)
 
 
-def test_the_crank_reaches_its_target_and_stays_and_is_braked_when_nobody_commands(
-    graph, folder, start, control, states
-):
+def test_controller_holds_the_crank_and_the_brake_follows(graph, folder, start, control, states):
     runs = folder / 'closed_loop'
     node = start(SCENE, '-p', f'runs_directory:={runs}')
     controller = control()
@@ -191,7 +189,7 @@ def test_the_crank_reaches_its_target_and_stays_and_is_braked_when_nobody_comman
     assert published >= len(states)
 
 
-def test_without_a_brake_it_falls_and_what_is_no_number_changes_nothing(
+def test_crank_without_a_brake_falls_and_ignores_nan(
     graph, folder, falling, start, control, states
 ):
     runs = folder / 'falls'
@@ -215,7 +213,7 @@ def test_without_a_brake_it_falls_and_what_is_no_number_changes_nothing(
     assert same
 
 
-def test_a_controller_outlives_a_clock_that_holds_no_time(graph, control):
+def test_controller_survives_an_invalid_clock(graph, control):
     controller = control('use_sim_time:=true')
     clock = graph.publisher(Clock, '/clock')
     wait_for(clock.get_subscription_count, 'a subscription to /clock')
@@ -225,7 +223,7 @@ def test_a_controller_outlives_a_clock_that_holds_no_time(graph, control):
     assert controller.end() == (0, ''), 'no complaint'
 
 
-def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, control):
+def test_controller_without_its_joint_publishes_nothing(graph, control):
     commands = graph.listen(JointState, '/crank_commands')
     states = graph.publisher(JointState, '/joint_states')
     numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -251,7 +249,7 @@ def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, 
         assert controller.end(number) == (0, '')
 
 
-def test_a_controller_of_several_joints_commands_those_that_it_hears(graph, control):
+def test_controller_commands_only_joints_with_a_state(graph, control):
     commands = graph.listen(JointState, '/crank_commands')
     states = graph.publisher(JointState, '/joint_states')
     given = ('joints:=[left, right]', 'right.target:=3.0', 'kd:=0.5', 'left.kd:=0.25')
@@ -273,7 +271,7 @@ def test_a_controller_of_several_joints_commands_those_that_it_hears(graph, cont
     assert controller.end() == (0, '')
 
 
-def test_a_controller_ends_after_its_time_and_says_what_is_wrong(control):
+def test_controller_ends_after_its_time_or_names_errors(control):
     bounded, wrong = control('seconds:=0.3'), control('kp:=-1.0')
     assert bounded.wait() == (0, '')
     code, said = wrong.wait()

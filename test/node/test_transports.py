@@ -75,7 +75,7 @@ def unsaid(monkeypatch, tmp_path):
         monkeypatch.delenv(name)
 
 
-def test_by_default_shared_memory_is_left_out(unsaid):
+def test_shared_memory_is_disabled_by_default(unsaid):
     leave_out_shared_memory()
     assert os.environ['FASTDDS_BUILTIN_TRANSPORTS'] == 'UDPv4'
 
@@ -89,13 +89,13 @@ def test_by_default_shared_memory_is_left_out(unsaid):
         ('RMW_FASTRTPS_PUBLICATION_MODE', 'ASYNCHRONOUS'),
     ],
 )
-def test_what_the_user_says_stays(unsaid, monkeypatch, name, value):
+def test_transport_settings_of_the_user_are_kept(unsaid, monkeypatch, name, value):
     monkeypatch.setenv(name, value)
     leave_out_shared_memory()
     assert {said: os.environ[said] for said in SAID if said in os.environ} == {name: value}
 
 
-def test_a_profile_in_the_working_folder_stays_in_force(unsaid):
+def test_default_profile_in_the_folder_is_kept(unsaid):
     Path('DEFAULT_FASTRTPS_PROFILES.xml').touch()
     leave_out_shared_memory()
     assert 'FASTDDS_BUILTIN_TRANSPORTS' not in os.environ
@@ -136,7 +136,7 @@ def heard_all(numbers):
     return len(numbers) > 1 and numbers == list(range(numbers[0], numbers[-1] + 1))
 
 
-def test_a_client_with_shared_memory_hears_every_message_of_a_node_without(meet):
+def test_shared_memory_client_receives_every_message(meet):
     found = meet()
     assert found['client']
     assert not found['node']
@@ -145,7 +145,7 @@ def test_a_client_with_shared_memory_hears_every_message_of_a_node_without(meet)
     assert 'may pause' not in found['log']
 
 
-def test_a_user_can_have_shared_memory_and_is_told_what_it_costs(meet):
+def test_enabled_shared_memory_is_reported_with_its_cost(meet):
     found = meet(FASTDDS_BUILTIN_TRANSPORTS='DEFAULT')
     assert found['node']
     assert heard_all(found['numbers'])
@@ -153,16 +153,14 @@ def test_a_user_can_have_shared_memory_and_is_told_what_it_costs(meet):
     assert found['log'].count('ticks may pause once') == 1
 
 
-def test_a_node_in_the_process_of_another_tells_that_it_could_not_choose(meet):
+def test_component_reports_shared_memory_of_its_process(meet):
     found = meet('-c', COMPONENT)
     assert found['node']
     assert 'FASTDDS_BUILTIN_TRANSPORTS=UDPv4' in found['tick']['Middleware']
     assert found['log'].count('ticks may pause once') == 1
 
 
-def test_where_discovery_is_local_shared_memory_comes_all_the_same_and_is_told(
-    graph, start, write_scene
-):
+def test_node_reports_shared_memory_under_local_discovery(graph, start, write_scene):
     node = start(write_scene('local', TURNING))
     (line,) = [line for line in node.log.splitlines() if 'may pause' in line]
     assert 'INFO' in line
@@ -172,7 +170,7 @@ def test_where_discovery_is_local_shared_memory_comes_all_the_same_and_is_told(
     assert 'config/fastdds/local.xml' in graph.value('tick', 'Middleware')
 
 
-def test_the_profile_that_comes_with_the_package_has_discovery_local_without_shared_memory(
+def test_shipped_profile_has_local_discovery_without_shared_memory(
     graph, start, write_scene, monkeypatch
 ):
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SYSTEM_DEFAULT')
@@ -184,7 +182,7 @@ def test_the_profile_that_comes_with_the_package_has_discovery_local_without_sha
     assert '/fastrtps_port' not in Path(f'/proc/{node.process.pid}/maps').read_text()
 
 
-def test_a_demo_has_discovery_local_without_shared_memory_and_says_nothing_of_it(folder, unsaid):
+def test_demo_has_local_discovery_without_shared_memory(folder, unsaid):
     environment = {k: v for k, v in os.environ.items() if k not in (*SAID, RANGE)}
     environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
     command = [sys.executable, '-m', 'linkage_ros', 'demo', 'bare', '--seconds', '1', '--plain']
@@ -200,7 +198,7 @@ def test_a_demo_has_discovery_local_without_shared_memory_and_says_nothing_of_it
 
 
 @pytest.mark.parametrize('name', SAID)
-def test_a_demo_leaves_the_users_transports_alone(unsaid, monkeypatch, name):
+def test_demo_keeps_transport_settings_of_the_user(unsaid, monkeypatch, name):
     monkeypatch.setenv(name, 'mine')
     monkeypatch.setenv(RANGE, 'SUBNET')
     stay_on_this_machine()

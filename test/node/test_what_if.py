@@ -108,7 +108,7 @@ CASES = [(name, linkage) for name in SCENES for linkage in ('four_bar', OPEN)
 @pytest.mark.sample(12)
 @pytest.mark.parametrize(('name', 'linkage'), CASES)
 @pytest.mark.parametrize('seed', range(2))
-def test_what_changes_nothing_gives_the_recorded_bytes(tmp_path, capsys, name, linkage, seed):
+def test_set_to_the_recorded_value_replays_to_same_bytes(tmp_path, capsys, name, linkage, seed):
     bag = busy_run(tmp_path, short(SCENES[name][0]), linkage, seed)
     account = what_if(capsys, bag, 'seed=7')
     for topic in account['topics']:
@@ -131,7 +131,7 @@ def reference(bag: Bag, scene: Scene) -> list[bytes]:
 
 @pytest.mark.parametrize('name', ['noise', 'torque'])
 @pytest.mark.parametrize('seed', range(3))
-def test_what_is_changed_moves_as_its_own_pipeline(tmp_path, capsys, name, seed):
+def test_changed_key_replays_as_its_own_pipeline(tmp_path, capsys, name, seed):
     text, setting = SCENES[name]
     bag = busy_run(tmp_path, text, 'four_bar', seed)
     what_if_bag = tmp_path / 'new'
@@ -142,7 +142,7 @@ def test_what_is_changed_moves_as_its_own_pipeline(tmp_path, capsys, name, seed)
     assert made != [m.data for m in bag.messages() if m.topic == '/joint_states']
 
 
-def test_at_another_rate_the_first_line_says_what_is_of_the_ticks(tmp_path, capsys):
+def test_replay_at_another_rate_prints_the_baseline_difference(tmp_path, capsys):
     bag = busy_run(tmp_path, SCENES['noise'][0], 'four_bar', 0)
     account = what_if(capsys, bag, 'rate=500')
     unchanged = account['unchanged']
@@ -154,7 +154,7 @@ def test_at_another_rate_the_first_line_says_what_is_of_the_ticks(tmp_path, caps
     assert first.endswith(f'ticks, by up to {greatest:.3g} rad (500 Hz instead of 1000 Hz)')
 
 
-def test_of_a_run_without_its_start_too(tmp_path, capsys):
+def test_replay_of_a_ring_reports_the_baseline_difference(tmp_path, capsys):
     bag = busy_run(tmp_path, SCENES['noise'][0], 'four_bar', 0)
     ring = rewritten(bag.path, 'ring', storage=Storage(split_seconds=0.1, keep_files=2))
     unchanged = what_if(capsys, read_bag(ring), 'seed=7')['unchanged']

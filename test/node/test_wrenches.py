@@ -68,7 +68,7 @@ def recorded(tmp_path):
 
 @pytest.mark.parametrize('jumps', [{}, {150: -90, 200: 400}], ids=['steady', 'with jumps'])
 @pytest.mark.parametrize('name', SCENES)
-def test_a_run_replays_to_the_last_byte(recorded, name, jumps):
+def test_run_with_wrenches_replays_to_the_same_bytes(recorded, name, jumps):
     done = recorded(name, resets={90}, jumps=jumps)
     (counts,) = done.loop.counts.wrenches
     assert counts.received == 53
@@ -80,7 +80,7 @@ def test_a_run_replays_to_the_last_byte(recorded, name, jumps):
 
 
 @pytest.mark.parametrize('name', SCENES)
-def test_without_its_wrenches_it_would_not(recorded, name):
+def test_run_without_its_wrenches_replays_differently(recorded, name):
     done = recorded(name)
     scene = recorded_scene(done.bag)
     others = [each for each in done.bag.messages() if each.topic != '/wrench_0']
@@ -89,7 +89,7 @@ def test_without_its_wrenches_it_would_not(recorded, name):
     assert found != [[each.recorded, *each.recorded_extras] for each in again]
 
 
-def test_a_bag_whose_account_names_more_wrenches_than_its_scene_can_be_read(recorded):
+def test_bag_with_surplus_wrench_topics_is_readable(recorded):
     done = recorded('held')
     scene = recorded_scene(done.bag)
     (scene_linkage,) = scene.linkages
@@ -104,9 +104,7 @@ def wrench(torque):
     return message
 
 
-def test_over_the_graph_a_wrench_moves_the_crank_and_what_is_no_number_is_counted(
-    graph, folder, start, write_scene
-):
+def test_wrench_topic_moves_the_crank_and_counts_nan(graph, folder, start, write_scene):
     # Valid for so long that a loaded machine does not publish too late.
     loads = LOADS.replace('0.05', '1.0')
     record = f'record: {{directory: {folder}, name: pushed}}'
@@ -144,7 +142,7 @@ def test_over_the_graph_a_wrench_moves_the_crank_and_what_is_no_number_is_counte
 
 
 @pytest.mark.parametrize('name', ['crank_commands', 'joint_states', 'diagnostics'])
-def test_a_topic_that_is_remapped_to_another_of_the_node_is_refused(start, write_scene, name):
+def test_wrench_topic_remapped_to_another_topic_is_refused(start, write_scene, name):
     scene = write_scene('clash', f'{SCENES["moved"]}{LOADS}', PENDULUM)
     node = start(scene, '-r', f'wrenches/crank:={name}', ready='')
     node.wait_for_log(f'loads.wrenches.crank.topic: /{name} is another topic of the node; write')

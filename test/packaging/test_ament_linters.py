@@ -30,7 +30,7 @@ HEADER = """\
 NAMES = ('setup.py', 'bench', 'campaigns', 'docs', 'examples', 'launch', 'linkage_ros', 'test')
 
 
-def test_all_that_is_tracked_is_linted(root):
+def test_linters_cover_every_tracked_python_folder(root):
     git = subprocess.run(
         ['git', 'ls-files', '*.py'], cwd=root, capture_output=True, text=True, check=False
     )
@@ -55,14 +55,14 @@ def linted(root, sources):
 
 @pytest.mark.linter
 @pytest.mark.timeout(300)  # it reads every file there is
-def test_flake8(linted):
+def test_flake8_reports_no_error(linted):
     flake8 = pytest.importorskip('ament_flake8.main')
     failed, errors = flake8.main_with_errors(argv=linted)
     assert not failed, '\n'.join(['', *errors])
 
 
 @pytest.mark.linter
-def test_pep257(linted, capfd, caplog):
+def test_pep257_reports_no_error(linted, capfd, caplog):
     pep257 = pytest.importorskip('ament_pep257.main')
     # It logs every file that it reads.
     caplog.set_level(logging.WARNING, 'pydocstyle.utils')
@@ -71,14 +71,14 @@ def test_pep257(linted, capfd, caplog):
 
 
 @pytest.mark.linter
-def test_copyright_by_ament(sources):
+def test_ament_copyright_reports_no_error(sources):
     # No wheel of this one exists; on a robot it is there.
     copyright_ = pytest.importorskip('ament_copyright.main')
     assert copyright_.main(argv=['.', '--exclude', 'build', 'install', 'log']) == 0
 
 
 @pytest.mark.linter
-def test_copyright(root, sources):
+def test_every_source_file_begins_with_the_licence_header(root, sources):
     files = [
         file
         for source in sources
@@ -90,7 +90,7 @@ def test_copyright(root, sources):
 
 
 @pytest.mark.linter
-def test_contributions_come_under_the_licence(root):
+def test_contributing_page_quotes_section_5_of_the_licence(root):
     # ament_copyright looks for this paragraph of the licence in CONTRIBUTING.md.
     def words(name):
         return ' '.join((root / name).read_text('utf-8').split())

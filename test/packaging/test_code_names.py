@@ -41,7 +41,7 @@ def definitions(root):
     return functions, classes
 
 
-def test_no_function_is_named_by_a_participle_or_a_preposition_alone(definitions):
+def test_function_names_contain_a_verb_or_a_noun(definitions):
     functions, _ = definitions
     vague = {
         name: places
@@ -52,6 +52,6 @@ def test_no_function_is_named_by_a_participle_or_a_preposition_alone(definitions
     assert vague == {}
 
 
-def test_no_two_classes_have_one_name(definitions):
+def test_class_names_are_unique(definitions):
     _, classes = definitions
     assert {name: places for name, places in classes.items() if len(places) > 1} == {}

@@ -49,7 +49,7 @@ def test_ros2_run_finds_the_executables(installed, name):
     assert os.access(installed / 'lib' / 'linkage_ros' / name, os.X_OK)
 
 
-def test_share_holds_what_launch_and_ament_look_for(installed, root):
+def test_share_folder_holds_config_launch_and_manifest(installed, root):
     share = installed / 'share'
     assert (share / 'ament_index/resource_index/packages/linkage_ros').is_file()
     assert (share / 'linkage_ros/package.xml').is_file()
@@ -60,7 +60,7 @@ def test_share_holds_what_launch_and_ament_look_for(installed, root):
                 assert there.read_bytes() == path.read_bytes()
 
 
-def test_the_installed_package_is_the_one_imported(workspace, installed, run):
+def test_installed_package_is_the_imported_one(workspace, installed, run):
     say = f'{sys.executable} -c "import linkage_ros; print(linkage_ros.__file__)"'
     printed = run('bash', '-c', f'source install/setup.bash && {say}', cwd=workspace)
     place = Path(printed.strip().splitlines()[-1])
@@ -68,7 +68,7 @@ def test_the_installed_package_is_the_one_imported(workspace, installed, run):
 
 
 @pytest.mark.sample(0)
-def test_colcon_test_is_clean(workspace, run):
+def test_colcon_test_passes_without_errors(workspace, run):
     # A few only: `make test` runs them all, and colcon adds nothing but its own doing.
     subset = ['test/packaging/test_launch.py', 'test/packaging/test_layering.py']
     run(

@@ -82,19 +82,19 @@ def start(launch_file):
     return start
 
 
-def test_by_default_the_node_runs_alone_with_the_installed_parameters(root, start):
+def test_launch_starts_the_node_with_installed_parameters(root, start):
     (node,) = start()
     assert node['executable'] == 'linkage_node'
     assert node['parameters'] == [str(root / 'config' / 'linkage_node.yaml'), {}]
 
 
-def test_a_scene_goes_before_that_of_the_parameter_file(start):
+def test_scene_argument_overrides_the_parameter_file(start):
     (node,) = start(scene='/scenes/mine.yaml', params_file='/mine.yaml')
     assert node['parameters'][0] == '/mine.yaml'
     assert node['parameters'][-1]['scene'] == '/scenes/mine.yaml'
 
 
-def test_arguments_reach_the_node(start):
+def test_launch_arguments_reach_the_node(start):
     (node,) = start(namespace='arm', use_sim_time='true', crank_states='joint_states')
     assert node['namespace'] == 'arm'
     assert node['parameters'][-1]['use_sim_time'] is True
@@ -112,14 +112,14 @@ def test_arguments_reach_the_node(start):
         ('0', False),
     ],
 )
-def test_a_clock_that_is_said_goes_before_that_of_the_parameter_file(start, said, meant):
+def test_use_sim_time_argument_overrides_the_parameter_file(start, said, meant):
     (node,) = start(use_sim_time=said, params_file='/mine.yaml')
     assert node['parameters'] == ['/mine.yaml', {'use_sim_time': meant}]
 
 
 @pytest.mark.parametrize('said', ['yes', 'no', 'on', 'tru', '2', ' '])
 @pytest.mark.parametrize('name', ['use_sim_time', 'robot_state_publisher'])
-def test_what_is_no_flag_is_refused(start, name, said):
+def test_launch_refuses_a_flag_that_is_not_boolean(start, name, said):
     with pytest.raises(LinkageError) as caught:
         start(**{name: said})
     assert str(caught.value) == ' '.join(
@@ -138,7 +138,7 @@ def test_what_is_no_flag_is_refused(start, name, said):
         ),
     ],
 )
-def test_a_description_that_cannot_be_read(start, tmp_path, file, reason):
+def test_launch_refuses_an_unreadable_robot_description(start, tmp_path, file, reason):
     (tmp_path / 'latin.urdf').write_bytes(b'<robot\xff')
     path = tmp_path / file
     with pytest.raises(LinkageError) as caught:
@@ -149,7 +149,7 @@ def test_a_description_that_cannot_be_read(start, tmp_path, file, reason):
 
 
 @pytest.mark.parametrize('code', [2, 1, -9, 0])
-def test_launch_ends_with_1_where_the_node_does_not_end_well(start, code):
+def test_launch_exits_with_1_after_a_node_failure(start, code):
     """
     As launch ends where an exception is handled (launch_service.py, run_async).
 
@@ -166,14 +166,14 @@ def test_launch_ends_with_1_where_the_node_does_not_end_well(start, code):
     assert handled == ([said] if code else [])
 
 
-def test_both_nodes_have_one_clock(start, root):
+def test_both_launched_nodes_share_one_clock_parameter(start, root):
     scene = root / 'config' / 'scenes' / 'bare.yaml'
     own, publisher = start(scene=str(scene), params_file='/mine.yaml', robot_state_publisher='1')
     assert own['parameters'][0] == publisher['parameters'][1] == '/mine.yaml'
     assert 'use_sim_time' not in publisher['parameters'][-1]
 
 
-def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
+def test_urdf_argument_starts_robot_state_publisher(start, tmp_path):
     urdf = tmp_path / 'robot.urdf'
     urdf.write_text('<robot name="r"/>', encoding='utf-8')
     _, publisher = start(robot_description_file=str(urdf), namespace='arm')
@@ -182,7 +182,7 @@ def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
     assert publisher['parameters'][-1]['robot_description'] == '<robot name="r"/>'
 
 
-def test_robot_state_publisher_takes_the_model_that_the_scene_makes(start, root):
+def test_robot_state_publisher_receives_the_model_of_the_scene(start, root):
     scene = root / 'config' / 'scenes' / 'two_fingers.yaml'
     _, publisher = start(scene=str(scene), robot_state_publisher='true')
     model = publisher['parameters'][-1]['robot_description']
@@ -190,12 +190,12 @@ def test_robot_state_publisher_takes_the_model_that_the_scene_makes(start, root)
     assert '<joint name="left_rocker_joint" type="revolute">' in model
 
 
-def test_without_a_scene_there_is_no_model(start):
+def test_robot_state_publisher_without_a_scene_is_refused(start):
     with pytest.raises(LinkageError, match='has no scene; name scene:=FILE too'):
         start(robot_state_publisher='true')
 
 
-def test_the_frequency_and_the_prefix_of_frames_reach_robot_state_publisher(start, root):
+def test_publish_frequency_and_frame_prefix_reach_robot_state_publisher(start, root):
     given = {'scene': str(root / 'config' / 'scenes' / 'bare.yaml'), 'robot_state_publisher': '1'}
     _, publisher = start(**given)
     first, _, last = publisher['parameters']
@@ -244,7 +244,7 @@ STREAMS = {
 
 
 @pytest.mark.parametrize('name', STREAMS)
-def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
+def test_two_streams_of_joint_states_agree_in_tf(start, root, name):
     """A broadcaster at 100 Hz, the crank at 1 rad/s; the node ticks 3 ms after it."""
     rate, publish_input, frequency, least, most = STREAMS[name]
     if frequency is None:
@@ -275,7 +275,7 @@ def test_two_streams_of_joint_states_meet_in_tf(start, root, name):
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
-def test_any_linkage_of_the_gallery_is_shown_whole(start, name):
+def test_tf_of_every_gallery_linkage_closes_its_loops(start, name):
     """What its two processes publish places every link, and the loops meet."""
     node, publisher = start(scene=name, robot_state_publisher='true')
     given = node['parameters'][-1]

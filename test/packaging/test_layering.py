@@ -204,7 +204,7 @@ def our_imports(imports):
     return [found for found in imports if found[1].split('.')[0] == PACKAGE and found[1] != faces]
 
 
-def test_every_package_has_its_height(root):
+def test_every_package_has_a_layer(root):
     packages = {
         path.stem
         for path in (root / PACKAGE).iterdir()
@@ -213,7 +213,7 @@ def test_every_package_has_its_height(root):
     assert packages - {'__init__'} <= set(HEIGHT)
 
 
-def test_imports_point_down(our_imports):
+def test_imports_point_to_lower_layers(our_imports):
     up = [
         f'{module} imports {name}'
         for module, name, _, _ in our_imports
@@ -234,7 +234,7 @@ def _face_beyond(module, importer):
     return ''
 
 
-def test_other_folders_and_tests_import_from_faces():
+def test_imports_from_other_folders_use_package_faces():
     beyond = defaultdict(list)
     for folder in (PACKAGE, 'test'):
         for path in sorted((ROOT / folder).rglob('*.py')):
@@ -250,7 +250,7 @@ def test_other_folders_and_tests_import_from_faces():
     assert all(len(beyond[module]) == 1 for module in WITHIN)
 
 
-def test_a_face_lists_what_others_import(root):
+def test_package_faces_list_only_imported_names(root):
     """No name stands in a face for nobody."""
     used = defaultdict(set)
     for folder in (PACKAGE, 'test', 'campaigns', 'bench', 'docs', 'examples'):
@@ -273,7 +273,7 @@ def test_a_long_face_says_what_to_read_first(root):
             assert {*told} <= {*names}
 
 
-def test_no_imports_run_in_a_circle(our_imports):
+def test_modules_have_no_circular_imports(our_imports):
     graph = defaultdict(set)
     for module, name, line, is_local in our_imports:
         # What a type checker alone imports runs nowhere: a function names the type that uses it.
@@ -286,7 +286,7 @@ def test_no_imports_run_in_a_circle(our_imports):
         pytest.fail(' imports '.join(reversed(error.args[1])), pytrace=False)
 
 
-def test_packages_do_not_import_each_other(our_imports):
+def test_packages_have_no_circular_imports(our_imports):
     graph = defaultdict(set)
     for module, name, _, _ in our_imports:
         if _package(name) and _package(name) != _package(module):
@@ -297,7 +297,7 @@ def test_packages_do_not_import_each_other(our_imports):
         pytest.fail(' imports '.join(reversed(error.args[1])), pytrace=False)
 
 
-def test_the_core_imports_no_tool(root):
+def test_core_imports_no_tool(root):
     found = [
         f'{module} imports {name}'
         for module, tree in _trees(root)
@@ -308,7 +308,7 @@ def test_the_core_imports_no_tool(root):
     assert not found
 
 
-def test_every_tool_is_there(root):
+def test_every_listed_tool_exists(root):
     modules = [f'{module}.' for module, _ in _trees(root)]
     assert not [
         tool
@@ -318,7 +318,7 @@ def test_every_tool_is_there(root):
     assert all(map(_is_tool, workbench.TOOLS.values()))
 
 
-def test_bag_needs_only_errors_and_files(our_imports):
+def test_bag_package_imports_only_errors_and_description(our_imports):
     known = ('', 'bag', 'errors', 'description')
     strangers = [
         f'{module} imports {name}'
@@ -328,7 +328,7 @@ def test_bag_needs_only_errors_and_files(our_imports):
     assert not strangers
 
 
-def test_kinematics_needs_only_numpy(imports):
+def test_kinematics_package_imports_only_numpy(imports):
     strangers = [
         f'{module} imports {name}'
         for module, name, _, _ in imports
@@ -338,7 +338,7 @@ def test_kinematics_needs_only_numpy(imports):
     assert not strangers
 
 
-def test_the_core_names_no_ros(imports):
+def test_core_imports_no_ros_package(imports):
     strangers = [
         f'{module} imports {name}'
         for module, name, _, _ in imports
@@ -349,7 +349,7 @@ def test_the_core_names_no_ros(imports):
     assert not strangers
 
 
-def test_local_imports_say_why(our_imports):
+def test_local_imports_have_a_reason(our_imports):
     unmarked = [
         f'{module}: {line.strip()}'
         for module, _, line, within in our_imports
@@ -361,7 +361,7 @@ def test_local_imports_say_why(our_imports):
     assert not unmarked
 
 
-def test_the_core_imports_where_there_is_no_ros(root, import_core):
+def test_core_imports_without_ros(root, import_core):
     file, count = import_core(sys.executable, skip=(*WITH_ROS, 'tools'), refuse=ROS, cwd=root)
     assert file == root / PACKAGE / '__init__.py'
     assert count > len(HEIGHTS)

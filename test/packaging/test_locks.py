@@ -65,7 +65,7 @@ def wanted(root, extra):
 
 
 @pytest.mark.parametrize('name', ['bench.txt', 'dev.txt', 'demo.txt', 'npm.txt', 'run.txt'])
-def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
+def test_lock_file_pins_one_version_with_hashes(root, name):
     found = pins(root / 'requirements' / name)
     assert found
     for pin, hashes in found:
@@ -87,7 +87,7 @@ def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
         ('run.txt', ''),
     ],
 )
-def test_a_lock_file_installs_all_that_setup_py_asks_for_once(root, name, extra, python):
+def test_lock_file_installs_every_requirement_of_setup_py(root, name, extra, python):
     installed = installed_by(root / 'requirements' / name, python)
     versions = dict(installed)
     assert len(versions) == len(installed)
@@ -99,7 +99,7 @@ def test_a_lock_file_installs_all_that_setup_py_asks_for_once(root, name, extra,
             assert requirement.specifier.contains(version), f'{requirement}: {version}; make lock'
 
 
-def test_what_is_used_at_run_time_is_bounded_on_both_sides(root):
+def test_runtime_requirements_have_lower_and_upper_bounds(root):
     for extra in USED_AT_RUN_TIME:
         for requirement in wanted(root, extra):
             operators = {each.operator for each in requirement.specifier}
@@ -107,7 +107,7 @@ def test_what_is_used_at_run_time_is_bounded_on_both_sides(root):
 
 
 @pytest.mark.parametrize('folder', ['browser', 'bag/foreign_reader'])
-def test_every_npm_package_of_the_tests_is_known_by_its_hash(root, folder):
+def test_npm_packages_of_tests_have_hashes(root, folder):
     lock = json.loads((root / 'test' / folder / 'package-lock.json').read_text('utf-8'))
     packages = {name: of for name, of in lock['packages'].items() if name}
     assert packages
@@ -116,7 +116,7 @@ def test_every_npm_package_of_the_tests_is_known_by_its_hash(root, folder):
 
 @pytest.mark.parametrize('python', PYTHONS)
 @pytest.mark.parametrize('name', ['demo.txt', 'run.txt'])
-def test_make_test_adds_to_what_make_demo_installed_and_replaces_nothing(root, name, python):
+def test_make_test_keeps_packages_of_make_demo(root, name, python):
     part, whole = (root / 'requirements' / each for each in (name, 'dev.txt'))
     assert set(installed_by(part, python)) <= set(installed_by(whole, python))
     hashes = {(pin.name, str(pin.specifier)): known for pin, known in pins(whole)}
@@ -124,7 +124,7 @@ def test_make_test_adds_to_what_make_demo_installed_and_replaces_nothing(root, n
 
 
 @pytest.mark.parametrize('python', PYTHONS)
-def test_make_bench_adds_to_what_make_test_installed_and_replaces_nothing(root, python):
+def test_make_bench_keeps_packages_of_make_test(root, python):
     part, whole = (dict(installed_by(root / 'requirements' / name, python))
                    for name in ('bench.txt', 'dev.txt'))  # fmt: skip
     assert {name: whole[name] for name in part.keys() & whole.keys()} == {
@@ -134,7 +134,7 @@ def test_make_bench_adds_to_what_make_test_installed_and_replaces_nothing(root, 
     assert {'pin', 'casadi', 'numba', 'pylinkage', 'llvmlite'}.isdisjoint(whole)
 
 
-def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
+def test_make_installs_only_by_lock_files(root):
     made = (root / 'Makefile').read_text('utf-8')
     by_hash = '--require-hashes --requirement'
     assert re.findall(r'\$\((?:PIP|UV)_INSTALL\) ([^;|}\n]*?)\s*[;|}\n]', made) == [
@@ -152,9 +152,7 @@ def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
 
 
 @pytest.mark.sample(0)
-def test_a_release_lists_itself_and_its_hard_dependencies_with_versions(
-    root, copy_checkout, tmp_path
-):
+def test_release_sbom_lists_dependencies_with_versions(root, copy_checkout, tmp_path):
     for tool in ('make', f'{sys.prefix}/bin/cyclonedx-py'):
         if shutil.which(tool) is None:
             pytest.skip(f'{tool} is not installed')
@@ -177,6 +175,6 @@ def test_a_release_lists_itself_and_its_hard_dependencies_with_versions(
     assert found.keys() >= HARD
 
 
-def test_make_demo_installs_what_serves_the_page_that_the_demo_names(root):
+def test_make_demo_installs_the_view_extra(root):
     view = {requirement.name for requirement in wanted(root, 'view')}
     assert view <= {requirement.name for requirement in wanted(root, 'demo')}

@@ -24,7 +24,7 @@ def package_xml(root):
     return ET.parse(root / 'package.xml').getroot()
 
 
-def test_one_version(root, package_xml):
+def test_package_xml_and_module_have_one_version(root, package_xml):
     text = (root / 'linkage_ros' / '__init__.py').read_text('utf-8')
     assert re.findall(r"^__version__ = '(.+)'$", text, re.MULTILINE) == [
         package_xml.findtext('version')
@@ -68,7 +68,7 @@ OF_UBUNTU = {
 """Keys that are packages of Ubuntu 24.04. (rosdistro, rosdep/python.yaml)"""
 
 
-def test_rosdep_of_the_readme_stops_at_no_key(root, package_xml):
+def test_readme_rosdep_command_skips_exactly_the_unknown_keys(root, package_xml):
     """What is no package of ROS or of Ubuntu goes to pip, which refuses on Ubuntu 24.04."""
     keys = {each.text for each in package_xml if each.tag.endswith('depend')}
     readme = (root / 'README.md').read_text('utf-8')
@@ -79,7 +79,7 @@ def test_rosdep_of_the_readme_stops_at_no_key(root, package_xml):
     assert re.search(r'\npython3 -m pip install .*--break-system-packages mcap\n', readme)
 
 
-def test_commands_that_are_not_on_the_path_of_a_robot_are_run_by_ros2(root):
+def test_readme_robot_section_uses_ros2_run(root):
     """After colcon, executables lie in lib/linkage_ros, which is on no path."""
     readme = (root / 'README.md').read_text('utf-8')
     on_a_robot = readme.partition('## On a robot')[2].partition('## ')[0]
@@ -88,7 +88,7 @@ def test_commands_that_are_not_on_the_path_of_a_robot_are_run_by_ros2(root):
     assert not re.findall(r'^(?:linkage|linkage_node|crank_source)\b', block, re.MULTILINE)
 
 
-def test_executables_go_where_ros2_run_looks(root):
+def test_executables_are_installed_to_lib_linkage_ros(root):
     config = ConfigParser()
     config.read(root / 'setup.cfg')
     assert config['develop']['script_dir'] == '$base/lib/linkage_ros'
@@ -124,7 +124,7 @@ PLUGINS = {
 }
 
 
-def test_the_plugins_of_launch_do_not_keep_pytest_from_running(root, environment, tmp_path):
+def test_launch_plugins_do_not_break_pytest(root, environment, tmp_path):
     """On a robot they load into every pytest; a newer one than Jazzy's refuses them."""
     for name, text in PLUGINS.items():
         (tmp_path / f'plugin_of_{name}.py').write_text(text)
@@ -144,7 +144,7 @@ def test_the_plugins_of_launch_do_not_keep_pytest_from_running(root, environment
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_policy_grants_no_wildcard_but_for_wrenches_of_links(root):
+def test_policy_uses_a_wildcard_for_wrenches_only(root):
     policy = ET.parse(root / 'policy.xml').getroot()
     assert (policy.tag, policy.get('version')) == ('policy', '0.2.0')
     names = [name.text for kind in ('topic', 'service') for name in policy.iter(kind)]
@@ -153,7 +153,7 @@ def test_policy_grants_no_wildcard_but_for_wrenches_of_links(root):
     assert all(re.fullmatch(r'(~?/)?[a-z_]+|wrenches/\*', name) for name in names)
 
 
-def test_what_the_readme_installs_serves_the_page_that_a_run_names(root):
+def test_readme_installs_the_view_extra(root):
     """A user who has not the `view` extra would be told of a command that does not start."""
     text = (root / 'README.md').read_text('utf-8')
     lines = re.findall(r'^pip install (.*)$', text, re.MULTILINE)

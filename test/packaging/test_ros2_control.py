@@ -44,7 +44,7 @@ def joints(system):
     }
 
 
-def test_the_joints_of_a_linkage_are_states_without_commands(expanded):
+def test_xacro_joints_have_state_interfaces_only(expanded):
     robot = expanded(
         '<xacro:linkage_ros2_control name="gripper" joints="coupler_joint rocker_joint"/>'
     )
@@ -63,7 +63,7 @@ def test_the_joints_of_a_linkage_are_states_without_commands(expanded):
     assert not list(system.iter('command_interface'))
 
 
-def test_several_linkages_topics_and_interfaces(expanded):
+def test_xacro_takes_several_linkages_topics_and_interfaces(expanded):
     robot = expanded(
         '<xacro:linkage_ros2_control name="left" joints="left_rocker_joint"'
         ' joint_states_topic="/left/states" interfaces="position"/>'

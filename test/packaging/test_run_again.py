@@ -37,7 +37,7 @@ def run(folder: Path, *typed: str) -> 'subprocess.CompletedProcess[str]':
 
 
 @pytest.mark.parametrize(('part', 'bad'), [('nodes', False), ('nodes', True), ('rest', False)])
-def test_what_failed_once_is_listed(tmp_path: Path, part: str, bad: bool) -> None:
+def test_tests_that_failed_once_are_listed(tmp_path: Path, part: str, bad: bool) -> None:
     (tmp_path / 'test_it.py').write_text(TESTS)
     (tmp_path / 'pytest.ini').write_text('[pytest]\n')
     if bad:
@@ -55,7 +55,7 @@ def test_what_failed_once_is_listed(tmp_path: Path, part: str, bad: bool) -> Non
     assert answer.returncode == int(bad or part == 'rest')
 
 
-def test_where_nothing_failed_nothing_is_said(tmp_path: Path) -> None:
+def test_run_again_without_failures_prints_nothing(tmp_path: Path) -> None:
     (tmp_path / 'test_it.py').write_text('def test_good(): pass\n')
     run(tmp_path, '-m', 'pytest', '-q', '-o', 'cache_dir=build/pytest_rest')
     answer = run(tmp_path, str(RUN_AGAIN), 'build/pytest_rest', 'build/pytest_none')

@@ -41,7 +41,7 @@ def collect(root, hidden, *places):
 FOLDERS = ['test'] if TAKES_ALL else [f'test/{name}' for name in ('fmu', 'synthesis', 'view')]
 
 
-def test_without_packages_that_have_no_key_all_other_tests_are_collected(root):
+def test_tests_without_optional_packages_are_collected(root):
     code, said = collect(root, WITHOUT_KEY, *FOLDERS)
     assert code == 0, said[-2000:]
     collected = int(re.search(r'(\d+)/\d+ tests collected', said)[1])
@@ -50,7 +50,7 @@ def test_without_packages_that_have_no_key_all_other_tests_are_collected(root):
     assert collected > 20
 
 
-def test_a_package_that_every_robot_has_is_missed_aloud(root):
+def test_missing_rosbags_fails_the_collection(root):
     code, said = collect(root, ['rosbags'], 'test/bag/test_split.py')
     assert code != 0
     assert "No module named 'rosbags'" in said

@@ -52,7 +52,7 @@ def test_core_imports_without_extras(prefix, import_core):
     assert file.is_relative_to(prefix)
 
 
-def test_share_is_what_the_checkout_has(prefix, root):
+def test_wheel_share_equals_the_checkout(prefix, root):
     share = prefix / 'share' / 'linkage_ros'
     for folder in ('config', 'launch'):
         expected, found = (
@@ -71,7 +71,7 @@ def test_share_is_what_the_checkout_has(prefix, root):
 
 
 @pytest.mark.parametrize('room', ['study', 'view', 'view/pages', 'view/report'])
-def test_what_pages_are_made_with_is_there(prefix, root, room):
+def test_wheel_holds_css_and_js_of_pages(prefix, root, room):
     packages = [folder for folder in prefix.rglob(f'linkage_ros/tools/{room}') if folder.is_dir()]
     assert len(packages) == 1
     files = [
@@ -84,12 +84,12 @@ def test_what_pages_are_made_with_is_there(prefix, root, room):
         assert (packages[0] / file.name).read_bytes() == file.read_bytes()
 
 
-def test_type_checkers_find_that_it_is_typed(prefix):
+def test_wheel_is_marked_as_typed(prefix):
     (package,) = prefix.glob('lib/python*/site-packages/linkage_ros')
     assert {'py.typed', '__init__.pyi'} <= {file.name for file in package.iterdir()}
 
 
-def test_tests_and_benchmarks_stay_out(prefix):
+def test_wheel_holds_no_tests_or_benchmarks(prefix):
     packages = {path.name for path in prefix.glob('lib/python*/site-packages/*')}
     assert not {'test', 'bench', 'examples', 'launch'} & packages
 
@@ -97,7 +97,7 @@ def test_tests_and_benchmarks_stay_out(prefix):
 @pytest.mark.parametrize(
     'name', ['linkage_node', 'linkage_relay', 'crank_source', 'pd_controller', 'linkage']
 )
-def test_executable_names_a_function_that_exists(prefix, root, name):
+def test_executable_calls_an_existing_main(prefix, root, name):
     script = (prefix / 'bin' / name).read_text('utf-8')
     module = next(
         line.split()[1] for line in script.splitlines() if line.startswith('from linkage_ros')

@@ -18,7 +18,7 @@ BIN = 1.0 / 32.0
 
 
 @given(st.lists(st.integers(0, 10**13), min_size=1, max_size=200))
-def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
+def test_tick_percentiles_equal_numpy_within_a_bin(durations):
     histogram = DurationHistogram()
     for duration in durations:
         histogram.add_duration(duration)
@@ -29,7 +29,7 @@ def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
 
 
 @pytest.mark.parametrize('percent', [50, 99])
-def test_one_late_tick_in_a_thousand_changes_no_percentile(percent):
+def test_one_late_tick_in_1000_changes_no_percentile(percent):
     histogram = DurationHistogram()
     for _ in range(999):
         histogram.add_duration(1_000)
@@ -38,11 +38,11 @@ def test_one_late_tick_in_a_thousand_changes_no_percentile(percent):
     assert histogram.percentile(100) == histogram.longest == 1_000_000
 
 
-def test_a_clock_that_steps_back_counts_as_on_time():
+def test_negative_lateness_counts_as_on_time():
     histogram = DurationHistogram()
     histogram.add_duration(-5)
     assert (histogram.count, histogram.longest, histogram.percentile(100)) == (1, 0, 0)
 
 
-def test_without_ticks_nothing_was_late():
+def test_empty_histogram_has_percentile_0():
     assert DurationHistogram().percentile(99) == 0

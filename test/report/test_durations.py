@@ -87,13 +87,13 @@ LATE = {
 
 @pytest.mark.parametrize('name', LATE)
 @pytest.mark.parametrize('piece', [1, 700, 10**6])
-def test_what_ticks_are_late_by_is_found_to_a_nanosecond(name, piece):
+def test_lateness_of_ticks_is_exact_to_a_nanosecond(name, piece):
     rate, late, numbers = LATE[name]
     times = made_late(rate, late, numbers)
     assert lateness(rate, times, piece) == pytest.approx(late, abs=1, rel=0)
 
 
-def test_a_clock_that_drifts_makes_no_tick_late():
+def test_drifting_clock_makes_no_tick_late():
     times = BEGIN + np.round(np.arange(60_000) * MS * (1 + 50e-6)).astype(np.int64)
     assert lateness(1000.0, times).max() <= 250 * MS * 50e-6 + 1
 
@@ -110,7 +110,7 @@ CLOCKS = {
 
 @pytest.mark.parametrize('name', CLOCKS)
 @pytest.mark.parametrize('piece', [1, 2, 9])
-def test_the_time_of_a_run_never_goes_back(name, piece):
+def test_run_time_never_decreases(name, piece):
     logged, disorder, expected, jumps = CLOCKS[name]
     clock = RunClock(disorder)
     pieces = pieces_of(logged, piece)
@@ -133,7 +133,7 @@ OTHER_HANDS = {
 
 
 @pytest.mark.parametrize('name', OTHER_HANDS)
-def test_what_is_recorded_by_another_hand_goes_by_the_same_clock(name):
+def test_messages_of_another_thread_follow_the_run_clock(name):
     first, table, (last, passed) = OTHER_HANDS[name]
     clock = RunClock()
     if not first:
@@ -147,13 +147,13 @@ def test_what_is_recorded_by_another_hand_goes_by_the_same_clock(name):
 
 
 @given(st.lists(st.integers(0, 2**64 - 1), max_size=30))
-def test_no_log_time_breaks_the_clock(logged):
+def test_run_clock_accepts_any_log_time(logged):
     passed = RunClock().run_times(times_of(logged))
     assert (np.diff(passed) >= 0).all()
     assert not len(passed) or passed[0] == 0
 
 
-def test_a_silence_is_longer_than_messages_are_otherwise_apart():
+def test_silence_is_longer_than_usual_message_intervals():
     lane = EventTrack()
     silences = Silences(lane, MS)
     times = np.array([*range(100), *range(104, 200), *range(206, 300)]) * MS
@@ -164,14 +164,14 @@ def test_a_silence_is_longer_than_messages_are_otherwise_apart():
     assert [(s.begin // MS, s.end // MS) for s in lane.spans] == [(199, 206), (299, 340)]
 
 
-def test_where_nothing_ever_comes_all_is_silence():
+def test_run_without_messages_is_one_silence():
     lane = EventTrack()
     Silences(lane, MS).end_run(500)
     assert [(s.begin, s.end) for s in lane.spans] == [(0, 500)]
 
 
 @given(st.lists(st.integers(0, 10**13), min_size=1, max_size=200))
-def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
+def test_histogram_percentiles_equal_numpy_within_a_bin(durations):
     found = Histogram()
     for part in pieces_of(durations, 30):
         found.add(np.array(part))
@@ -204,7 +204,7 @@ def kept(rows, cuts, most):
 
 
 @given(ROWS, CUTS, st.sampled_from([2, 4, 16, 64]))
-def test_each_interval_has_the_least_and_the_greatest_of_its_rows_in_their_order(rows, cuts, most):
+def test_intervals_hold_least_and_greatest_value_in_order(rows, cuts, most):
     values, found = kept(rows, cuts, most)
     begins, ends = found.begins // 7, found.ends // 7
     # Every row is in one interval, and no other.
@@ -226,9 +226,7 @@ def test_each_interval_has_the_least_and_the_greatest_of_its_rows_in_their_order
 
 
 @given(ROWS, CUTS, st.sampled_from([2, 4, 16, 64]))
-def test_there_are_no_more_intervals_than_there_is_room_for_and_no_row_is_lost_needlessly(
-    rows, cuts, most
-):
+def test_decimation_keeps_every_row_up_to_its_capacity(rows, cuts, most):
     values, found = kept(rows, cuts, most)
     assert len(found.begins) <= (2 * most if found.rows == 1 else most)
     assert (found.rows == 1) == (len(values) <= 2 * most)
@@ -239,21 +237,21 @@ def test_there_are_no_more_intervals_than_there_is_room_for_and_no_row_is_lost_n
 
 
 @pytest.mark.parametrize('columns', [1, 2, 6, 40, 200, most_columns(4_000_000)])
-def test_the_room_is_kept_and_used(columns):
+def test_interval_capacity_fills_the_allowed_bytes(columns):
     most = interval_capacity(columns, 4_000_000)
     assert most & (most - 1) == 0
     # Of each interval begin and end, and two values of each curve, of 8 bytes each.
     assert most * (16 * columns + 16) <= 4_000_000 < 2 * most * (16 * columns + 16)
 
 
-def test_no_more_curves_share_a_room_than_have_a_shape_left():
+def test_column_limit_leaves_256_intervals_per_curve():
     most = most_columns(4_000_000)
     assert interval_capacity(most, 4_000_000) == 256
     assert interval_capacity(most + 1, 4_000_000) < 256
 
 
 @given(st.integers(0, 400), CUTS, st.sampled_from([2, 6, 40]))
-def test_rows_at_equal_steps(count, cuts, most):
+def test_decimated_rows_have_equal_steps(count, cuts, most):
     rows = Decimation(1, most)
     edges = [0, *sorted(min(cut, count) for cut in cuts), count]
     for start, end in pairwise(edges):
@@ -266,7 +264,7 @@ def test_rows_at_equal_steps(count, cuts, most):
 
 
 @given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 50)), max_size=50))
-def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
+def test_event_track_counts_every_event_in_separate_spans(events):
     lane = EventTrack(near=100)
     time = 0
     for wait, lasting in events:
@@ -277,7 +275,7 @@ def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
         assert after.begin - before.end > 100
 
 
-def test_any_number_of_events_is_a_bounded_number_of_spans_with_bounded_texts():
+def test_event_track_bounds_spans_and_texts():
     lane = EventTrack()
     count = sample_count(1_000_000, 50_000)
     for index in range(count):
@@ -308,7 +306,7 @@ LANES = {
 
 
 @pytest.mark.parametrize('name', LANES)
-def test_events_of_a_lane_become_spans(name):
+def test_near_events_of_a_track_merge_into_spans(name):
     options, events, expected = LANES[name]
     lane = EventTrack(**options)
     for event in events:
@@ -317,7 +315,7 @@ def test_events_of_a_lane_become_spans(name):
     assert lane.count == sum(span[2] for span in expected)
 
 
-def test_ever_new_texts_take_no_more_room_than_there_is():
+def test_new_event_texts_take_bounded_space():
     lane = EventTrack()
     for time in range(5000):
         lane.add(1000 * time, 1000 * time, f'{time}<\0\udc80' * 50)
@@ -327,7 +325,7 @@ def test_ever_new_texts_take_no_more_room_than_there_is():
     assert sum(span.count for span in lane.spans) == 5000
 
 
-def test_where_the_longest_stay_the_others_are_still_counted():
+def test_track_of_longest_spans_counts_all_events():
     lane = EventTrack(longest=True, most=10)
     for time in range(100):
         lane.add(1000 * time, 1000 * time + (900 if time in (3, 50, 51) else time % 7))
@@ -340,6 +338,6 @@ def test_where_the_longest_stay_the_others_are_still_counted():
 
 
 @given(st.text() | st.floats(allow_nan=False, allow_infinity=False) | st.integers())
-def test_what_a_text_takes_on_a_page_is_no_more_than_is_said(value):
+def test_json_size_bounds_the_written_size(value):
     written = json.dumps(value, ensure_ascii=False).replace('<', r'\u003c')
     assert len(written.encode('utf-8', 'backslashreplace')) <= size_in_json(value)

@@ -59,7 +59,7 @@ MESSAGES = st.lists(
 
 
 @given(MESSAGES)
-def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
+def test_joint_state_arrays_equal_those_of_rosbags(messages):
     reader = JointStates()
     block = reader.read(messages)
     assert block.good.all()
@@ -89,7 +89,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('reason', BAD)
-def test_what_is_no_joint_state_is_left_out_and_counted(reason):
+def test_malformed_joint_states_are_left_out_and_counted(reason):
     reader = JointStates()
     block = reader.read([GOOD, *BAD[reason], GOOD])
     assert [*block.good] == [True, *(False for _ in BAD[reason]), True]
@@ -97,14 +97,14 @@ def test_what_is_no_joint_state_is_left_out_and_counted(reason):
     assert [*block.numbers[-1, 0]] == [1.0, 2.0]
 
 
-def test_a_command_may_have_efforts_alone():
+def test_command_with_efforts_only_is_read():
     reader = JointStates()
     block = reader.read([joint_state(['a'], efforts=[1.5])])
     assert block.good.all()
     assert np.array_equal(block.numbers[0], [[np.nan], [np.nan], [1.5]], equal_nan=True)
 
 
-def test_joints_beyond_what_one_could_look_at_are_counted():
+def test_joints_beyond_the_first_64_are_counted():
     many = {f'j{i}': float(i) for i in range(MOST_JOINTS + 3)}
     reader = JointStates()
     block = reader.read([state(many)] * 2)
@@ -113,7 +113,7 @@ def test_joints_beyond_what_one_could_look_at_are_counted():
     assert +reader.left_out == {'joints beyond the first 64': 6}
 
 
-def test_ever_new_layouts_do_not_take_ever_more_time():
+def test_message_layouts_beyond_the_first_64_are_left_out():
     # Of one length, each with other names.
     data = [state({f'joint_{i:05}': 1.0}) for i in range(3000)]
     reader = JointStates()
@@ -135,12 +135,12 @@ TEXTS = st.text(max_size=9).map(lambda text: text.replace('\0', ''))
     ),
     st.booleans(),
 )  # fmt: skip
-def test_diagnostics_are_read_as_rosbags_writes_them(said, little):
+def test_diagnostics_written_by_rosbags_are_read(said, little):
     expected = [(one.level, f'{one.node}: {one.task}', one.message, one.values) for one in said]
     assert [tuple(each) for each in read_statuses(diagnostics(said, little))] == expected
 
 
-def test_diagnostics_are_read_as_the_node_writes_them():
+def test_diagnostics_written_by_the_node_are_read():
     pytest.importorskip('rclpy')
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
     from rclpy.serialization import serialize_message
@@ -160,7 +160,7 @@ def test_diagnostics_are_read_as_the_node_writes_them():
     ]
 
 
-def test_damaged_diagnostics_say_nothing():
+def test_damaged_diagnostics_give_no_status():
     assert read_statuses(diagnostics([Said(0, '', {})] * 10_001)) == []
     whole = diagnostics([Said(0, 'tick', {'a': 'b'}, 2, 'late'), Said(0, 'crank', {})])
     assert len(read_statuses(whole)) == 2
@@ -199,7 +199,7 @@ def small():
 
 
 @given(BLOCK_MESSAGES, st.sets(st.sampled_from(BLOCK_NAMES)))
-def test_every_wanted_message_is_in_one_block_in_its_place(messages, wanted):
+def test_blocks_hold_every_wanted_message_in_order(messages, wanted):
     found, counts = [], []
     reader = Blocks(bag_of(messages), wanted, Progress(counts.append))
     for block in reader:
@@ -212,7 +212,7 @@ def test_every_wanted_message_is_in_one_block_in_its_place(messages, wanted):
 
 
 @given(BLOCK_MESSAGES)
-def test_a_tick_is_in_one_block_unless_it_is_larger_than_any(messages):
+def test_tick_lies_within_one_block(messages):
     blocks = [
         sorted((number, log, len(data)) for own in block.values() for number, log, _, data in own)
         for block in Blocks(bag_of(messages), (*BLOCK_NAMES, '/not in the index'), Progress())
@@ -230,7 +230,7 @@ def test_a_tick_is_in_one_block_unless_it_is_larger_than_any(messages):
 
 
 @pytest.mark.parametrize('harm', ['cut in a chunk', 'a damaged chunk', 'without an end', 'none'])
-def test_counts_are_those_of_info_for_a_harmed_bag_too(tmp_path, harm):
+def test_block_counts_of_a_damaged_bag_equal_info(tmp_path, harm):
     folder = recorded(tmp_path, 'effects: {velocity: {}}\n').path
     (file,) = folder.glob('*.mcap')
     content = bytearray(file.read_bytes())
@@ -252,7 +252,7 @@ def test_counts_are_those_of_info_for_a_harmed_bag_too(tmp_path, harm):
     assert bool(reader.count_contents().damage) == (harm == 'a damaged chunk')
 
 
-def test_a_wish_to_stop_ends_the_reading_at_the_next_block():
+def test_stop_ends_reading_at_the_next_block():
     messages = [BagMessage('/a', index, 0, b'') for index in range(100)]
     reader = Blocks(bag_of(messages), ['/a'], Progress(stopped=lambda: True))
     assert sum(len(block['/a']) for block in reader) == 8

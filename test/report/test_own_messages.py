@@ -38,7 +38,7 @@ from ..support.scenes import four_bar_text
 # Curves agree with the messages of a run; implausible numbers break nothing.
 
 
-def test_ticks_are_late_by_what_they_were_late(tmp_path):
+def test_report_shows_the_lateness_of_ticks(tmp_path):
     late = np.random.default_rng(7).integers(0, 300_000, 1000)
     late[::10] = 0
     moments = but(
@@ -51,7 +51,7 @@ def test_ticks_are_late_by_what_they_were_late(tmp_path):
     assert found.lateness.count == 1000
 
 
-def test_curves_are_what_messages_say(tmp_path):
+def test_report_curves_equal_the_recorded_joint_states(tmp_path):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
     found = read(bag)
     states = [
@@ -66,7 +66,7 @@ def test_curves_are_what_messages_say(tmp_path):
     assert curve(found, 'crank_joint', 'position')[1] == [0.007 * tick for tick in range(1000)]
 
 
-def test_torque_commands_are_samples_of_efforts(tmp_path):
+def test_report_shows_torque_commands_as_efforts(tmp_path):
     linkage = FOUR_BAR_WITH_MASSES
     command = JointStateWriter(['crank_joint']).write
 
@@ -84,7 +84,7 @@ FOUR_BAR_WITH_MASSES = four_bar_text(0.04, 0.12, 0.08, 0.1, [(0.1, 0, 1e-5)] * 3
 
 
 @pytest.mark.parametrize('value', [nan, inf, -inf, 1e308])
-def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
+def test_report_page_survives_infinite_and_nan_values(tmp_path, value):
     pytest.importorskip('plotly')
     moments = but(50, lambda tick, m: m)
     bag = recorded(tmp_path, 'effects: {velocity: {}}\nfaults: {n: {not_a_number: {}}}\n', moments)
@@ -106,7 +106,7 @@ def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
 # The diagnostics of a run: lost ticks, dropped messages, warnings, and when it ended.
 
 
-def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
+def test_report_shows_diagnostic_counts_since_the_last_message(tmp_path):
     said = [
         Said(100.3, 'tick', {'Lost ticks': 2}),
         Said(200.3, 'tick', {'Lost ticks': 2}),
@@ -139,7 +139,7 @@ def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
     assert ('motor', 'Lost ticks') not in found.last_values
 
 
-def test_diagnostics_tell_how_long_a_run_went_on_without_a_joint_state(tmp_path):
+def test_report_shows_silence_up_to_the_last_diagnostics(tmp_path):
     moments = but(1000, without_samples(300, 999))
     said = [Said(ms, 'crank', {}, 3, 'No crank') for ms in (1000.0, 2000.0, 3000.0)]
     found = read(recorded(tmp_path, SHORT_MEMORY, moments, said=said))
@@ -151,7 +151,7 @@ def test_diagnostics_tell_how_long_a_run_went_on_without_a_joint_state(tmp_path)
     }
 
 
-def test_a_bag_begun_in_mid_run_does_not_tell_what_was_lost_before(tmp_path):
+def test_report_of_a_mid_run_bag_omits_earlier_losses(tmp_path):
     bag = recorded(tmp_path, said=[Said(100, 'tick', {'Lost ticks': 50}),
                                    Said(200, 'tick', {'Lost ticks': 53})])  # fmt: skip
     begun = bag.attachments['run.json'].replace(b'{', b'{"begun": "mid-run", ', 1)
@@ -159,7 +159,7 @@ def test_a_bag_begun_in_mid_run_does_not_tell_what_was_lost_before(tmp_path):
     assert on_lanes(read(bag)) == {'lost': [(100, 200, 3, '')]}
 
 
-def test_ever_new_diagnostics_take_no_ever_growing_room(tmp_path):
+def test_diagnostics_with_new_keys_take_bounded_space(tmp_path):
     said = [
         Said(ms, 'tick', {f'{ms} {n}': 'x' * 1000 for n in range(100)}, 1, f'{ms}' * 200)
         for ms in range(100)
@@ -170,7 +170,7 @@ def test_ever_new_diagnostics_take_no_ever_growing_room(tmp_path):
     assert sum(span[2] for span in on_lanes(found)['health']) == 100
 
 
-def test_the_counts_that_are_followed_are_those_that_the_node_tells():
+def test_report_follows_counts_that_the_node_publishes():
     pytest.importorskip('diagnostic_msgs')
     from linkage_ros.node import diagnostics  # local import: needs rclpy
 
@@ -180,7 +180,7 @@ def test_the_counts_that_are_followed_are_those_that_the_node_tells():
     assert "f'Dropped: {topic.name}'" in source
 
 
-def test_what_could_not_be_known_is_not_said_to_be_none(tmp_path):
+def test_report_without_diagnostics_has_no_track_of_losses(tmp_path):
     assert {*read(recorded(tmp_path)).event_tracks} == {
         'silent',
         'jump',
@@ -216,7 +216,7 @@ REJECTED = {
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('reason', REJECTED)
-def test_samples_are_rejected_for_the_reason_for_which_the_drive_did(tmp_path, reason):
+def test_report_names_the_reason_of_rejected_samples(tmp_path, reason):
     bad = REJECTED[reason]
     moments = but(
         1000,
@@ -235,7 +235,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize('kind', OTHERS)
-def test_messages_of_other_robots_are_not_rejected(tmp_path, kind):
+def test_report_does_not_count_other_joints_as_rejected(tmp_path, kind):
     moments = but(100, lambda tick, m: m._replace(messages=(OTHERS[kind], *m.messages)))
     found = read(recorded(tmp_path, '', moments))
     assert on_lanes(found) == {}
@@ -243,7 +243,7 @@ def test_messages_of_other_robots_are_not_rejected(tmp_path, kind):
     assert found.left_out['samples', 'of other joints'] == 100
 
 
-def test_what_is_rejected_is_told_apart_and_counted(tmp_path):
+def test_rejected_samples_are_shown_by_reason_and_counted(tmp_path):
     bad = {
         **dict.fromkeys((100, 110, 125), REJECTED['malformed message']),
         **dict.fromkeys((126, 200), REJECTED['crank joint named twice']),
@@ -262,7 +262,7 @@ def test_what_is_rejected_is_told_apart_and_counted(tmp_path):
     assert found.rejected == {'malformed message': 3, 'crank joint named twice': 2}
 
 
-def test_the_age_of_the_input_is_the_ticks_time_less_the_newest_stamp(tmp_path):
+def test_input_age_is_tick_time_minus_newest_stamp(tmp_path):
     # A sample every 10 ticks, 3 ms old when it comes.
     moments = but(
         100,
@@ -277,7 +277,7 @@ def test_the_age_of_the_input_is_the_ticks_time_less_the_newest_stamp(tmp_path):
     assert (found.age.count, found.age.least, found.age.greatest) == (100, 3 * MS, 12 * MS)
 
 
-def test_an_age_is_negative_where_a_stamp_is_ahead_of_the_clock(tmp_path):
+def test_input_age_of_a_future_stamp_is_negative(tmp_path):
     moments = but(50, lambda tick, m: m._replace(messages=(sample(tick + 2, 0.1),)))
     found = read(recorded(tmp_path, '', moments))
     assert curve(found, 'input', 'age')[1] == pytest.approx([-2.0] * 50)
@@ -287,14 +287,14 @@ def test_an_age_is_negative_where_a_stamp_is_ahead_of_the_clock(tmp_path):
     assert (spread['counts'], spread['percentiles']['p50']) == ([50], -0.002)
 
 
-def test_between_two_samples_the_crank_is_carried_forward(tmp_path):
+def test_report_carries_the_crank_forward_between_samples(tmp_path):
     moments = but(100, lambda tick, m: m if tick % 10 == 0 else m._replace(messages=()))
     found = read(recorded(tmp_path, '', moments))
     crank = found.frames.values['crank_joint']
     assert crank == pytest.approx([0.007 * tick for tick in range(100)], abs=1e-12)
 
 
-def test_a_run_by_samples_has_no_lateness(tmp_path):
+def test_run_at_rate_0_has_no_lateness(tmp_path):
     found = read(recorded(tmp_path, 'rate: 0\n', map(turning, range(200))))
     assert found.lateness is None
     assert curve(found, 'input', 'age')[1] == pytest.approx([0.0] * 200)

@@ -148,9 +148,7 @@ HAPPENS = {
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('block', [8192, 64])
 @pytest.mark.parametrize('name', HAPPENS)
-def test_what_happens_is_on_its_lane_at_its_time_and_nothing_on_the_others(
-    tmp_path, monkeypatch, name, block
-):
+def test_event_appears_on_its_track_at_its_time(tmp_path, monkeypatch, name, block):
     monkeypatch.setattr('linkage_ros.tools.view.report.blocks._MOST_MESSAGES', block)
     scene, changed, linkage, expected = HAPPENS[name]
     ticks = 16 if linkage == FLAT else 1000
@@ -159,7 +157,7 @@ def test_what_happens_is_on_its_lane_at_its_time_and_nothing_on_the_others(
     assert on_lanes(read(recorded(tmp_path, scene, moments, **more))) == expected
 
 
-def test_blocks_make_no_difference(tmp_path, monkeypatch):
+def test_report_is_independent_of_the_block_size(tmp_path, monkeypatch):
     late = np.random.default_rng(7).integers(0, 90_000, 1000)
     moments = but(
         1000,
@@ -247,9 +245,7 @@ BEGUN_LATER = {
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('block', [8192, 1])
 @pytest.mark.parametrize('name', BEGUN_LATER)
-def test_a_fault_that_was_on_before_the_bag_is_on_from_its_begin(
-    tmp_path, monkeypatch, name, block
-):
+def test_fault_begun_before_the_bag_starts_with_it(tmp_path, monkeypatch, name, block):
     monkeypatch.setattr('linkage_ros.tools.view.report.blocks._MOST_MESSAGES', block)
     changed, said, expected = BEGUN_LATER[name]
     bag = recorded(tmp_path, QUIET, but(1000, changed), said=said)
@@ -257,12 +253,12 @@ def test_a_fault_that_was_on_before_the_bag_is_on_from_its_begin(
     assert found.get('fault', []) == expected
 
 
-def test_of_a_whole_run_no_fault_was_on_before(tmp_path):
+def test_whole_run_shows_no_earlier_fault(tmp_path):
     moments = but(1000, asking(tick_500=('quiet', False)))
     assert 'fault' not in on_lanes(read(recorded(tmp_path, QUIET, moments)))
 
 
-def test_of_several_linkages_each_has_its_own_silence(tmp_path):
+def test_each_of_two_linkages_has_its_own_silence(tmp_path):
     found = read(recorded(tmp_path, TWO, but(1000, both)))
     # The other's sample is held for 0.2 s.
     assert on_lanes(found) == {'silent': [(499, 700, 1, 'right')]}
@@ -270,7 +266,7 @@ def test_of_several_linkages_each_has_its_own_silence(tmp_path):
     assert (left.silent.count, right.silent.count) == (0, 1)
 
 
-def test_a_part_has_what_is_within_and_the_counts_of_all(tmp_path):
+def test_report_part_holds_its_events_and_counts_of_all(tmp_path):
     bag = recorded(
         tmp_path, QUIET, but(1000, asking(tick_200=('quiet', True), tick_500=('quiet', False)))
     )
@@ -308,7 +304,7 @@ def foreign(folder, rows, kind=STATE):
     return found
 
 
-def test_joints_of_several_topics_are_told_apart(tmp_path):
+def test_joints_of_two_topics_have_separate_curves(tmp_path):
     rows = []
     for ms in range(100):
         rows += [('/arm', ms, state({'a': ms, 'b': -ms}, [1.0, 2.0]))]
@@ -334,7 +330,7 @@ def test_joints_of_several_topics_are_told_apart(tmp_path):
     assert '"name":"a on /hand"' in page
 
 
-def test_joints_that_turn_up_later_are_counted(tmp_path):
+def test_joints_appearing_later_are_left_out_and_counted(tmp_path):
     rows = [('/j', ms, state({'a': 1.0} if ms < 9000 else {'a': 1.0, 'b': 2.0}))
             for ms in range(10_000)]  # fmt: skip
     found = foreign(tmp_path, rows)
@@ -362,14 +358,14 @@ TIMES = {
 
 
 @pytest.mark.parametrize('name', TIMES)
-def test_the_time_of_one_topic_goes_on(tmp_path, name):
+def test_run_time_of_one_topic_continues_after_jumps(tmp_path, name):
     logged, times, lanes = TIMES[name]
     found = foreign(tmp_path, [('/j', ms, state({'a': float(ms)})) for ms in logged])
     assert curve(found, 'a', 'position') == (times or logged, logged)
     assert on_lanes(found) == lanes
 
 
-def test_what_cannot_be_read_is_counted_by_topic(tmp_path):
+def test_unreadable_messages_are_counted_by_topic(tmp_path):
     rows = [('/j', 0, GOOD), ('/j', 1, TWICE), ('/j', 2, b'no'), ('/k', 3, b'')]
     found = foreign(tmp_path, rows)
     assert found.curves[0].rows == 1
@@ -380,7 +376,7 @@ def test_what_cannot_be_read_is_counted_by_topic(tmp_path):
     }
 
 
-def test_of_many_topics_the_first_are_told_and_the_others_counted(tmp_path):
+def test_topics_beyond_the_first_6_are_counted(tmp_path):
     rows = [(f'/j{n}', n, state({'a': 0.0})) for n in range(9)]
     found = foreign(tmp_path, rows)
     assert [curves.title for curves in found.curves] == [f'/j{n}' for n in range(6)]
@@ -388,7 +384,7 @@ def test_of_many_topics_the_first_are_told_and_the_others_counted(tmp_path):
     assert found.left_out == {(f'/j{n}', why): 1 for n in (6, 7, 8)}
 
 
-def test_other_topics_are_counted_and_not_drawn(tmp_path):
+def test_topics_of_other_types_are_counted_without_curves(tmp_path):
     found = foreign(tmp_path, [('/t', ms, b'abc') for ms in range(5)], 'std_msgs/msg/Empty')
     assert not found.curves
     (topic,) = found.contents.topics

@@ -121,14 +121,14 @@ def long(tmp_path_factory):
     return reader.finish_run(blocks.count_contents()), sizes
 
 
-def test_what_is_held_does_not_grow_with_the_run(long):
+def test_report_memory_does_not_grow_with_the_run(long):
     _, sizes = long
     assert len(sizes) > 25
     assert max(sizes) - sizes[2] < 10_000
     assert max(sizes) < 4e6
 
 
-def test_a_long_run_is_thinned_and_its_extremes_are_kept(long):
+def test_long_run_is_thinned_and_keeps_its_extremes(long):
     states = long[0].curves[0]
     assert states.rows == TICKS
     rows, begins, ends, first, second = states.intervals
@@ -144,7 +144,7 @@ def test_a_long_run_is_thinned_and_its_extremes_are_kept(long):
         assert told == pytest.approx([own.min(), own.max()], abs=1e-15)
 
 
-def test_its_page_says_how_much_it_holds(long):
+def test_page_of_a_long_run_names_its_thinning(long):
     page = page_of_run(long[0])
     assert 'of the moving picture one joint state of every' in page
     assert len(data_of(page)['curves']) == 4
@@ -221,7 +221,7 @@ def worst_run():
     )
 
 
-def test_the_page_of_the_worst_run_is_below_the_bound():
+def test_page_of_the_worst_run_fits_its_limit():
     run = worst_run()
     tables = [
         Table(WORST, ('a', '>b'), [(WORST, WORST)] * 5000),
@@ -239,7 +239,7 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
     assert all(len(lane['spans']) <= MOST_SPANS for lane in data['lanes'])
 
 
-def test_the_rooms_come_to_less_than_the_bound():
+def test_size_limits_of_page_parts_add_up():
     library = len(plotting_library()) + 100_000  # with what is ours of script and style
     texts = len(EVENT_TRACKS) * (MOST_TEXT + 60 * MOST_SPANS) + MOST_LINKAGES * 400 * 45
     numbers = STATE_BYTES + SAMPLE_BYTES + FORCE_BYTES + 2 * DURATION_BYTES + FRAME_BYTES
@@ -247,13 +247,13 @@ def test_the_rooms_come_to_less_than_the_bound():
     assert MOST_FRAMES * 16 < FRAME_BYTES
 
 
-def test_names_beyond_all_measure_are_refused_in_a_line(long):
+def test_oversized_names_are_refused_in_one_line(long):
     first = long[0].linkages[0]._replace(name='x' * 15_000_000)
     with pytest.raises(LinkageError, match='its page would be larger than 20 MB; shorten'):
         page_of_run(replace(long[0], linkages=[first]))
 
 
-def test_a_bag_of_hundreds_of_topics_and_joints_with_endless_names(tmp_path):
+def test_bag_of_100_topics_gives_a_bounded_page(tmp_path):
     names = [f'/{n}{"<" * 3000}' for n in range(100)]
     kind = 'sensor_msgs/msg/JointState'
     writer = BagWriter(tmp_path / 'bag', [Topic(name, kind, '', '') for name in names])
@@ -330,7 +330,7 @@ def rewritten(bag, folder, random, index):
 
 
 @pytest.mark.parametrize(('harm', 'of_all', 'few'), [(flipped, 300, 45), (rewritten, 50, 10)])
-def test_a_harmed_bag_is_told_as_far_as_it_goes_or_refused(
+def test_damaged_bag_is_reported_or_refused_in_one_line(
     bag, tmp_path, monkeypatch, harm, of_all, few
 ):
     # The library makes pages long, and nothing else.
@@ -342,7 +342,7 @@ def test_a_harmed_bag_is_told_as_far_as_it_goes_or_refused(
     assert all('\n' not in line for line in lines)
 
 
-def test_the_same_bag_makes_the_same_page(bag):
+def test_repeated_report_gives_the_same_page(bag):
     assert len({bag_page(bag, Window(), Event()) for _ in range(2)}) == 1
 
 
@@ -378,14 +378,14 @@ def damaged(good):
 
 
 @given(damaged(WHOLE) | st.builds(bytes.__add__, st.sampled_from(HEADS), st.binary(max_size=300)))
-def test_no_bytes_break_the_reader_of_diagnostics(data):
+def test_random_bytes_do_not_break_the_diagnostics_reader(data):
     for status in read_statuses(data):
         assert status.level in range(256)
         assert sum(map(len, status.values)) <= 10 * len(WHOLE)
 
 
 @given(st.lists(st.binary(max_size=200) | damaged(GOOD), max_size=8))
-def test_no_bytes_break_the_reader_of_joint_states(messages):
+def test_random_bytes_do_not_break_the_joint_state_reader(messages):
     reader = JointStates()
     block = reader.read(messages)
     assert len(block.good) == len(messages)

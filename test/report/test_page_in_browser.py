@@ -275,7 +275,7 @@ def recorded(drill_file):
 
 
 @pytest.mark.parametrize(('width', 'scheme'), [(400, 'dark'), (1600, 'light')])
-def test_it_opens_without_a_word_a_request_or_a_scroll_bar(browser, drill_file, width, scheme):
+def test_page_opens_without_errors_requests_or_scroll_bars(browser, drill_file, width, scheme):
     with quiet(browser, drill_file, width=width, color_scheme=scheme) as page:
         assert page.title() == 'Run of drill & <b>bold</b>'
         assert page.evaluate(WIDER) == []
@@ -289,7 +289,7 @@ def test_it_opens_without_a_word_a_request_or_a_scroll_bar(browser, drill_file, 
             assert page.evaluate(BROKEN) == []
 
 
-def test_it_opens_at_the_first_pose(browser, folder):
+def test_page_opens_at_the_first_pose(browser, folder):
     """A crank may come long after the run began: an empty picture would say nothing."""
     with quiet(browser, page_of(bags.drill(folder / 'late', begin=0.6))) as page:
         assert page.evaluate(PINS) is not None
@@ -297,9 +297,7 @@ def test_it_opens_at_the_first_pose(browser, folder):
         assert time == pytest.approx(0.6, abs=0.05)
 
 
-def test_light_and_dark_are_what_the_system_and_the_switch_say_and_paper_is_light(
-    browser, drill_file
-):
+def test_page_follows_light_dark_and_print_colours(browser, drill_file):
     with quiet(browser, drill_file, width=1600, color_scheme='light') as page:
 
         def looks():
@@ -334,7 +332,7 @@ def test_light_and_dark_are_what_the_system_and_the_switch_say_and_paper_is_ligh
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
-def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_file, scheme):
+def test_forced_colours_leave_pictures_and_plots_unchanged(browser, drill_file, scheme):
     with quiet(browser, drill_file, forced_colors='active', color_scheme=scheme) as page:
         assert painted_faces(page) == [scheme == 'light', scheme == 'dark']
         for place in ('canvas', '[data-plot=rates_rad] .main-svg'):
@@ -352,9 +350,7 @@ def test_colours_that_the_system_forces_leave_pictures_and_plots(browser, drill_
             assert abs(brightness(ink) - brightness(ground)) > 100
 
 
-def test_it_takes_the_width_of_its_window_and_a_foreign_font_does_not_break_it(
-    browser, drill_file
-):
+def test_page_fits_its_window_with_a_foreign_font(browser, drill_file):
     with quiet(browser, drill_file) as page:
         for width in (1600, 400, 1000):
             page.set_viewport_size({'width': width, 'height': 900})
@@ -373,7 +369,7 @@ def test_it_takes_the_width_of_its_window_and_a_foreign_font_does_not_break_it(
         assert page.evaluate('Report.number') == 1
 
 
-def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
+def test_touch_scrolls_the_page_without_zooming(browser, drill_file):
     with quiet(browser, drill_file, width=400, has_touch=True, is_mobile=True) as page:
         layout = 'document.querySelector("[data-plot=rates_rad] .plot").layout'
         assert page.evaluate(f'{layout}.xaxis.fixedrange')
@@ -386,7 +382,7 @@ def test_a_finger_scrolls_the_page_and_does_not_zoom(browser, drill_file):
 # It moves.
 
 
-def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
+def test_time_slider_shows_the_recorded_pose(drill, recorded):
     times, pins = recorded
     end = drill.evaluate('Report.whole[1]')
     draws = random.Random(8)
@@ -414,7 +410,7 @@ def test_the_bar_moves_the_pose_to_the_recorded_one(drill, recorded):
     assert readout(drill)['links come apart by'] == f'{1e3 * apart:.2f} mm'
 
 
-def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
+def test_picture_is_painted_at_the_pose(drill, recorded):
     times, pins = recorded
     drill.locator('#traces').uncheck()
 
@@ -437,7 +433,7 @@ def test_the_picture_is_painted_where_the_pose_is(drill, recorded):
 
 
 @pytest.mark.parametrize('time', [1.25, 3.4, 5.1])
-def test_where_no_joint_state_was_recorded_no_pose_is_drawn_and_the_page_says_so(drill, time):
+def test_picture_without_a_recorded_pose_names_the_gap(drill, time):
     assert INPUT_FACE in drill.evaluate(PAINTED)[0]
     drill.evaluate('(time) => Report.seek(time)', time)
     (painted,) = drill.evaluate(PAINTED)
@@ -449,7 +445,7 @@ def test_where_no_joint_state_was_recorded_no_pose_is_drawn_and_the_page_says_so
     assert 'rocker_joint' not in told
 
 
-def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
+def test_readout_prints_values_with_units_and_events(drill):
     told = readout(drill)
     assert told['time'] == '0.000000 s'
     coupler, rocker = bags.follow(bags.A, bags.B, bags.C, bags.D, 0.9 * pi * 0.003)
@@ -463,7 +459,7 @@ def test_the_readout_tells_values_with_units_and_what_is_going_on(drill):
     assert 'samples rejected: position or rate not finite' in readout(drill)['going on']
 
 
-def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_file):
+def test_playback_keeps_its_speed_and_stops_at_the_end(browser, drill_file):
     with quiet(browser, drill_file) as page:
         page.clock.install(time=0)
         page.clock.pause_at(1000)
@@ -496,7 +492,7 @@ def test_it_plays_as_fast_as_was_asked_for_and_stops_at_the_end(browser, drill_f
         assert 0 < page.evaluate('Report.time') < 0.2
 
 
-def test_buttons_and_keys_step_from_picture_to_picture(drill, recorded):
+def test_buttons_and_keys_step_between_pictures(drill, recorded):
     times, _ = recorded
     numbers = []
     for act in (
@@ -516,7 +512,7 @@ def test_buttons_and_keys_step_from_picture_to_picture(drill, recorded):
     assert drill.evaluate('Report.number') == 0
 
 
-def test_space_plays_and_pauses_unless_it_is_meant_for_something_else(drill):
+def test_space_key_plays_and_pauses_outside_of_controls(drill):
     drill.keyboard.press(' ')
     assert drill.evaluate('Report.playing')
     drill.keyboard.press(' ')
@@ -554,7 +550,7 @@ def test_each_linkage_of_a_scene_has_its_picture(browser, folder):
 # Its plots.
 
 
-def test_a_zoom_in_one_plot_is_one_in_all_and_a_double_click_shows_all_again(drill):
+def test_zoom_applies_to_all_plots_until_a_double_click(drill):
     whole = drill.evaluate('Report.whole')
     assert drill.evaluate(RANGES) == [whole] * 5
     drag(drill, 'rates_rad', 2.0, 4.0)
@@ -590,7 +586,7 @@ def drag(page, plot, begin, end):
     settle(page)
 
 
-def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
+def test_zoom_refines_the_curves_of_a_long_run(long_run):
     page, rockers = long_run
     name = ['positions_rad', 'rocker_joint']
     trace = page.evaluate(TRACE, name)
@@ -631,7 +627,7 @@ def test_a_zoom_shows_more_of_a_long_run_than_all_of_it_does(long_run):
     assert longest_step(page) < 0.5
 
 
-def test_the_pointer_tells_what_a_point_and_a_span_are(drill):
+def test_pointer_shows_values_of_points_and_spans(drill):
     trace = drill.evaluate(TRACE, ['rates_rad', 'crank_joint'])
     place = next(i for i, x in enumerate(trace['x']) if x is not None and x > 6.2)
     time, value = trace['x'][place], trace['y'][place]
@@ -655,7 +651,7 @@ def test_the_pointer_tells_what_a_point_and_a_span_are(drill):
 
 
 @pytest.mark.parametrize('y', [0.0, -2.0], ids=['between curves', 'below'])
-def test_a_click_into_a_plot_goes_there(drill, y):
+def test_click_in_a_plot_sets_the_time(drill, y):
     x, y = pixel_of(drill, 'rates_rad', 6.3, y)
     drill.mouse.click(x, y)
     assert drill.evaluate('Report.time') == pytest.approx(6.3, abs=0.05)
@@ -665,7 +661,7 @@ def test_a_click_into_a_plot_goes_there(drill, y):
     assert share == pytest.approx(6.3 / 7.98, abs=0.01)
 
 
-def test_what_happened_stands_on_the_time_line(drill, drill_file):
+def test_event_plot_shows_every_event_of_the_run(drill, drill_file):
     lanes = {lane['title']: lane['spans'] for lane in data_of(drill_file.read_text())['lanes']}
     assert set(lanes) == set(bags.DRILL_LANES)
     for title, expected in bags.DRILL_LANES.items():
@@ -688,7 +684,7 @@ def test_what_happened_stands_on_the_time_line(drill, drill_file):
     ]
 
 
-def test_a_joint_has_one_colour_in_all_plots_and_joints_have_their_own(drill):
+def test_each_joint_has_one_colour_in_all_plots(drill):
     found = {}
     for plot in ('positions_rad', 'rates_rad', 'crossed_0'):
         for trace in drill.evaluate(data_in(plot)):
@@ -717,9 +713,7 @@ def faulty_file(folder):
 
 
 @pytest.mark.parametrize('width', [400, 1600])
-def test_each_fault_is_named_at_its_bar_no_name_lies_on_another_and_wide_tables_scroll(
-    browser, faulty_file, width
-):
+def test_fault_names_do_not_overlap_and_tables_scroll(browser, faulty_file, width):
     names, file = faulty_file
     with quiet(browser, file, width=width) as page:
         told = page.locator('[data-plot=events] .annotation-text').all_text_contents()
@@ -749,7 +743,7 @@ def test_each_fault_is_named_at_its_bar_no_name_lies_on_another_and_wide_tables_
 # Its switches and keys.
 
 
-def test_the_switch_to_degrees_changes_titles_values_and_the_readout(turning):
+def test_degrees_switch_changes_titles_values_and_readout(turning):
     radians = {key: values(turning, plot=key) for key in ('positions_rad', 'rates_rad')}
     assert turning.evaluate(PLOT, 'rates_rad') == {
         'caption': 'Rates of angles [rad/s]', 'axis': '[rad/s]'
@@ -773,7 +767,7 @@ def test_the_switch_to_degrees_changes_titles_values_and_the_readout(turning):
     assert (values(turning) == radians['positions_rad']).all()
 
 
-def test_within_half_a_turn_continuous_angles_are_interrupted_where_they_jump(turning):
+def test_wrapped_curves_break_at_half_a_turn(turning):
     continuous = values(turning)
     assert np.ptp(continuous) == pytest.approx(4 * pi)
     turning.locator('#range').select_option('wrapped')
@@ -786,9 +780,7 @@ def test_within_half_a_turn_continuous_angles_are_interrupted_where_they_jump(tu
     assert readout(turning)['crank_joint'] == '1.57080 rad (90.00°)'
 
 
-def test_angles_recorded_within_a_turn_are_shown_so_until_they_are_made_continuous(
-    browser, folder
-):
+def test_recorded_wrapped_angles_are_shown_wrapped_first(browser, folder):
     with quiet(browser, page_of(bags.turning(folder / 'wrapped', 'wrapped'))) as page:
         assert page.locator('#range').input_value() == 'wrapped'
         assert np.abs(values(page)).max() <= pi
@@ -798,7 +790,7 @@ def test_angles_recorded_within_a_turn_are_shown_so_until_they_are_made_continuo
         assert values(page) == pytest.approx(expected, abs=1e-12)
 
 
-def test_every_control_is_reached_and_worked_by_keys_alone(turning):
+def test_keyboard_reaches_and_works_every_control(turning):
     reached = set()
     for _ in range(20):
         turning.keyboard.press('Tab')
@@ -842,7 +834,7 @@ HIDDEN_LEGENDS = """() => [...document.querySelectorAll('[data-plot]')]
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('width', [400, 700, 1000])
 @pytest.mark.parametrize('name', ['n{}', 'cylinder_number_{}'])
-def test_no_legend_lies_under_the_buttons(browser, tmp_path, name, width):
+def test_buttons_hide_no_legend(browser, tmp_path, name, width):
     linkages = [f'{{name: {name.format(k)}, linkage: slider_crank}}' for k in range(9)]
     scene = tmp_path / 'nine.yaml'
     scene.write_text(
@@ -859,7 +851,7 @@ def test_no_legend_lies_under_the_buttons(browser, tmp_path, name, width):
 # Bags of others.
 
 
-def test_names_that_are_markup_stay_names(browser, folder, foreign_file):
+def test_html_in_names_is_shown_as_text(browser, folder, foreign_file):
     for file in (foreign_file, page_of(bags.named(folder / 'named'))):
         with quiet(browser, file, width=400) as page:
             page.mouse.move(200, 400)
@@ -873,7 +865,7 @@ def test_names_that_are_markup_stay_names(browser, folder, foreign_file):
             assert page.evaluate('window.hit') is None
 
 
-def test_a_bag_without_a_scene_has_plots_and_no_player(browser, foreign_file):
+def test_page_without_a_scene_has_plots_and_no_player(browser, foreign_file):
     with quiet(browser, foreign_file) as page:
         assert 'No scene of linkage_ros' in page.locator('.warnings').inner_text()
         assert page.locator('canvas, .controls').count() == 0
@@ -883,7 +875,7 @@ def test_a_bag_without_a_scene_has_plots_and_no_player(browser, foreign_file):
         assert ranges[0] == ranges[1] == pytest.approx([0.5, 1.0], abs=0.02)
 
 
-def test_a_bag_without_a_message_says_so(browser, folder):
+def test_page_of_an_empty_bag_names_the_missing_messages(browser, folder):
     with quiet(browser, page_of(bags.empty(folder / 'empty'))) as page:
         text = page.locator('body').inner_text()
         assert 'The bag holds no messages.' in text

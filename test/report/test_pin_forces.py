@@ -41,7 +41,7 @@ def press(tmp_path_factory):
     return recorded(tmp_path_factory.mktemp('press'), SCENE, moments, linkage)
 
 
-def test_the_magnitude_of_each_recorded_force_is_plotted(press):
+def test_report_plots_the_magnitude_of_each_pin_force(press):
     reader = MessageValues(WRENCHES)
     messages = [reader.read(each.data) for each in press.messages() if each.topic == FORCES]
     assert len(messages) == 200
@@ -56,7 +56,7 @@ def test_the_magnitude_of_each_recorded_force_is_plotted(press):
     assert plot['unit'] == 'N'
 
 
-def test_plots_of_zeros_are_named_instead(press):
+def test_report_names_plots_of_zeros_without_drawing(press):
     found = read(press)
     # Only the crank is driven: the effort of the sliding joint is zero.
     assert zero_plots(found) == ['Forces']
@@ -74,7 +74,7 @@ def collected(*messages):
     return forces
 
 
-def test_of_several_linkages_each_has_its_own_topic(tmp_path):
+def test_two_linkages_have_separate_pin_force_curves(tmp_path):
     scene = f"""
 linkages:
 - {{name: left, linkage: l.yaml, {SCENE.replace(chr(10), ', ')}}}
@@ -90,7 +90,7 @@ linkages:
     assert curve(found, 'right_A', 'force') == curve(found, 'left_A', 'force')
 
 
-def test_moments_have_a_curve_where_there_are_any():
+def test_pin_moments_are_plotted_where_any_is_nonzero():
     write = JointWrenchWriter(['pin', 'slider'], planar=True).write
     curves = collected(*((time, write(BEGIN, [(3.0, 4.0, 0.0), (0.0, 1.0, -2.0)]))
                          for time in range(5))).build_curves()  # fmt: skip
@@ -100,7 +100,7 @@ def test_moments_have_a_curve_where_there_are_any():
     assert curves.intervals.first.tolist() == [[5.0, 1.0, -2.0]] * 5
 
 
-def test_messages_of_two_linkages_at_one_time_are_one_row():
+def test_pin_forces_of_one_time_share_a_row():
     left, right = (
         JointWrenchWriter([name], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)]) for name in 'ab'
     )
@@ -111,7 +111,7 @@ def test_messages_of_two_linkages_at_one_time_are_one_row():
     np.testing.assert_equal(curves.intervals.first, [[np.nan, 1.0], [1.0, 1.0], [1.0, np.nan]])
 
 
-def test_other_messages_are_counted_and_left_out():
+def test_malformed_pin_forces_are_left_out_and_counted():
     good = JointWrenchWriter(['a'], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)])
     other = JointWrenchWriter(['b'], planar=True).write(BEGIN, [(1.0, 0.0, 0.0)])
     forces = collected((1, b'no message'), (2, good), (3, other))
@@ -119,7 +119,7 @@ def test_other_messages_are_counted_and_left_out():
     assert forces.build_curves().rows == 2
 
 
-def test_wrenches_on_links_are_plotted_as_they_were_recorded(tmp_path):
+def test_report_plots_recorded_wrenches_on_links(tmp_path):
     def pushed(row, moment):
         wrenches = [(0, wrench_stamped(3.0 * row, 4.0 * row, 0.0))] if row % 2 else []
         wrenches += [(1, wrench_stamped(0.0, -1.0, 0.1 * row))] if row % 5 == 0 else []

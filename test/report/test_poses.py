@@ -68,7 +68,7 @@ def some(closure):
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_points_are_where_the_closure_has_them(file):
+def test_report_points_equal_those_of_the_closure(file):
     closure = closure_of(file)
     inputs, positions = some(closure)
     names = [f'p_{given.joint}' for given in closure.linkage.inputs]
@@ -88,7 +88,7 @@ def test_points_are_where_the_closure_has_them(file):
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_shapes_in_frames_are_those_of_the_drawing(file):
+def test_report_shapes_equal_those_of_draw(file):
     closure = closure_of(file)
     shown = prepare_view(closure, usual_inputs(closure))
     data = drawn_in_frames(shown)
@@ -117,7 +117,7 @@ def four_bar():
     return closure_of(shipped_path('linkages/four_bar.yaml'))
 
 
-def test_a_wrong_sensor_lets_links_come_apart_by_what_it_is_wrong():
+def test_wrong_rocker_angle_separates_links_by_its_chord():
     closure = four_bar()
     position = closure.position(1.0)
     values = published(closure, [position] * 2, [(1.0,)] * 2)
@@ -128,7 +128,7 @@ def test_a_wrong_sensor_lets_links_come_apart_by_what_it_is_wrong():
     assert found.apart == pytest.approx([0.0, 2 * rocker * np.sin(0.15)], abs=1e-12)
 
 
-def test_where_a_joint_is_not_told_there_is_no_pose():
+def test_missing_joint_value_gives_no_pose():
     closure = four_bar()
     position = closure.position(1.0)
     values = published(closure, [position] * 2, [(1.0,)] * 2)
@@ -139,7 +139,7 @@ def test_where_a_joint_is_not_told_there_is_no_pose():
     assert np.isnan(found.apart[1])
 
 
-def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
+def test_undetermined_link_is_drawn_by_closing_the_loops():
     whole = four_bar()
     joints = {k: v for k, v in whole.linkage.joints.items() if k != 'coupler_joint'}
     closure = Closure(replace(whole.linkage, joints=joints))
@@ -182,7 +182,7 @@ def of(text, kind):
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_links_are_drawn_where_the_loops_close_at_the_recorded_inputs(tmp_path, file):
+def test_gallery_links_are_drawn_at_the_recorded_inputs(tmp_path, file):
     scene_file = tmp_path / 's.yaml'
     scene_file.write_text(f'linkage: {file}\n')
     scene = load_scene(scene_file)

@@ -58,7 +58,7 @@ def camera_of(page: Any) -> Camera:
     return Camera(*page.evaluate('Report.linkages[0].camera'))
 
 
-def test_the_data_are_the_places_of_the_drawing_at_the_recorded_inputs(bag):
+def test_page_places_equal_the_drawing_at_recorded_inputs(bag):
     data = data_of(page_of_run(read(bag)))
     (told,), frames = data['linkages'], data['frames']
     closure = load(WISHBONE)
@@ -76,7 +76,7 @@ def test_the_data_are_the_places_of_the_drawing_at_the_recorded_inputs(bag):
     assert np.linalg.norm(away, axis=2).max() < up
 
 
-def test_places_are_projected_as_in_the_picture_of_draw(page, canvas):
+def test_page_projects_places_as_draw_does(page, canvas):
     model = SpaceDrawing(load(WISHBONE))
     for share in (0.0, 0.3, 0.8):
         page.locator('#scrub').fill(str(round(share * 1e6)))
@@ -94,7 +94,7 @@ def test_places_are_projected_as_in_the_picture_of_draw(page, canvas):
         assert np.array(told) == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_drag_and_arrow_keys_turn_the_camera_and_the_run_stands_still(page, canvas):
+def test_drag_and_arrow_keys_turn_the_camera(page, canvas):
     first = camera_of(page)
     box = canvas.bounding_box()
     x, y = box['x'] + box['width'] / 2, box['y'] + box['height'] / 2
@@ -121,7 +121,7 @@ def test_a_drag_and_arrow_keys_turn_the_camera_and_the_run_stands_still(page, ca
     assert camera_of(page) == pytest.approx(first)
 
 
-def test_other_keys_move_the_run(page, canvas):
+def test_arrow_and_end_keys_move_the_run_time(page, canvas):
     page.keyboard.press('ArrowRight')
     assert page.evaluate('Report.number') == 1
     canvas.focus()
@@ -130,7 +130,7 @@ def test_other_keys_move_the_run(page, canvas):
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
-def test_parts_are_painted_in_the_colours_of_the_page(browser, bag, scheme):
+def test_spatial_parts_are_painted_in_page_colours(browser, bag, scheme):
     with quiet(browser, page_of(bag.path), color_scheme=scheme) as page:
         settle(page)
         ink = page.evaluate('Picture.ink()')
@@ -141,7 +141,7 @@ def test_parts_are_painted_in_the_colours_of_the_page(browser, bag, scheme):
         assert wanted <= page.evaluate(PAINTED)[0].keys()
 
 
-def test_a_linkage_that_never_closed_has_no_pose(tmp_path):
+def test_open_spatial_linkage_has_no_pose(tmp_path):
     rows = (JointStateWriter(['travel', 'rack']).write(BEGIN + tick * MS, [2.9, 0.9])
             for tick in range(50))  # fmt: skip
     ticks = (Moment(BEGIN + tick * MS, (row,)) for tick, row in enumerate(rows))

@@ -49,7 +49,7 @@ def check(data):
 @pytest.mark.sample(20)
 @pytest.mark.parametrize('write', [urdf_model, mujoco_model])
 @pytest.mark.parametrize('file', FILES, ids=lambda file: f'{file.parent.name}/{file.stem}')
-def test_what_comes_with_the_package(file, write):
+def test_shipped_models_are_one_yaml_text(file, write):
     check(model_of(str(file), write))
 
 
@@ -87,7 +87,7 @@ HOSTILE = st.lists(PIECES | LETTERS | st.just(' '), min_size=1, max_size=5).map(
 @example([f'{name}: ' for name in NAMES], 'leg: v2 # the new one')
 @example([f' #{name}' for name in NAMES], '\x00 \t\x85\u2028\udc80')
 @example([f'--{name}:' for name in NAMES], '- \n: ')
-def test_names_of_any_kind(names, robot):
+def test_models_with_odd_names_are_one_yaml_text(names, robot):
     if set(names) & {'ground', 'O4', 'coupler_joint'}:
         return
     assume(not re.search(r'\$[{(]', ''.join([*names, robot])))
@@ -104,7 +104,7 @@ EXPRESSIONS = ['${1+1}', 'a$(pwd)', '$${x}', '$$(x)', '${']
 @pytest.mark.sample(15)
 @pytest.mark.parametrize('odd', EXPRESSIONS)
 @pytest.mark.parametrize('place', range(9))
-def test_a_name_that_xacro_would_evaluate_is_refused(place, odd):
+def test_urdf_refuses_names_that_xacro_would_evaluate(place, odd):
     names = [*NAMES]
     names[place] = odd
     with pytest.raises(PartError) as caught:
@@ -116,7 +116,7 @@ def test_a_name_that_xacro_would_evaluate_is_refused(place, odd):
 
 
 @pytest.mark.parametrize('odd', EXPRESSIONS)
-def test_a_file_whose_name_xacro_would_evaluate_is_refused(odd, tmp_path):
+def test_urdf_refuses_file_names_that_xacro_would_evaluate(odd, tmp_path):
     file = tmp_path / f'{odd}.yaml'
     file.write_bytes((LINKAGES / 'four_bar.yaml').read_bytes())
     with pytest.raises(FileError) as caught:
@@ -127,11 +127,11 @@ def test_a_file_whose_name_xacro_would_evaluate_is_refused(odd, tmp_path):
 
 
 @pytest.mark.parametrize('name', ['$', '{$}', '$a', '$[x]', '{}', '()'])
-def test_a_dollar_alone_is_a_letter_of_a_name(name):
+def test_urdf_accepts_a_lone_dollar_in_names(name):
     assert name.encode() in urdf_model(name, [ModelPart(named(NAMES))])
 
 
-def test_a_file_with_an_odd_name(tmp_path):
+def test_urdf_of_an_oddly_named_file_is_yaml(tmp_path):
     file = tmp_path / 'leg: v2 \x01\udc80.yaml'
     file.write_bytes((LINKAGES / 'four_bar.yaml').read_bytes())
     data = model_of(str(file), urdf_model)
@@ -139,12 +139,12 @@ def test_a_file_with_an_odd_name(tmp_path):
     assert ET.fromstring(data).get('name') == 'leg: v2 ��'
 
 
-def test_the_macro_of_ros2_control():
+def test_ros2_control_macro_is_one_yaml_text():
     check((CONFIG / 'ros2_control' / 'linkage.ros2_control.xacro').read_bytes())
 
 
 @pytest.mark.parametrize('file', [None, *FILES[::9]], ids=str)
-def test_what_xacro_makes_of_it(file, tmp_path):
+def test_xacro_output_is_one_yaml_text(file, tmp_path):
     """As ``Command(['xacro ', file])`` in a launch file; None is the macro of ros2_control."""
     xacro = pytest.importorskip('xacro')
     robot = tmp_path / 'robot.xacro'

@@ -43,7 +43,7 @@ def values_of(closure, *inputs):
     [[], ['knee', 'ankle'], ['rotor_joint', 'knee'], ['ankle', 'rotor_joint']],
     ids=['as the file says', 'joints', 'rotor and knee', 'ankle and rotor'],
 )
-def test_a_belt_over_a_joint_turns_its_rotor_by_the_sum(tmp_path, inputs):
+def test_belt_coupling_turns_the_rotor_by_the_sum(tmp_path, inputs):
     closure = robot(tmp_path, BELT, **({'input': inputs} if inputs else {}))
     file = tmp_path / 'written.yaml'
     file.write_text(linkage_text(closure.linkage))
@@ -69,7 +69,7 @@ ratios:
 """
 
 
-def test_a_differential_pitches_by_the_sum_and_rolls_by_the_difference(tmp_path):
+def test_differential_pitch_and_roll_follow_sum_and_difference(tmp_path):
     file = tmp_path / 'differential.yaml'
     file.write_text(DIFFERENTIAL)
     closure = load(file)
@@ -88,7 +88,7 @@ def test_a_differential_pitches_by_the_sum_and_rolls_by_the_difference(tmp_path)
         (BELT.replace('successor link="rotor"', 'successor link="thigh"'), 'couples 2 and 0'),
     ],
 )
-def test_couplings_that_cannot_be_are_refused(tmp_path, text, said):
+def test_impossible_couplings_are_refused(tmp_path, text, said):
     with pytest.raises(FileError, match=said):
         robot(tmp_path, text)
 
@@ -102,7 +102,7 @@ def test_couplings_that_cannot_be_are_refused(tmp_path, text, said):
         ('{right: 0.5}', 'right', 'ratios.pitch.also'),
     ],
 )
-def test_sums_that_cannot_be_are_refused(tmp_path, old, new, said):
+def test_impossible_ratio_sums_are_refused(tmp_path, old, new, said):
     file = tmp_path / 'differential.yaml'
     file.write_text(DIFFERENTIAL.replace(old, new))
     with pytest.raises((DefinitionError, FileError), match=said):

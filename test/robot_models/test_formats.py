@@ -36,7 +36,7 @@ def assert_same_states(closure, names, states=STATES, told=ANKLE):
         )
 
 
-def test_sdf_has_the_states_of_the_urdf():
+def test_sdf_robot_has_the_states_of_the_urdf():
     closure = load(ROBOTS / 'ankle.sdf', ANKLE)
     names = {'m1': 'm1', 'm2': 'm2', 'rod1_y': 'rod1_ends_1', 'rod1_x': 'rod1_ends_2'}
     assert_same_states(closure, names)
@@ -45,7 +45,7 @@ def test_sdf_has_the_states_of_the_urdf():
     assert 'm2' not in limits  # 1e16 is none
 
 
-def test_a_frame_of_sdf_may_be_relative_to_many_others(tmp_path):
+def test_sdf_frame_chain_of_1500_is_resolved(tmp_path):
     frames = ''.join(
         f'<frame name="f{k}"><pose relative_to="f{k + 1}">1e-4 0 0 0 0 0</pose></frame>'
         for k in range(1500)
@@ -60,7 +60,7 @@ def test_a_frame_of_sdf_may_be_relative_to_many_others(tmp_path):
     assert at == pytest.approx((0.45, 0.1, -0.4), abs=1e-12)
 
 
-def test_sdf_has_its_masses_in_the_pose_of_its_model():
+def test_sdf_masses_are_read_in_the_model_pose():
     mass = load(ROBOTS / 'ankle.sdf', ANKLE).linkage.masses['rod2']
     # 0.1 below rod2 on the shin, and turned by 0.4 about x; the shin is turned in the model.
     x, y, z = np.eye(3)
@@ -117,7 +117,7 @@ def joint(name, kind, parent, child, xyz, rpy='0 0 0'):
     )
 
 
-def test_closings_beside_a_urdf_have_the_states_of_one_that_says_them(tmp_path):
+def test_closings_file_gives_the_states_of_the_urdf(tmp_path):
     closure = load(ankle_with_closings(tmp_path))
     assert [driven.joint for driven in closure.linkage.inputs] == ['pitch', 'roll']
     names = {'m1': 'm1', 'm2': 'm2', 'rod1_y': 'rod1_start_Y', 'rod1_x': 'rod1_start_X',
@@ -126,7 +126,7 @@ def test_closings_beside_a_urdf_have_the_states_of_one_that_says_them(tmp_path):
     assert 'SPHERICAL of gone, which is not a joint (not read)' in closure.linkage.left_out
 
 
-def test_a_bag_has_such_a_robot_as_one_urdf(tmp_path):
+def test_scene_stores_robot_and_closings_as_one_urdf(tmp_path):
     file = ankle_with_closings(tmp_path)
     (tmp_path / 'scene.yaml').write_text('linkage: robot.yaml\nrate: 100\n')
     scene = load_scene(tmp_path / 'scene.yaml')
@@ -165,7 +165,7 @@ def rotation(axis, angle):
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def test_mjcf_closes_as_mujoco_has_it():
+def test_mjcf_loops_close_in_mujoco():
     mujoco = pytest.importorskip('mujoco')
     closure = load(ROBOTS / 'cassie_leg.xml', {'near': True})
     assert [driven.joint for driven in closure.linkage.inputs] == ['knee', 'foot']
@@ -181,7 +181,7 @@ def test_mjcf_closes_as_mujoco_has_it():
         assert mujoco_gap(model, data, closure, (knee, foot)) < 1e-12
 
 
-def test_mjcf_ties_joints_by_polynomials_and_tendons(tmp_path):
+def test_mjcf_joint_and_tendon_equalities_become_ratios(tmp_path):
     pytest.importorskip('mujoco')
     (tmp_path / 'tied.xml').write_text("""\
 <mujoco><worldbody>
@@ -202,7 +202,7 @@ def test_mjcf_ties_joints_by_polynomials_and_tendons(tmp_path):
 
 
 @pytest.mark.parametrize('turns', [(90, -90, 90), (-90, 90, 90), (37, 143, -10)])
-def test_mjcf_may_begin_at_any_values_of_its_joints(tmp_path, turns):
+def test_mjcf_joint_reference_values_are_respected(tmp_path, turns):
     mujoco = pytest.importorskip('mujoco')
     ref = [f'ref="{turn}"' for turn in turns]
     text = f"""\
@@ -278,7 +278,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('case', REFUSED)
-def test_a_robot_that_cannot_be_read_is_refused_in_a_line(tmp_path, monkeypatch, case):
+def test_unreadable_robot_is_refused_in_one_line(tmp_path, monkeypatch, case):
     name, text, line = REFUSED[case]
     if name.endswith('.xml'):
         pytest.importorskip('mujoco')
@@ -305,7 +305,7 @@ WRONG_CLOSINGS = {
 
 
 @pytest.mark.parametrize('case', WRONG_CLOSINGS)
-def test_wrong_closings_are_refused_in_a_line(tmp_path, case):
+def test_wrong_closings_are_refused_in_one_line(tmp_path, case):
     old, new, line = WRONG_CLOSINGS[case]
     file = ankle_with_closings(tmp_path)
     assert CLOSINGS.count(old) == 1

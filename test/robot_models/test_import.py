@@ -105,7 +105,7 @@ def gripper(text=GRIPPER, **told):
     return robot_of(text, **{'close': ['bar_end=finger_end'], 'input': 'motor_joint', **told})
 
 
-def test_a_gripper_on_an_arm():
+def test_imported_gripper_closes_its_urdf_pins():
     """Its joints close the pin in the URDF itself, walked by yourdfpy, all over the range."""
     closure = gripper()
     assert closure.linkage.left_out == ('shoulder', 'mimic of finger_joint')
@@ -123,7 +123,7 @@ def test_a_gripper_on_an_arm():
         assert hypot(apart[0], apart[2]) < 1e-12 * 0.1
 
 
-def test_masses_are_laid_into_the_plane():
+def test_imported_masses_are_projected_into_the_plane():
     """What is fixed together is one body; the inertia is that about y, by hand."""
     masses = gripper().linkage.masses
     assert set(masses) == {'motor', 'bar', 'finger'}
@@ -142,14 +142,14 @@ def test_masses_are_laid_into_the_plane():
     assert finger.inertia == pytest.approx(expected)
 
 
-def test_signs_are_those_of_the_urdf():
+def test_imported_joints_keep_the_urdf_signs():
     """From x to z is about −y, as the axis of the bar; the finger's frame is turned round."""
     joints = gripper().linkage.joints
     assert joints['bar_joint'] == RevoluteJoint('motor', 'bar', LIMITS)
     assert joints['finger_joint'] == RevoluteJoint('finger', 'ground', LIMITS)
 
 
-def test_a_pose_says_the_side():
+def test_import_pose_selects_the_assembly():
     """Of the same URDF with another zero, a pose in which the pins meet has to be told."""
     turned = GRIPPER.replace(
         'xyz="0.05 0 0" rpy="0 0 3.14159265358979"', 'xyz="0.05 0 0" rpy="0 0.5 3.14159265358979"'
@@ -169,7 +169,7 @@ FOLDED = """<robot name="r">
 
 
 @pytest.mark.parametrize('turned', [0.0, 1.0, -1.0, 2.5, pi])
-def test_links_of_a_parallelogram_stay_parallel_wherever_it_is_drawn(turned):
+def test_imported_parallelogram_links_stay_parallel(turned):
     """Also drawn flat, where two assemblies meet: by the sums of angles."""
     parts = [
         joint('crank_joint', 'base', 'crank', '0 0 0', f'0 0 {turned}', axis='0 0 1'),
@@ -231,7 +231,7 @@ PINS = {
 
 @pytest.mark.parametrize('floor', ['0 0 0', '0.3 0.2 0.1'])
 @pytest.mark.parametrize('tags', PINS)
-def test_pins_of_simulators_close_a_loop(tags, floor):
+def test_simulator_pin_tags_close_a_loop(tags, floor):
     """Gazebo's are where they are with all joints at 0: frames are turned so, on any floor."""
     at = closed_values(0.5)
     turned = ''.join(map(LINK, ('base', 'floor', 'crank', 'coupler', 'rocker')))
@@ -260,7 +260,7 @@ UNREAD = {
 
 
 @pytest.mark.parametrize('tags', UNREAD)
-def test_tags_that_are_not_read_are_named(tags):
+def test_unread_urdf_tags_are_listed(tags):
     told = {'input': 'crank_joint', 'at': closed_values(0.5)}
     linkage = robot_of(robot(TREE, tags), close=['='.join(PLACES)], **told).linkage
     assert linkage.left_out == (f'{UNREAD[tags]} (not read)',)
@@ -268,7 +268,7 @@ def test_tags_that_are_not_read_are_named(tags):
         robot_of(robot(TREE, tags), **told)
 
 
-def test_usual_tags_are_no_loops():
+def test_common_urdf_tags_are_ignored():
     tags = '<material name="m"/><transmission name="t"/><gazebo reference="crank"/><!-- -->'
     told = {'input': 'crank_joint', 'at': closed_values(0.5)}
     assert robot_of(robot(TREE, tags, LOOP_CONSTRAINT), **told).linkage.left_out == ()
@@ -349,7 +349,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('name', BAD)
-def test_what_is_no_linkage(name):
+def test_urdf_that_gives_no_linkage_is_refused(name):
     text, message, *close = BAD[name]
     with pytest.raises(FileError) as caught:
         robot_of(text, close=close[0] if close else ['a=b'], input='j')
@@ -364,14 +364,14 @@ def test_what_is_no_linkage(name):
         ({'input': 'k'}, "r.urdf: input: 'k' follows 'j'; drive 'j'"),
     ],
 )
-def test_what_joints_that_mimic_follow_has_to_be_said(told, line):
+def test_mimic_robot_needs_a_named_input(told, line):
     gear = joint('k', 'base', 'b', '1 0 0', axis='0 0 1', more='<mimic joint="j"/>')
     with pytest.raises(FileError, match=f'^{line}$'):
         robot_of(robot(A_B, FLAT, gear), **told)
     assert robot_of(robot(A_B, FLAT, gear), input='j').linkage.ratios.keys() == {'k'}
 
 
-def test_what_drives_it_has_to_be_said():
+def test_import_without_a_valid_input_is_refused():
     with pytest.raises(FileError, match='drives it; write --input motor_joint, or --input bar_j'):
         gripper(input=[])
     with pytest.raises(FileError, match="no moving joint 'motor'; did you mean 'motor_joint'"):
@@ -385,7 +385,7 @@ def test_what_drives_it_has_to_be_said():
 class TestCommand:
     """``linkage urdf``, ``linkage mjcf`` and ``linkage import``, as they are typed."""
 
-    def test_there_and_back(self, tmp_path, capsys):
+    def test_urdf_and_import_commands_round_trip(self, tmp_path, capsys):
         model, file = tmp_path / 'leg.urdf', tmp_path / 'leg.yaml'
         assert main(['urdf', str(LINKAGES / 'jansen_leg.yaml'), '-o', str(model)]) == 0
         assert main(['import', str(model), '-o', str(file)]) == 0
@@ -397,7 +397,7 @@ class TestCommand:
         assert '<mujoco model="leg">' in capsys.readouterr().out
         assert [path.name for path in tmp_path.iterdir() if path.name.startswith('.')] == []
 
-    def test_models_of_others_become_linkages(self, tmp_path, capsys):
+    def test_import_command_converts_a_foreign_urdf(self, tmp_path, capsys):
         file = tmp_path / 'g.urdf'
         file.write_text(GRIPPER)
         typed = ['import', str(file), '--close', 'bar_end=finger_end', '--input', 'motor_joint']
@@ -415,14 +415,16 @@ class TestCommand:
             (['import', '.'], 'linkage import: .: is a folder, not a URDF; name a URDF'),
         ],
     )
-    def test_a_file_that_is_not_there(self, typed, message, capsys, tmp_path, monkeypatch):
+    def test_missing_model_file_is_refused_in_one_line(
+        self, typed, message, capsys, tmp_path, monkeypatch
+    ):
         monkeypatch.chdir(tmp_path)
         assert main(typed) == 2
         err = capsys.readouterr().err
         assert err.startswith(message)
         assert err.count('\n') == 1
 
-    def test_a_linkage_that_does_not_tell_all(self, tmp_path, capsys):
+    def test_urdf_command_refuses_undetermined_links(self, tmp_path, capsys):
         text, remedy = UNTOLD['the coupler']
         file = tmp_path / 'l.yaml'
         file.write_text(text)
@@ -432,14 +434,14 @@ class TestCommand:
         told = f'joints: the published joints do not determine where {remedy}'
         assert err == f'linkage urdf: {file}:{line}: {told}\n'
 
-    def test_where_it_cannot_be_written(self, tmp_path, capsys):
+    def test_urdf_command_refuses_an_existing_folder(self, tmp_path, capsys):
         folder = tmp_path / 'x.urdf'
         folder.mkdir()
         assert main(['urdf', str(LINKAGES / 'four_bar.yaml'), '-o', str(folder)]) == 2
         assert 'exists already; name another' in capsys.readouterr().err
 
     @pytest.mark.parametrize('typed', [['--start', 'a=b'], ['--start', 'a']])
-    def test_options_that_are_none(self, typed, capsys):
+    def test_import_command_refuses_invalid_options(self, typed, capsys):
         with pytest.raises(SystemExit) as caught:
             main(['import', 'x.urdf', *typed])
         assert caught.value.code == 2
@@ -469,7 +471,7 @@ def robot_file(folder, name):
 
 @pytest.mark.sample(12)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names(), *CHOICES])
-def test_an_imported_robot_is_the_robot_to_the_last_bit(tmp_path, name):
+def test_imported_linkage_file_equals_the_robot_exactly(tmp_path, name):
     file, told = robot_file(tmp_path, name)
     robot, again = imported(tmp_path, file, **told)
     assert type(robot) is type(again)
@@ -487,7 +489,7 @@ def test_an_imported_robot_is_the_robot_to_the_last_bit(tmp_path, name):
         assert found.joints == expected.joints
 
 
-def test_the_plane_of_a_robot_stands_in_its_file(tmp_path):
+def test_imported_file_keeps_the_plane_axes(tmp_path):
     _, closure = imported(
         tmp_path, ROBOTS / 'palletizer.urdf', input=['shoulder', 'counterweight']
     )
@@ -495,7 +497,7 @@ def test_the_plane_of_a_robot_stands_in_its_file(tmp_path):
 
 
 @pytest.mark.parametrize('command', ['check', 'view', 'mjcf', 'scene'])
-def test_a_file_that_holds_the_keys_of_a_robot_is_no_linkage(tmp_path, capsys, command):
+def test_robot_keys_in_a_linkage_file_are_refused(tmp_path, capsys, command):
     file = tmp_path / 'robot.yaml'
     file.write_text(f'urdf: {ROBOTS / "ankle.urdf"}\ninput: [pitch, roll]\n')
     assert main([command, str(file)]) == 2
@@ -504,7 +506,7 @@ def test_a_file_that_holds_the_keys_of_a_robot_is_no_linkage(tmp_path, capsys, c
     assert line in err or 'is neither a scene nor a linkage; write linkage: FILE for a' in err
 
 
-def test_moments_of_inertia_that_no_body_has_matter_to_forces_alone(tmp_path):
+def test_import_accepts_inertia_that_only_forces_refuse(tmp_path):
     """Exporters write some for a link without a shape: what reads the robot reads its file."""
     text, mesh = (ROBOTS / 'ankle.urdf').read_text(), '<link name="foot">'
     assert mesh in text

@@ -56,7 +56,7 @@ def states_of(closure):
 
 @pytest.mark.parametrize('plane', PLANES)
 @pytest.mark.parametrize('name', linkage_names())
-def test_a_robot_in_one_plane_has_the_states_of_the_planar_file(tmp_path, name, plane):
+def test_planar_robot_has_the_states_of_the_file(tmp_path, name, plane):
     rpy, axes = PLANES[plane]
     planar, robot = robot_of(tmp_path, name, rpy)
     assert isinstance(robot, PlanarClosure)
@@ -103,7 +103,7 @@ def spatial(folder, **kinds):
     return load(file)
 
 
-def test_coordinates_have_the_names_of_the_grounds_axes(tmp_path):
+def test_planar_robot_coordinates_use_the_ground_axes(tmp_path):
     closure = spatial(tmp_path)
     assert isinstance(closure, PlanarClosure)
     assert closure.linkage.traced == ('T',)
@@ -134,7 +134,7 @@ def test_coordinates_have_the_names_of_the_grounds_axes(tmp_path):
     ],
     ids=['zeroes', 'traced', 'turntable'],
 )
-def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
+def test_linkage_with_spatial_features_stays_spatial(tmp_path, kinds):
     flat, closure = spatial(tmp_path), spatial(tmp_path, **kinds)
     assert isinstance(closure, SpaceClosure)
     pose = closure.linkage.pose.inputs
@@ -144,7 +144,7 @@ def test_what_a_plane_cannot_say_stays_spatial(tmp_path, kinds):
         assert position[joint] == pytest.approx(expected[joint], abs=1e-14)
 
 
-def test_a_traced_point_on_the_axis_of_a_hinge_keeps_its_name(tmp_path):
+def test_traced_point_on_a_hinge_axis_keeps_its_name(tmp_path):
     closure = spatial(tmp_path, traced=', A')
     assert isinstance(closure, PlanarClosure)
     place = closure.named_points(closure.position(0.4))['A']
@@ -153,7 +153,7 @@ def test_a_traced_point_on_the_axis_of_a_hinge_keeps_its_name(tmp_path):
     )
 
 
-def test_its_model_places_links_whose_joints_the_file_does_not_publish(tmp_path):
+def test_urdf_places_links_with_unpublished_joints(tmp_path):
     """By yourdfpy: the traced point of the coupler, whose joint is published for the model."""
     yourdfpy = pytest.importorskip('yourdfpy')
     closure = spatial(tmp_path, joints='')
@@ -170,7 +170,7 @@ def test_its_model_places_links_whose_joints_the_file_does_not_publish(tmp_path)
 
 
 @pytest.mark.parametrize('plane', ['xy', 'xy seen from below', 'xz', 'yz'])
-def test_masses_of_a_robot_are_those_of_the_planar_file(tmp_path, plane):
+def test_planar_robot_masses_equal_the_file(tmp_path, plane):
     """The model of a link has its moment about the plane's normal; others do not matter."""
     planar, robot = robot_of(tmp_path, 'watt_1', PLANES[plane][0])
     expected, found = planar.linkage, robot.linkage
@@ -188,7 +188,7 @@ def test_masses_of_a_robot_are_those_of_the_planar_file(tmp_path, plane):
 
 
 @pytest.mark.parametrize('name', ['andrews_squeezer', 'four_bar', 'slider_crank', 'watt_1'])
-def test_its_motor_has_the_effort_of_the_planar_files(tmp_path, name):
+def test_planar_robot_effort_equals_the_file(tmp_path, name):
     """Under gravity and its own inertia; the robot stands in the plane of x and z."""
     planar, robot = robot_of(tmp_path, name, PLANES['xz'][0])
     efforts = []
@@ -221,9 +221,7 @@ IN_SPACE = ('animation', 'engine', 'page')
 
 @pytest.mark.parametrize('output', OUTPUTS)
 @pytest.mark.parametrize('source', DRAWN)
-def test_what_takes_planar_files_alone_takes_what_lies_in_a_plane(
-    tmp_path, monkeypatch, source, output, capsys
-):
+def test_planar_commands_accept_planar_robots_only(tmp_path, monkeypatch, source, output, capsys):
     """The output is that of the planar file with the same content and name."""
     monkeypatch.chdir(tmp_path)
     (file, told), (command, name) = DRAWN[source], OUTPUTS[output]
@@ -251,7 +249,7 @@ def test_what_takes_planar_files_alone_takes_what_lies_in_a_plane(
     assert 'ankle.urdf: is a spatial linkage; ' in capsys.readouterr().err
 
 
-def test_a_scene_of_a_robot_in_a_plane_has_a_page(tmp_path):
+def test_view_writes_a_page_for_a_planar_robot_scene(tmp_path):
     scene = tmp_path / 'scene.yaml'
     scene.write_text(
         f'linkage: {{urdf: {ROBOTS / "palletizer.urdf"}, input: [shoulder, counterweight]}}\n'

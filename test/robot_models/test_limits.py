@@ -55,7 +55,7 @@ GIVEN = {
 
 
 @pytest.mark.parametrize('name', GIVEN)
-def test_the_same_limits_come_back(name):
+def test_limits_survive_the_urdf_round_trip(name):
     linkage = closed(GIVEN[name]).linkage
     made = robot_of(urdf_model('it', [ModelPart(Closure(linkage))])).linkage
     assert made.limits == linkage.limits
@@ -66,14 +66,14 @@ WIDTH = st.floats(0.5, 3.0)
 
 @settings(max_examples=30, deadline=None)
 @given(low=st.floats(-3.0, 3.0), width=WIDTH, rate=st.none() | st.floats(1e-6, 1e6))
-def test_any_limits_of_the_input_come_back(low, width, rate):
+def test_random_input_limits_survive_the_urdf_round_trip(low, width, rate):
     said = f'limits: [{low!r}, {low + width!r}]' + (f', velocity: {rate!r}' if rate else '')
     linkage = closed(f', input: {{{said}}}').linkage
     made = robot_of(urdf_model('it', [ModelPart(Closure(linkage))])).linkage
     assert made.limits == linkage.limits
 
 
-def test_what_is_written():
+def test_urdf_writes_given_and_computed_limits():
     said = ', input: {limits: [0.5, 1.5], velocity: 2, effort: 3}'
     written = limits_in(urdf_model('it', [ModelPart(closed(said))]))
     assert written['crank_joint'] == (
@@ -88,7 +88,7 @@ def test_what_is_written():
     assert (limit['effort'], limit['velocity']) == ('1000', '100')
 
 
-def test_what_somebody_has_changed_is_kept():
+def test_edited_urdf_limits_are_kept():
     data = urdf_model('it', [ModelPart(closed(''))]).decode()
     _, limit = limits_in(data.encode())['rocker_joint']
     robot = ET.fromstring(data)
@@ -115,12 +115,12 @@ def without_book(data):
     return ET.tostring(robot)
 
 
-def test_a_urdf_of_ours_without_a_book_has_none():
+def test_urdf_without_computed_limit_record_has_no_limits():
     data = without_book(urdf_model('it', [ModelPart(closed(''))]))
     assert robot_of(data).linkage.limits == {}
 
 
-def test_a_urdf_of_others_says_limits():
+def test_foreign_urdf_limits_are_read():
     robot = ET.fromstring(urdf_model('it', [ModelPart(closed(''))]))
     robot.remove(robot.find('linkage_start'))
     for joint in robot.findall('joint'):
@@ -135,7 +135,7 @@ def test_a_urdf_of_others_says_limits():
 
 
 @pytest.mark.parametrize(('lower', 'upper'), [('2', '1'), ('1', '1')])
-def test_limits_of_a_urdf_that_cross_are_refused(lower, upper):
+def test_crossed_urdf_limits_are_refused(lower, upper):
     robot = ET.fromstring(urdf_model('it', [ModelPart(closed(''))]))
     for joint in robot.findall('joint'):
         if joint.get('name') == 'rocker_joint':
@@ -148,7 +148,7 @@ def test_limits_of_a_urdf_that_cross_are_refused(lower, upper):
     )
 
 
-def test_an_engine_keeps_them():
+def test_mujoco_model_keeps_the_limits():
     said = (
         ', input: {limits: [0.5, 1.5], velocity: 2, effort: 3}, '
         'joints: {rocker_joint: {limits: [-5.4, -4.2]}}'
@@ -165,7 +165,7 @@ def test_an_engine_keeps_them():
     assert not model.joint('coupler_joint').limited.item()
 
 
-def test_several_linkages_have_their_prefixes():
+def test_urdf_limits_use_the_linkage_prefixes():
     said = ', input: {limits: [0.5, 1.5]}'
     parts = [ModelPart(closed(said), prefix='left_'), ModelPart(closed(''), prefix='right_')]
     written = limits_in(urdf_model('it', parts))

@@ -79,7 +79,7 @@ def case(name):
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
-def test_it_starts_closed(name):
+def test_mujoco_model_starts_closed(name):
     closure = case(name)
     model, state = started(mujoco_model(name, [ModelPart(closure)]))
     assert model.neq >= 1
@@ -104,7 +104,7 @@ ROUNDING = 1e-14
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
-def test_a_reset_closes_it_too(name):
+def test_mujoco_model_is_closed_after_reset(name):
     """Where no key is asked for, a simulation starts at qpos0: that is the same pose."""
     closure = case(name)
     model = mujoco.MjModel.from_xml_string(mujoco_model(name, [ModelPart(closure)]).decode())
@@ -126,7 +126,7 @@ def test_a_reset_closes_it_too(name):
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('name', CASES)
-def test_it_moves_as_the_closure_says(name):
+def test_mujoco_model_moves_as_the_closure(name):
     closure = case(name)
     model, state = started(mujoco_model(name, [ModelPart(closure)]))
     size, worst, first = size_of(closure), 0.0, state.ctrl.copy()
@@ -143,7 +143,7 @@ def test_it_moves_as_the_closure_says(name):
     assert worst <= MOVING * size
 
 
-def test_gravity_and_springs_are_those_of_the_scene():
+def test_mujoco_model_has_the_scene_gravity_and_springs():
     """What holds the crank against them, by virtual work over MuJoCo's forces, is our effort."""
     closure = load(LINKAGES / 'stephenson_3.yaml')
     spring = Spring('coupler', 'C', 'ground', 'O6', 40.0, 0.03, 1.5, 'pull')
@@ -167,7 +167,7 @@ def test_gravity_and_springs_are_those_of_the_scene():
     assert model.body('coupler').inertia.max() == closure.linkage.masses['coupler'].inertia
 
 
-def test_linkages_of_two_gravities_are_refused():
+def test_linkages_with_different_gravity_are_refused():
     (closure,) = moving(LINKAGES / 'four_bar.yaml').closures
     parts = [
         ModelPart(closure, 'a_', Loads((0.0, -9.81))),
@@ -177,7 +177,7 @@ def test_linkages_of_two_gravities_are_refused():
         mujoco_model('it', parts)
 
 
-def test_a_scene_of_two_linkages_is_one_model(tmp_path):
+def test_scene_of_two_linkages_becomes_one_model(tmp_path):
     data = model_of(str(LINKAGES.parent / 'scenes' / 'two_fingers.yaml'), mujoco_model)
     model, state = started(data)
     assert model.nu == 2

@@ -51,7 +51,7 @@ def models():
 @pytest.mark.sample(14)
 @pytest.mark.parametrize('powers', [FINE, COARSE], ids=['fine', 'coarse'])
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
-def test_noise_of_cad_and_the_order_of_joints_change_no_pose(tmp_path, models, name, powers):
+def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers):
     if name not in models:
         models[name] = model_of(name, urdf_model).decode()
     random, linkage = Random(f'{name} {powers}'), load(name)
@@ -117,7 +117,7 @@ def ankle_urdf():
     yield '</robot>'
 
 
-def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_path):
+def test_ankle_with_nearly_coincident_hinges_moves_as_drawn(tmp_path):
     file = tmp_path / 'ankle.urdf'
     file.write_text(''.join(ankle_urdf()))
     ankle = load(file, {'input': ['m1', 'm2']})
@@ -128,7 +128,7 @@ def test_an_ankle_whose_rods_hang_on_hinges_7e_18_m_apart_moves_as_drawn(tmp_pat
     assert 6.9e-18 < ankle.linkage.corrections.merged_by < 8e-18
 
 
-def test_check_says_the_largest_distance_that_was_merged(tmp_path, capsys):
+def test_check_prints_the_largest_merged_distance(tmp_path, capsys):
     text = model_of('hooke_joint', urdf_model).decode()
     text = text.replace('<origin xyz="0 0 0"', '<origin xyz="0 3e-10 4e-10"', 1)
     (tmp_path / 'robot.urdf').write_text(text)
@@ -136,7 +136,7 @@ def test_check_says_the_largest_distance_that_was_merged(tmp_path, capsys):
     assert 'places of the pose that are up to 5e-10 m apart' in capsys.readouterr().out
 
 
-def test_hinges_a_hundred_thousandth_of_the_size_apart_are_two(tmp_path):
+def test_clearly_separate_hinges_are_not_merged(tmp_path):
     text = ''.join(ankle_urdf()).replace('6.93889e-18', '2e-6')
     (tmp_path / 'ankle.urdf').write_text(text)
     ankle = load(tmp_path / 'ankle.urdf', {'input': ['m1', 'm2']})

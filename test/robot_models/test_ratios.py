@@ -64,7 +64,7 @@ def hand_of(text: str, places: list[str], **told: object) -> Closure:
 
 @pytest.mark.parametrize('axis', ['0 0 1', '0 0 -1'])
 @pytest.mark.parametrize(('multiplier', 'offset'), [(-1.0, 0.0), (1.0, 0.2), (0.5, -0.3)])
-def test_mimic_becomes_a_ratio(multiplier: float, offset: float, axis: str) -> None:
+def test_urdf_mimic_becomes_a_ratio(multiplier: float, offset: float, axis: str) -> None:
     """Places on links close the loops, as yourdfpy walks them; the joint goes as mimic says."""
     random = Random(f'{multiplier} {offset} {axis}')
     for _ in range(3):
@@ -88,7 +88,7 @@ def test_mimic_becomes_a_ratio(multiplier: float, offset: float, axis: str) -> N
                 assert hypot(*(ends[0] - ends[1])) < 1e-12
 
 
-def test_mimics_that_the_loops_move_are_named() -> None:
+def test_redundant_mimics_are_listed_as_left_out() -> None:
     """Of two mimics one is needed; that of gears on the base comes first."""
     text, places = hand(Random(1), -1.0, 0.0, '0 0 1')
     text = text.replace(
@@ -100,7 +100,7 @@ def test_mimics_that_the_loops_move_are_named() -> None:
     assert linkage.left_out == ('mimic of right_in_joint',)
 
 
-def test_mimic_alone_needs_no_loop() -> None:
+def test_mimic_robot_needs_no_loop() -> None:
     """A rack on a pinion."""
     mimic = '<mimic joint="pinion_joint" multiplier="0.012" offset="0.001"/>'
     text = (
@@ -115,7 +115,7 @@ def test_mimic_alone_needs_no_loop() -> None:
     )
 
 
-def test_place_on_no_link_is_refused() -> None:
+def test_closing_place_on_an_unknown_link_is_refused() -> None:
     """One line says which links there are."""
     text, places = hand(Random(1), -1.0, 0.0, '0 0 1')
     with pytest.raises(FileError, match='there is no link'):
@@ -132,7 +132,7 @@ SHAPES = {
 
 
 @pytest.mark.parametrize('name', SHAPES)
-def test_urdf_there_and_back(name: str) -> None:
+def test_ratios_survive_the_urdf_round_trip(name: str) -> None:
     """The ratio is a mimic, and the joints come back the same."""
     closure = Closure(SHAPES[name]())
     data = urdf_model('r', [ModelPart(closure)])
@@ -148,7 +148,7 @@ def test_urdf_there_and_back(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', SHAPES)
-def test_engine_keeps_the_ratio(name: str) -> None:
+def test_mujoco_model_keeps_the_ratio(name: str) -> None:
     """The engine starts closed, and still has the ratio when its servo has moved the input."""
     mujoco = pytest.importorskip('mujoco')
     closure = Closure(SHAPES[name]())

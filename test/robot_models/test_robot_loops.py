@@ -160,7 +160,7 @@ def pose_of(closure):
 
 
 @pytest.mark.parametrize('name', CHOICES)
-def test_states_are_those_of_newtons_method_on_the_urdf(name):
+def test_robot_states_equal_newtons_method_on_the_urdf(name):
     told, loops, reach = CHOICES[name]
     closure = load(ROBOTS / f'{name}.urdf', told)
     walk = Walk((ROBOTS / f'{name}.urdf').read_text(), loops)
@@ -205,7 +205,7 @@ OPEN = re.compile(r'<(loop_joint|loop|constraint)\b.*</\1>', re.DOTALL)
 
 @pytest.mark.parametrize('kind', ['spherical', 'revolute'])
 @pytest.mark.parametrize('dialect', [*TAGS, 'close'])
-def test_dialects_of_one_robot_have_the_same_states(tmp_path, dialect, kind):
+def test_loop_tag_dialects_give_the_same_states(tmp_path, dialect, kind):
     name = 'ankle' if kind == 'spherical' else 'four_bar'
     told, pairs, reach = CHOICES[name]
     text = OPEN.sub('', (ROBOTS / f'{name}.urdf').read_text())
@@ -223,7 +223,7 @@ def test_dialects_of_one_robot_have_the_same_states(tmp_path, dialect, kind):
         assert closure.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
 
 
-def test_motors_move_the_ankle_that_moves_them():
+def test_ankle_driven_by_motors_inverts_its_joints():
     given = {'input': ['m1', 'm2']}
     closure, motors = (
         load(ROBOTS / 'ankle.urdf', CHOICES['ankle'][0]),
@@ -235,7 +235,7 @@ def test_motors_move_the_ankle_that_moves_them():
         assert joints[:2] == pytest.approx(inputs, abs=1e-14)
 
 
-def test_rods_may_be_links_without_a_joint(tmp_path):
+def test_link_constraints_act_as_rods(tmp_path):
     """A <constraint type="link"> is a rod between two balls (urdfdom#264)."""
     text = OPEN.sub('', (ROBOTS / 'ankle.urdf').read_text())
     bars = (('bar1', (0, -0.004, -0.0165)), FOOT1), (('bar2', (0, -0.0165, -0.004)), FOOT2)
@@ -261,7 +261,7 @@ GEARS = {
 
 
 @pytest.mark.parametrize('gear', GEARS)
-def test_a_motor_may_move_a_loop_by_a_ratio(tmp_path, gear):
+def test_geared_motor_drives_a_loop(tmp_path, gear):
     within, beside = GEARS[gear]
     text = (ROBOTS / 'four_bar.urdf').read_text()
     text = text.replace('<child link="crank"/>', f'<child link="crank"/>{within}')
@@ -274,7 +274,7 @@ def test_a_motor_may_move_a_loop_by_a_ratio(tmp_path, gear):
         assert [*found.values()] == pytest.approx(expected.position(crank).joints, abs=1e-14)
 
 
-def test_a_mimic_that_loops_make_needless_is_left_out(tmp_path):
+def test_redundant_mimic_of_a_loop_is_left_out(tmp_path):
     """Exporters write roughly by a mimic what a loop does exactly."""
     text = (ROBOTS / 'four_bar.urdf').read_text()
     rough = '<child link="rocker"/><mimic joint="crank_joint" multiplier="-0.4" offset="-0.7"/>'
@@ -284,7 +284,7 @@ def test_a_mimic_that_loops_make_needless_is_left_out(tmp_path):
     assert closure.linkage.left_out == ('mimic of rocker_joint',)
 
 
-def test_loops_that_no_input_moves_are_left_out(tmp_path):
+def test_loops_without_an_input_are_left_out(tmp_path):
     """A scene may move one leg of a robot, and another linkage of it the other."""
     text = (ROBOTS / 'ankle.urdf').read_text()
     inner = re.search(r'<robot name="ankle">(.*)</robot>', text, re.DOTALL)[1]
@@ -301,7 +301,7 @@ def test_loops_that_no_input_moves_are_left_out(tmp_path):
             assert leg.position(*inputs).joints == pytest.approx(joints, abs=1e-14)
 
 
-def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
+def test_rounded_loops_are_closed_without_changing_links(tmp_path):
     """CAD writes five digits: no link changes, and each angle is that at which the loops close."""
     text = (ROBOTS / 'ankle.urdf').read_text().replace('0.040 0 0.215', '0.04001 0 0.21502')
     closure = read(tmp_path, text, input=['pitch', 'roll'])
@@ -313,9 +313,7 @@ def test_loops_that_miss_by_rounding_are_closed_on_the_urdf_as_it_is(tmp_path):
 
 
 @pytest.mark.parametrize('rounding', [1e-16, 1e-13, 1e-9, 1e-6])
-def test_a_pose_at_a_limit_is_within_it_whatever_the_rounding_of_the_loops(
-    tmp_path, rounding, turns
-):
+def test_pose_at_a_limit_tolerates_loop_rounding(tmp_path, rounding, turns):
     """Each joint that the loops move has a limit of 0, above or below, where it is in the pose."""
     text = (ROBOTS / 'ankle.urdf').read_text()
     off = [0.022, 0.015, 0.008] + rounding * turns.uniform(-1.0, 1.0, 3)
@@ -365,7 +363,7 @@ def hexapod(tmp_path_factory):
 
 
 @pytest.mark.parametrize('name', [*spatial_linkage_names(), *STRUTS])
-def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
+def test_spatial_linkage_survives_the_urdf_round_trip(tmp_path, name, request):
     file = STRUTS.get(name, name)
     if file == 'cylinder.yaml':
         file = tmp_path / file
@@ -387,7 +385,7 @@ def test_a_spatial_linkage_comes_back_from_its_urdf(tmp_path, name, request):
 
 
 @pytest.mark.parametrize('name', ['bennett', 'spherical_four_bar'])
-def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name, turns):
+def test_loop_closing_joint_keeps_its_pose_value(tmp_path, name, turns):
     """Its frame is welded as it lies where the joints have values that are not 0."""
     linkage = load(name).linkage
     values = {joint: turns.uniform(-3.0, 3.0) for joint in linkage.hinges}
@@ -402,7 +400,7 @@ def test_a_joint_that_closes_a_loop_comes_back_at_its_value(tmp_path, name, turn
         assert found == pytest.approx(written.position(*inputs).joints, abs=1e-12)
 
 
-def test_a_model_has_the_masses_of_a_spatial_file_where_its_pose_has_them(turns):
+def test_urdf_masses_equal_the_spatial_file(turns):
     """By yourdfpy, with the frames of links at the joints of the pose, beside the file's text."""
     yourdfpy = pytest.importorskip('yourdfpy')
     linkage = load('ankle_motors').linkage
@@ -432,7 +430,7 @@ def test_a_model_has_the_masses_of_a_spatial_file_where_its_pose_has_them(turns)
             )
 
 
-def test_each_rod_ends_where_the_platform_carries_it(hexapod):
+def test_hexapod_urdf_rods_end_at_the_platform_points(hexapod):
     """By yourdfpy, at the joints of the model as they come back, beside the file's own points."""
     yourdfpy = pytest.importorskip('yourdfpy')
     text, robot = hexapod
@@ -450,7 +448,7 @@ def test_each_rod_ends_where_the_platform_carries_it(hexapod):
                 assert at[:3] == pytest.approx(points[loop.get('name')], abs=1e-12)
 
 
-def test_pinocchio_reads_struts_too(hexapod):
+def test_pinocchio_reads_a_hexapod_urdf(hexapod):
     pinocchio = pytest.importorskip('pinocchio')
     model = pinocchio.buildModelFromXML(hexapod[0])
     assert {'leg1_x', 'leg1_y', 'leg1', 'x', 'r_z'} < {*model.names}
@@ -461,7 +459,7 @@ SCENE = 'linkage: {urdf: robots/ankle.urdf, input: [pitch, roll]}\nrate: 200\n'
 SCENE += 'drive: {sine: {amplitude: 0.1, frequency: 0.5}}\neffects: {velocity: {}}\n'
 
 
-def test_the_bag_of_a_robot_replays_without_its_urdf(tmp_path, monkeypatch, capsys):
+def test_robot_bag_replays_without_its_urdf(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'robots').mkdir()
     urdf = tmp_path / 'robots' / 'ankle.urdf'
@@ -511,7 +509,7 @@ def test_bad_robots_are_refused_in_one_line(tmp_path, case):
     assert said.removeprefix('FILE: ') == BAD[case]['line']
 
 
-def test_a_robot_that_a_linkage_file_cannot_be_is_said(tmp_path):
+def test_robot_options_on_a_linkage_file_are_refused(tmp_path):
     with pytest.raises(LinkageError, match='is not a robot; leave out input'):
         linkage_content(named_file('four_bar', 'linkages'), {'input': 'x'})
     scene = parse_yaml(SCENE.encode(), 'legs.yaml')
@@ -541,7 +539,7 @@ def angle_between(kind, rpy):
 
 
 @pytest.mark.parametrize('kind', ['fixed', 'revolute', 'prismatic'])
-def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind, turns):
+def test_misaligned_closing_frames_are_refused(tmp_path, kind, turns):
     for _ in range(4):
         rpy = turns.uniform(0.4, 3.0, 3) * turns.choice([-1, 1], 3)
         with pytest.raises(LinkageError, match='the loop loop is open by') as caught:
@@ -551,7 +549,7 @@ def test_frames_of_a_closing_that_differ_in_direction_are_refused(tmp_path, kind
 
 
 @pytest.mark.parametrize('kind', ['fixed', 'revolute'])
-def test_frames_of_a_closing_that_differ_by_rounding_are_told(tmp_path, kind, capsys):
+def test_check_prints_rounding_of_closing_frames(tmp_path, kind, capsys):
     rpy = (3e-4, -2e-4, 0.0)
     text = WELDED % CLOSED_BY.format(kind, *rpy)
     if kind == 'revolute':
@@ -569,7 +567,7 @@ TIP += '<origin xyz="0.3 0 0" rpy="0 0 -0.5"/></joint>'
 
 
 @pytest.mark.parametrize('welded', [CLOSED_BY.format('fixed', 0, 0, 0.5), 'tip=end:fixed'])
-def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_path, welded, turns):
+def test_open_weld_error_proposes_the_closing_pose(tmp_path, welded, turns):
     text, close = WELDED % (welded if '<' in welded else TIP), [] if '<' in welded else [welded]
     with pytest.raises(LinkageError, match=r'is open by 0\.5 rad in the pose; near it') as caught:
         read(tmp_path, text, input='q1', close=close)
@@ -585,7 +583,7 @@ def test_a_weld_that_joints_can_turn_into_place_is_refused_with_that_pose(tmp_pa
         assert np.remainder(away + np.pi, 2.0 * np.pi) - np.pi == pytest.approx(0.0, abs=1e-12)
 
 
-def test_places_are_welded_as_they_stand(tmp_path):
+def test_welded_places_need_no_correction(tmp_path):
     close = ['rod.0.3,0,0=end.0,0,0:fixed']
     closure = read(tmp_path, WELDED.replace('rpy="0 0 0.6"/><axis xyz="0 0 1"/></joint>%s', '/>'
                    '<axis xyz="0 0 1"/></joint>%s') % '', input='q1', close=close)  # fmt: skip
@@ -614,7 +612,7 @@ TRANSMITTED = (
     ],
     ids=['ros2_control', 'transmissions', 'both', 'an attribute more'],
 )
-def test_the_file_says_which_joints_motors_move(tmp_path, added, inputs):
+def test_urdf_tags_select_the_motor_joints(tmp_path, added, inputs):
     ankle = (ROBOTS / 'ankle.urdf').read_text()
     closure = read(tmp_path, ankle.replace('</robot>', f'{added}</robot>'))
     assert closure.input_names == inputs
@@ -623,7 +621,7 @@ def test_the_file_says_which_joints_motors_move(tmp_path, added, inputs):
 
 
 @pytest.mark.parametrize(('apart', 'told'), [(0.0, 0.0), (1e-9, 0.0), (0.012, 0.012)])
-def test_ends_of_a_planar_pin_that_lie_beside_each_other_are_told(tmp_path, apart, told):
+def test_planar_pin_offset_along_its_axis_is_recorded(tmp_path, apart, told):
     """Links of a plane lie beside each other; a wrong place along the axis looks the same."""
     text, end = (ROBOTS / 'four_bar.urdf').read_text(), '<origin xyz="0.08 0 0"/>'
     assert end in text

@@ -131,7 +131,7 @@ def described(closure, joints, commanded, reductions, offsets=None):
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', CASES)
-def test_motors_move_joints_and_commands_move_motors(programs, name):
+def test_transmission_maps_motors_to_joints_and_back(programs, name):
     """Numbers are those of the closure; efforts are those of virtual work."""
     case, random = CASES[name], Random(name)
     closure = load(case.linkage).measuring(*case.commanded)
@@ -192,9 +192,7 @@ FINGER = ['actuator motor left_knuckle_joint 1 0', 'joint finger left_finger_joi
         ('inf', 'INDETERMINATE'),
     ],
 )
-def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
-    programs, typed, status
-):
+def test_command_without_a_pose_keeps_the_last_one(programs, typed, status):
     lines = [*FINGER, 'configure', 'to_actuators -0.3 0 2', f'to_actuators {typed} 1 1',
              'sleep 1200', 'to_actuators -0.4 0 0']  # fmt: skip
     answers, errors = run(programs('finger'), lines)
@@ -207,7 +205,7 @@ def test_without_a_pose_the_last_valid_command_stays_and_the_status_says_so(
     assert f': {status}; the last valid command stays' in line
 
 
-def test_one_joint_without_a_command_leaves_the_last_of_all(programs):
+def test_one_missing_joint_command_keeps_all_commands(programs):
     lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
     lines += ['to_actuators 0.1 0 0 -0.1 0 0', 'to_actuators nan 1 0 0.1 1 0']
     answers, _ = run(programs('ankle'), lines)
@@ -220,7 +218,7 @@ DEACTIVATED = 'to_actuators nan nan nan'
 """What a transmission finds while no controller commands: NaN, as the handles begin."""
 
 
-def test_without_a_command_the_actuators_get_none_and_no_earlier_one_comes_back(programs):
+def test_deactivated_commands_are_nan_without_earlier_values(programs):
     lines = [
         *FINGER,
         'configure',
@@ -248,7 +246,7 @@ def test_without_a_command_the_actuators_get_none_and_no_earlier_one_comes_back(
     assert errors == ''
 
 
-def test_each_kind_of_command_may_be_absent_by_itself(programs):
+def test_each_command_interface_may_be_nan_separately(programs):
     lines = [*FINGER, 'configure', 'to_joints 0.3 0 0', 'to_actuators nan 2 nan',
              'to_actuators -0.3 nan nan', 'to_actuators nan nan 1']  # fmt: skip
     answers, _ = run(programs('finger'), lines)
@@ -258,7 +256,7 @@ def test_each_kind_of_command_may_be_absent_by_itself(programs):
     assert found[2] == pytest.approx([np.nan, np.nan, -1.0], nan_ok=True)
 
 
-def test_another_configuration_knows_nothing_of_the_last(programs):
+def test_reconfigured_transmission_forgets_earlier_values(programs):
     """The handles of a component are given anew when it is activated again."""
     lines = [*FINGER, 'configure', 'to_actuators -0.3 0 2', 'to_joints 0.3 0 0', 'configure',
              'to_joints nan 0 0', 'to_actuators 0.1 0 0']  # fmt: skip
@@ -268,7 +266,7 @@ def test_another_configuration_knows_nothing_of_the_last(programs):
     assert np.isnan(command[0, [0, 2]]).all()
 
 
-def test_states_beyond_limits_are_told_and_commands_are_not_taken(programs):
+def test_transmission_reports_states_but_refuses_commands_beyond_limits(programs):
     lines = [*FINGER, 'configure', 'to_joints 0.8 0 0', 'to_actuators -0.8 0 0']
     answers, _ = run(programs('finger'), lines)
     (joints, state, _), (actuators, command, _) = map(numbers_of, answers)
@@ -277,7 +275,7 @@ def test_states_beyond_limits_are_told_and_commands_are_not_taken(programs):
     assert np.isnan(actuators[0, 0])
 
 
-def test_another_assembly_is_not_the_commanded_one(programs):
+def test_transmission_refuses_commands_of_another_assembly(programs):
     lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
     answers, _ = run(programs('ankle'), [*lines, 'to_actuators 9 0 0 -0.5 0 0'])
     found, status, _ = numbers_of(answers[0])
@@ -286,7 +284,7 @@ def test_another_assembly_is_not_the_commanded_one(programs):
     assert not found[:, 1].any()
 
 
-def test_velocities_and_efforts_alone_are_at_the_last_state(programs):
+def test_velocity_and_effort_commands_use_the_last_state(programs):
     finger = [FINGER[0], 'joint finger left_finger_joint 1 0 velocity effort']
     lines = [*finger, 'configure', 'to_joints 0.3 0 0', 'to_actuators 7 2 1']
     answers, _ = run(programs('finger'), lines)
@@ -295,7 +293,7 @@ def test_velocities_and_efforts_alone_are_at_the_last_state(programs):
     assert found[0] == pytest.approx([0.3, -2.0, -1.0], abs=1e-14)
 
 
-def test_values_that_are_no_commands_are_not_taken_for_them(programs):
+def test_unclaimed_interfaces_do_not_count_as_commands(programs):
     finger = [FINGER[0], 'joint finger left_finger_joint 1 0 position']
     answers, _ = run(programs('finger'), [*finger, 'configure', 'to_actuators -0.3 2 1'])
     found, _, _ = numbers_of(answers[0])
@@ -306,7 +304,7 @@ def test_values_that_are_no_commands_are_not_taken_for_them(programs):
 # written may be one of the other way.
 
 
-def test_without_a_pose_a_state_is_the_last_and_never_a_command(programs):
+def test_state_without_a_pose_keeps_the_last_state(programs):
     lines = described(load('ankle_motors'), ['pitch', 'roll'], ['pitch', 'roll'], [1.0, 1.0])
     lines += ['to_actuators 0.1 0 0 -0.1 0 0', 'to_joints 2.5 0 0 -2.5 0 0',
               'to_joints 0.1 0 0 0.2 0 0', 'to_actuators 0.1 0 0 -0.1 0 0',
@@ -318,7 +316,7 @@ def test_without_a_pose_a_state_is_the_last_and_never_a_command(programs):
     assert last[0].tolist() == known[0].tolist()
 
 
-def test_without_a_pose_a_command_is_the_last_and_never_a_state(programs):
+def test_command_without_a_pose_ignores_the_state(programs):
     lines = [
         *FINGER,
         'configure',
@@ -351,7 +349,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize('told', WRONG)
-def test_the_loader_says_what_is_wrong(programs, told):
+def test_transmission_loader_reports_errors_in_one_line(programs, told):
     answers, errors = run(programs('finger'), [*WRONG[told], 'configure'])
     assert answers == []
     assert told.removeprefix('no linkage has ') in errors
@@ -378,7 +376,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('told', REFUSED)
-def test_what_cannot_be_written_is_one_line(told, tmp_path, capsys):
+def test_unsupported_transmission_is_refused_in_one_line(told, tmp_path, capsys):
     linkage, *options = REFUSED[told]
     assert main(['compile', linkage, '--ros2-control', str(tmp_path / 'arm'), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -386,7 +384,7 @@ def test_what_cannot_be_written_is_one_line(told, tmp_path, capsys):
     assert not (tmp_path / 'arm').exists()
 
 
-def test_a_name_is_a_name_in_all_of_cs_spellings(tmp_path):
+def test_joint_names_with_trigraphs_are_escaped(tmp_path):
     """Trigraphs, which C++14 still has: ??/ is a backslash, so a text would end early."""
     (tmp_path / 'arm.yaml').write_text(
         'links:\n'
@@ -431,7 +429,7 @@ UNWRITABLE = {
 
 
 @pytest.mark.parametrize('name', UNWRITABLE)
-def test_a_folder_that_cannot_be_made_is_one_line(name, tmp_path, capsys):
+def test_uncreatable_package_folder_is_refused_in_one_line(name, tmp_path, capsys):
     (tmp_path / 'file').write_text('')
     assert main(['compile', 'ankle_motors', '--ros2-control', str(tmp_path / name)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -442,7 +440,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(name, tmp_path, capsys):
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('count', range(6))
 @pytest.mark.parametrize('force', [False, True])
-def test_a_package_is_written_whole_or_not_at_all(count, force, tmp_path, capsys, monkeypatch):
+def test_full_disk_leaves_no_partial_package(count, force, tmp_path, capsys, monkeypatch):
     """The disk is full after some files."""
     folder = tmp_path / 'ankle_transmission'
     if force:
@@ -472,12 +470,12 @@ def test_a_package_is_written_whole_or_not_at_all(count, force, tmp_path, capsys
 
 
 @pytest.mark.parametrize('name', ['Arm', '9arm', 'my-arm', 'a__b', 'arm_'])
-def test_a_package_has_a_name_that_ros_allows(name, tmp_path, capsys):
+def test_invalid_ros_package_name_is_refused(name, tmp_path, capsys):
     assert main(['compile', 'ankle_motors', '--ros2-control', str(tmp_path / name)]) == 2
     assert 'is not a name of a ROS package; use lower-case letters' in capsys.readouterr().err
 
 
-def test_a_folder_that_exists_is_not_written_into_without_force(tmp_path, capsys):
+def test_existing_package_folder_needs_force(tmp_path, capsys):
     folder = write(tmp_path, 'ankle_motors')
     (folder / 'mine').write_text('mine')
     typed = ['compile', 'ankle_motors', '--ros2-control', str(folder)]

@@ -48,7 +48,7 @@ def numbers(element, key):
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_it_is_what_urdf_asks_for(name):
+def test_written_urdf_is_valid(name):
     """As check_urdf has it, and what robot_state_publisher warns of."""
     robot = ET.fromstring(urdf_model('it', [ModelPart(closure(name))]))
     links = [link.get('name') for link in robot.findall('link')]
@@ -85,7 +85,7 @@ def test_it_is_what_urdf_asks_for(name):
 
 
 @pytest.mark.parametrize('name', CASES[::7])
-def test_the_same_linkage_gives_the_same_bytes(name):
+def test_same_linkage_gives_the_same_urdf_bytes(name):
     assert urdf_model('it', [ModelPart(closure(name))]) == urdf_model(
         'it', [ModelPart(closure(name))]
     )
@@ -101,7 +101,7 @@ def limits_of(data):
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
-def test_joints_keep_their_limits_and_come_near_them(name):
+def test_urdf_limits_enclose_the_published_joints_closely(name):
     """A node that starts where the linkage starts publishes nothing beyond the limits."""
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving_text(ODD[name]) if name in ODD else moving(file)
@@ -145,7 +145,7 @@ def swept(pipeline, name, values):
 @pytest.mark.sample(20)
 @pytest.mark.parametrize('angles', ['continuous', 'wrapped'])
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
-def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
+def test_urdf_limits_enclose_the_whole_input_range(name, angles):
     """Wherever in its range the input is when the node starts, and whichever way it goes on."""
     text = ODD[name].encode() if name in ODD else (LINKAGES / f'{name}.yaml').read_bytes()
     scene = from_topic(text, angles)
@@ -177,7 +177,7 @@ def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
         ('wrapped', '[0.5, .inf]', 'continuous'),
     ],
 )
-def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
+def test_wrapped_angles_beyond_limits_become_continuous_joints(angles, limits, kind):
     crank = f'input: {{limits: {limits}, effort: 2}}'
     text = f'four_bar: {{a: 0.04, b: 0.12, c: 0.08, d: 0.1, {crank}}}'
     scene = from_topic(text.encode(), angles)
@@ -187,7 +187,7 @@ def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
     assert limit.get('effort') == '2'
 
 
-def test_limits_are_those_worked_out_by_hand():
+def test_urdf_limits_equal_the_dead_centre_angles():
     """The rocker of a crank-rocker turns back where crank and coupler are in line."""
     limits = limits_of(urdf_model('it', [ModelPart(closure('four_bar'))]))
     # Of the triangles 0.16, 0.1, 0.08 and 0.08, 0.1, 0.08: the angle at O4, from the ground's x.
@@ -209,7 +209,7 @@ def test_limits_are_those_worked_out_by_hand():
 
 
 @pytest.mark.parametrize('name', UNTOLD)
-def test_joints_that_do_not_tell_all(name):
+def test_urdf_refuses_undetermined_links_with_a_remedy(name):
     text, remedy = UNTOLD[name]
     linkage = linkage_of(text)
     with pytest.raises(PartError) as caught:
@@ -221,7 +221,7 @@ def test_joints_that_do_not_tell_all(name):
     urdf_model('it', [ModelPart(Closure(linkage_of(whole)))])
 
 
-def test_a_scene_of_two_has_prefixes_and_one_root():
+def test_urdf_of_two_linkages_has_prefixes_and_one_root():
     data = model_of(str(SCENES / 'two_fingers.yaml'), urdf_model)
     model = Walked(data)
     pipeline = Pipeline(load_scene(SCENES / 'two_fingers.yaml'))
@@ -236,7 +236,7 @@ def test_a_scene_of_two_has_prefixes_and_one_root():
     assert model.model.base_link == 'world'
 
 
-def test_parts_that_deviate_are_in_the_model():
+def test_urdf_contains_the_toleranced_links():
     """A scene with tolerances publishes the joints of the linkage as it was made."""
     file = SCENES / 'worn_press.yaml'
     scene = load_scene(file)
@@ -251,7 +251,7 @@ def test_parts_that_deviate_are_in_the_model():
     assert numbers(place, 'xyz')[0] == x1 - x0
 
 
-def test_names_that_two_linkages_come_to(tmp_path):
+def test_urdf_refuses_duplicate_prefixed_names(tmp_path):
     four_bar = LINKAGES / 'four_bar.yaml'
     other = tmp_path / 'other.yaml'
     other.write_text(four_bar.read_text().replace('crank_joint', 'b_crank_joint'))
@@ -266,7 +266,7 @@ def test_names_that_two_linkages_come_to(tmp_path):
 
 
 @pytest.mark.parametrize('name', ONE_INPUT)
-def test_pinocchio_reads_it_too(name):
+def test_pinocchio_reads_the_urdf(name):
     """A reader that uses urdfdom, as robot_state_publisher does."""
     pinocchio = pytest.importorskip('pinocchio')
     data = urdf_model('it', [ModelPart(closure(name))])
@@ -308,7 +308,7 @@ def differences(one, other):
 
 
 @pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
-def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
+def test_gallery_linkage_survives_the_urdf_round_trip(name):
     closure = load(LINKAGES / f'{name}.yaml')
     again = back(closure)
     assert list(again.linkage.joints) == list(closure.linkage.joints)
@@ -325,7 +325,7 @@ def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
 
 
 @pytest.mark.parametrize('name', ODD)
-def test_every_way_from_frame_to_frame(name):
+def test_odd_frames_survive_the_urdf_round_trip(name):
     closure = closure_of(name)
     again = back(closure)
     lost = set(closure.linkage.joints) - set(again.linkage.joints)

@@ -59,7 +59,7 @@ def check(data, closure, messages, within=1e-12):
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', ONE_INPUT)
-def test_every_cut_pin_of_the_shipped_linkages_meets(name):
+def test_urdf_cut_pins_of_gallery_linkages_meet(name):
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving(file)
     (closure,) = pipeline.closures
@@ -68,7 +68,7 @@ def test_every_cut_pin_of_the_shipped_linkages_meets(name):
     assert cuts, 'nothing closes'
 
 
-def test_cut_pins_of_a_linkage_with_two_inputs_meet():
+def test_urdf_cut_pins_of_a_five_bar_meet():
     file = LINKAGES / 'five_bar.yaml'
     turns = np.linspace(0.0, 6.28, 60)
     values = [(1.6 + 0.3 * cos(t), 1.5 + 0.3 * sin(1.7 * t)) for t in turns]
@@ -81,7 +81,7 @@ def test_cut_pins_of_a_linkage_with_two_inputs_meet():
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', ODD)
-def test_every_way_from_frame_to_frame(name):
+def test_urdf_cut_pins_of_odd_frames_meet(name):
     closure = closure_of(name)
     pipeline = moving_text(ODD[name])
     count, _ = check(urdf_model(name, [ModelPart(closure)]), closure, said(pipeline))

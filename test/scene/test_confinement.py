@@ -44,7 +44,7 @@ UNREADABLE = {
 
 @pytest.mark.parametrize('kind', UNREADABLE)
 @pytest.mark.parametrize('role', ['scene', 'linkage', 'urdf'])
-def test_an_error_repeats_nothing_of_a_file_of_another_kind(tmp_path, kind, role):
+def test_error_repeats_no_content_of_foreign_files(tmp_path, kind, role):
     named = tmp_path / ('x.urdf' if role == 'urdf' else 'x.yaml')
     named.write_text(UNREADABLE[kind], 'utf-8')
     scene = tmp_path / 'scene.yaml'
@@ -111,14 +111,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('kind', ALLOWED)
-def test_files_of_the_folder_and_shipped_ones_may_be_named(machine, kind):
+def test_node_accepts_files_of_folder_and_package(machine, kind):
     scene, settings = ALLOWED[kind]
     own = str(machine)
     assert load(machine, scene.replace('OWN', own), *(s.replace('OWN', own) for s in settings))
 
 
 @pytest.mark.parametrize('kind', REFUSED)
-def test_anything_else_is_refused_before_it_is_opened(machine, monkeypatch, kind):
+def test_node_refuses_other_files_before_opening_them(machine, monkeypatch, kind):
     scene, settings = REFUSED[kind]
     own = str(machine)
     opened = []
@@ -138,14 +138,14 @@ def test_anything_else_is_refused_before_it_is_opened(machine, monkeypatch, kind
     assert all(any(file.is_relative_to(place) for place in places) for file in opened)
 
 
-def test_the_scene_of_the_start_stays_allowed(machine):
+def test_node_keeps_accepting_its_start_scene(machine):
     scene = machine.parent / 'scene.yaml'
     assert load(machine, scene, 'rate=500', own_file=str(scene), folder=machine.parent)
     with pytest.raises(FileError, match='is not below'):  # its linkage is beside it
         load(machine, scene, 'rate=500', own_file=str(scene))
 
 
-def test_the_start_allows_folders_and_effects(machine):
+def test_node_start_options_allow_folders_and_effects(machine):
     elsewhere = str(machine.parent)
     assert load(machine, f'{elsewhere}/scene.yaml', folder=machine.parent)
     record = f'record={{directory: {elsewhere}/runs}}'

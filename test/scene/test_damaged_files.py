@@ -46,7 +46,7 @@ def either_runs_or_says_why(files: dict[str, bytes]) -> None:
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
-def test_files_with_damaged_bytes_run_or_say_why_not(data):
+def test_scene_with_damaged_bytes_runs_or_is_refused(data):
     shipped = data.draw(st.sampled_from(SHIPPED))
     files = {name: bytearray(file) for name, file in shipped.items()}
     damaged = files[data.draw(st.sampled_from(sorted(files)))]
@@ -81,7 +81,7 @@ def places(content, path=()):
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
-def test_damaged_contents(data):
+def test_scene_with_damaged_keys_runs_or_is_refused(data):
     shipped = data.draw(st.sampled_from(SHIPPED))
     files = {name: yaml.safe_load(file) for name, file in shipped.items()}
     damaged = files[data.draw(st.sampled_from(sorted(files)))]
@@ -181,7 +181,7 @@ def read(name: str, content: Any) -> Linkage | FileError:
     derandomize=True, deadline=None, max_examples=600, suppress_health_check=list(HealthCheck)
 )
 @given(spoilt())
-def test_a_spoilt_file_is_answered_or_refused_in_one_line(case):
+def test_damaged_linkage_file_is_solved_or_refused(case):
     name, content = case
     found = read(name, content)
     if isinstance(found, FileError):
@@ -208,5 +208,5 @@ def test_a_spoilt_file_is_answered_or_refused_in_one_line(case):
 
 
 @pytest.mark.parametrize('name', sorted(GALLERY))
-def test_what_is_spoilt_here_is_sound_before(name):
+def test_gallery_linkage_is_valid_before_damage(name):
     read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0])

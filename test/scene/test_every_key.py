@@ -170,7 +170,7 @@ LINKAGES = {f'gallery {name}': text for name, text in GALLERY.items()} | WHOLE
 
 
 @pytest.mark.parametrize('kind', ['then', 'else', 'scene'])
-def test_the_files_have_every_key(kind):
+def test_sample_files_contain_every_schema_key(kind):
     root = scene_schema() if kind == 'scene' else linkage_schema()
     files = [*map(yaml.safe_load, (SCENES if kind == 'scene' else LINKAGES).values())]
     for path in set(schema_keys(root if kind == 'scene' else root[kind], root)):
@@ -225,7 +225,7 @@ def read_text(text):
 @pytest.mark.parametrize(
     ('name', 'within'), [*((name, ()) for name in WHOLE), ('gallery hexapod', ('balls',))]
 )
-def test_a_linkage_without_a_key_or_with_a_wrong_one_is_refused_in_one_line(name, within):
+def test_linkage_with_damaged_keys_is_refused_in_one_line(name, within):
     read_any_closure(parse_yaml(LINKAGES[name].encode(), 'file.yaml'))
     for path, text in damaged(yaml.safe_load(LINKAGES[name]), within):
         error = refusal(partial(read_text, text))
@@ -233,7 +233,7 @@ def test_a_linkage_without_a_key_or_with_a_wrong_one_is_refused_in_one_line(name
 
 
 @pytest.mark.parametrize('name', SCENES)
-def test_a_scene_without_a_key_or_with_a_wrong_one_is_refused_in_one_line(name, tmp_path):
+def test_scene_with_damaged_keys_is_refused_in_one_line(name, tmp_path):
     (tmp_path / 'linkage.yaml').write_text(GALLERY['four_bar'], 'utf-8')
     robot = ROBOTS / 'four_bar.urdf'
     (tmp_path / 'robot.urdf').write_bytes(robot.read_bytes())
@@ -244,7 +244,7 @@ def test_a_scene_without_a_key_or_with_a_wrong_one_is_refused_in_one_line(name, 
         assert error is None or is_one_line(error), (path, str(error))
 
 
-def test_a_spatial_file_without_input_says_what_is_missing():
+def test_spatial_file_without_input_error_names_the_key():
     content = yaml.safe_load(LINKAGES['gallery rssr'])
     del content['input']
     with pytest.raises(FileError, match=r"^rssr: the key 'input' is missing; add input: "):
@@ -255,7 +255,7 @@ SPATIAL = [name for name, text in LINKAGES.items() if 'points' in yaml.safe_load
 
 
 @pytest.mark.parametrize('name', SPATIAL)
-def test_a_misspelt_link_of_a_joint_is_told_by_its_right_name(name):
+def test_misspelt_joint_link_error_suggests_the_name(name):
     content, random = yaml.safe_load(LINKAGES[name]), Random(name)
     links = {'ground', *content.get('links', {})}
     ends = [path for path in damaged_places(content) if path[-1] in ('parent', 'child')]
@@ -289,7 +289,7 @@ input: [a, b, c, d, e, f]
         ('ground', 'is held by one ball at most, and free', 'hang it on three slides and a ball'),
     ],
 )
-def test_a_platform_on_struts_alone_is_told_what_carries_it(base, reason, remedy):
+def test_strut_platform_error_names_the_missing_ground(base, reason, remedy):
     text = STEWART.replace('base', base)
     with pytest.raises(FileError, match=f'{reason}; .*{remedy}'):
         read_any_closure(parse_yaml(text.encode(), 'x'))

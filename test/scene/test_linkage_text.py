@@ -55,7 +55,7 @@ def reads_as(linkage: Linkage, text: str) -> bool:
 
 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
-def test_every_shipped_linkage_is_written_as_it_stands(file):
+def test_gallery_linkage_text_equals_its_file(file):
     linkage = GALLERY[file.stem]
     written = linkage_text(linkage)
     assert reads_as(linkage, written)
@@ -98,7 +98,7 @@ def spatial_linkage(text: str):
 
 
 @pytest.mark.parametrize('name', [*spatial_linkage_names(), 'every key'])
-def test_a_spatial_linkage_is_read_back_to_the_last_bit(name):
+def test_spatial_linkage_text_is_read_back_exactly(name):
     linkage = spatial_linkage(EVERY_KEY) if name == 'every key' else load(name).linkage
     linkage = replace(linkage, corrections=PoseCorrections())
     written = linkage_text(linkage, ['One.'])
@@ -220,7 +220,7 @@ def linkages(draw: st.DrawFn) -> Linkage:
 
 @settings(deadline=None)
 @given(linkages())
-def test_any_linkage_is_read_back(linkage):
+def test_random_linkage_text_is_read_back_exactly(linkage):
     text = linkage_text(linkage, ['One.', 'Other.'])
     assert reads_as(linkage, text)
     # YAML 1.1 has other numbers and words; both see the same here.
@@ -233,7 +233,7 @@ def test_any_linkage_is_read_back(linkage):
 @example(-1e-7)
 @example(5e-324)
 @example(1.7976931348623157e308)
-def test_any_number_is_read_back_to_the_last_bit(value):
+def test_number_text_is_read_back_exactly(value):
     text = f'x: [{number_text(value)}]'
     (found,) = parse_yaml(text.encode(), 'x.yaml').numbers('x')
     assert found.hex() == value.hex()
@@ -246,11 +246,11 @@ def test_any_number_is_read_back_to_the_last_bit(value):
     ('value', 'text'),
     [(0.0, '0'), (-0.0, '-0.0'), (-3.0, '-3'), (0.1, '0.1'), (1e-7, '1.0e-07'), (1e16, '1.0e+16')],
 )
-def test_how_numbers_look(value, text):
+def test_number_text_has_the_expected_format(value, text):
     assert number_text(value) == text
 
 
-def test_what_is_too_long_for_a_line_has_rows():
+def test_long_link_is_written_in_rows():
     third = 1.0 / 3.0
     linkage = read(FOUR_BAR)
     points = dict.fromkeys(('first', 'second', 'third'), (third, -third))
@@ -271,7 +271,7 @@ def test_what_is_too_long_for_a_line_has_rows():
     ]
 
 
-def test_comments_stand_at_the_head_within_99_columns():
+def test_linkage_comments_are_wrapped_at_the_head():
     long = 'x' * 120
     comment = ['word ' * 40, '', f'a {long} b', 'two\nlines', 'a\0bell\a']
     text = linkage_text(read(FOUR_BAR), comment)
@@ -281,7 +281,7 @@ def test_comments_stand_at_the_head_within_99_columns():
     assert reads_as(read(FOUR_BAR), text)
 
 
-def test_a_file_takes_the_place_of_the_one_before(tmp_path):
+def test_written_linkage_replaces_the_previous_file(tmp_path):
     file, link = tmp_path / 'linkage.yaml', tmp_path / 'link.yaml'
     file.write_text('before')
     link.symlink_to(file)
@@ -307,7 +307,7 @@ NOT_WRITTEN = {
 
 
 @pytest.mark.parametrize('name', NOT_WRITTEN)
-def test_a_file_that_cannot_be_written(tmp_path, name):
+def test_unwritable_linkage_path_is_refused(tmp_path, name):
     (tmp_path / 'file').write_text('')
     os.mkfifo(tmp_path / 'pipe')
     (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
@@ -321,7 +321,7 @@ def test_a_file_that_cannot_be_written(tmp_path, name):
 
 @pytest.mark.skipif(os.geteuid() == 0, reason='root may write everywhere')
 @pytest.mark.parametrize('read_only', ['.', 'linkage.yaml'])
-def test_what_is_read_only_stays(tmp_path, read_only):
+def test_read_only_linkage_file_stays_unchanged(tmp_path, read_only):
     file = tmp_path / 'linkage.yaml'
     file.write_text('before')
     mode = (tmp_path / read_only).stat().st_mode
@@ -334,7 +334,7 @@ def test_what_is_read_only_stays(tmp_path, read_only):
     assert file.read_text() == 'before'
 
 
-def test_where_the_disk_is_full_the_file_before_stays(tmp_path):
+def test_full_disk_keeps_the_previous_linkage_file(tmp_path):
     file = tmp_path / 'linkage.yaml'
     file.write_text('before')
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -348,7 +348,7 @@ def test_where_the_disk_is_full_the_file_before_stays(tmp_path):
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_what_is_no_linkage_is_not_written(tmp_path):
+def test_linkage_that_never_closes_is_not_written(tmp_path):
     apart = replace(
         read(FOUR_BAR), links=read(FOUR_BAR).links | {'rocker': {'O4': (0, 0), 'B': (9, 0)}}
     )

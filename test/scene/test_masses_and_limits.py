@@ -30,18 +30,18 @@ def masses_of(text):
     return read_linkage(parse_yaml(text.encode(), 'linkage.yaml')).masses
 
 
-def test_masses_are_read_as_the_file_says():
+def test_masses_are_read_from_the_file():
     assert masses_of(f'{BEFORE}masses:\n  crank: {CRANK}\n') == {
         'crank': Mass(mass=0.1, center=(0.02, 0.0), inertia=1e-5)
     }
 
 
 @pytest.mark.parametrize('masses', ['', 'masses: {}'])
-def test_a_linkage_needs_none(masses):
+def test_linkage_may_have_no_masses(masses):
     assert masses_of(BEFORE + masses) == {}
 
 
-def test_a_point_mass_has_no_inertia():
+def test_point_mass_may_have_zero_inertia():
     found = masses_of(f'{BEFORE}masses: {{crank: {{mass: 1, center: [0, 0], inertia: 0}}}}')
     assert found == {'crank': Mass(1.0, (0.0, 0.0), 0.0)}
 
@@ -49,7 +49,7 @@ def test_a_point_mass_has_no_inertia():
 @pytest.mark.parametrize(
     'file', ['four_bar', 'slider_crank', 'excavator_bucket', 'watt_1', 'stephenson_3']
 )
-def test_shipped_linkages_that_forces_can_move(file):
+def test_gallery_linkages_with_masses_weigh_every_link(file):
     linkage = read_linkage(parse_yaml((CONFIG / f'linkages/{file}.yaml').read_bytes(), file))
     assert {*linkage.masses} == {*linkage.links} - {'ground'}
 
@@ -89,7 +89,7 @@ SAID = {
 
 
 @pytest.mark.parametrize('name', SAID)
-def test_what_an_input_may_say(name):
+def test_input_limits_are_read_and_written(name):
     said, limits = SAID[name]
     linkage = linkage_of(long(said))
     assert linkage.inputs[0].limits == limits
@@ -97,7 +97,7 @@ def test_what_an_input_may_say(name):
     assert linkage_of(SHORT.replace('SAID', f'input: {{{said[2:]}}}')) == linkage
 
 
-def test_what_a_published_joint_may_say():
+def test_published_joint_limits_are_read_and_written():
     said = 'limits: [1, 2.1], velocity: 4, effort: 5'
     linkage = linkage_of(long(rocker=f', {said}'))
     assert linkage.joints['rocker_joint'].limits == Limits(1.0, 2.1, 4.0, 5.0)
@@ -106,7 +106,7 @@ def test_what_a_published_joint_may_say():
     assert linkage_of(SHORT.replace('SAID', f'joints: {{rocker_joint: {{{said}}}}}')) == linkage
 
 
-def test_where_nothing_is_said_there_are_none():
+def test_missing_limits_are_infinite():
     linkage = linkage_of(long())
     assert linkage.limits == {}
     assert linkage.inputs[0].limits == Limits(-inf, inf, inf, inf)
@@ -116,7 +116,7 @@ def test_where_nothing_is_said_there_are_none():
 LIMITED = SHORT.replace('SAID', 'input: {limits: [0, 1]}').encode()
 
 
-def test_what_is_published_beyond_them_is_a_choice():
+def test_beyond_limits_option_selects_silence():
     assert not scene_of('', LIMITED).linkages[0].silent_beyond_limits
     assert not scene_of('beyond_limits: publish', LIMITED).linkages[0].silent_beyond_limits
     assert scene_of('beyond_limits: silent', LIMITED).linkages[0].silent_beyond_limits

@@ -115,7 +115,7 @@ LINKAGES = {
 
 
 @pytest.mark.parametrize('kind', LINKAGES)
-def test_an_error_in_a_linkage_says_what_to_write(tmp_path, kind):
+def test_linkage_error_names_the_remedy(tmp_path, kind):
     text, (right, wrong), line = LINKAGES[kind]
     file = tmp_path / 'linkage.yaml'
     file.write_text(text)
@@ -170,7 +170,7 @@ def scene_of(tmp_path, text):
 
 
 @pytest.mark.parametrize('kind', SCENES)
-def test_an_error_in_a_scene_says_what_to_write(tmp_path, kind):
+def test_scene_error_names_the_remedy(tmp_path, kind):
     text, line = SCENES[kind]
     file = scene_of(tmp_path, text)
     with pytest.raises(FileError) as caught:
@@ -217,7 +217,7 @@ x: 1
 
 
 @pytest.mark.parametrize('kind', SEVERAL)
-def test_all_errors_of_a_scene_are_told(tmp_path, kind):
+def test_all_errors_of_a_scene_are_listed(tmp_path, kind):
     text, expected = SEVERAL[kind]
     file = scene_of(tmp_path, text)
     with pytest.raises(FileError) as caught:
@@ -227,7 +227,7 @@ def test_all_errors_of_a_scene_are_told(tmp_path, kind):
     assert all(map(str.startswith, lines, expected)), lines
 
 
-def test_all_errors_of_a_linkage_are_told(tmp_path):
+def test_all_errors_of_a_linkage_are_listed(tmp_path):
     file = tmp_path / 'wrong.yaml'
     text = LINKAGE.replace('assembly: {B: left,', 'mases: {}\nassembly: {B: lef,')
     file.write_text(text.replace('rocker_joint: {parent:', 'rocker_joint: {parnt:'))

@@ -132,7 +132,7 @@ def folder_with(tmp_path, linkage, scene):
 
 
 @pytest.mark.parametrize('kind', NOTES)
-def test_a_scene_is_noted(tmp_path, kind):
+def test_suspicious_scene_values_get_notes(tmp_path, kind):
     linkage, scene, notes = NOTES[kind]
     file = folder_with(tmp_path, linkage, scene) / 'scene.yaml'
     assert [str(note) for note in scene_notes(load_scene(file))] == [
@@ -140,7 +140,7 @@ def test_a_scene_is_noted(tmp_path, kind):
     ]
 
 
-def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
+def test_check_and_scene_note_a_suspicious_link_length(tmp_path, capsys):
     folder = folder_with(tmp_path, LONG_COUPLER, SINE.replace('45', '0.5'))
     for command, name in (('check', 'linkage'), ('scene', 'scene')):
         assert main([command, str(folder / f'{name}.yaml')]) == 0
@@ -151,7 +151,7 @@ def test_a_link_of_another_unit_is_noted_by_check_and_scene(tmp_path, capsys):
         )
 
 
-def test_a_simulation_notes_what_is_in_its_scene_and_what_is_set(tmp_path, capsys):
+def test_simulate_notes_suspicious_scene_values(tmp_path, capsys):
     scene = folder_with(tmp_path, FOUR_BAR, SINE) / 'scene.yaml'
     typed = ['simulate', str(scene), '--seconds', '0.01', '-o', str(tmp_path / 'x.csv')]
     note = 'drive.sine.amplitude: 45 rad is more than a turn'
@@ -161,7 +161,7 @@ def test_a_simulation_notes_what_is_in_its_scene_and_what_is_set(tmp_path, capsy
 
 
 @pytest.mark.parametrize('kind', ['linkages', 'scenes'])
-def test_no_shipped_file_is_noted(kind):
+def test_shipped_files_get_no_notes(kind):
     files = sorted((CONFIG / kind).glob('*.yaml'))
     assert files
     for file in files:
@@ -196,7 +196,7 @@ masses: {b: {mass: 0.003, center: [4, 0], inertia: 0}}
         (FINGER + 'units: mm', ''),
     ],
 )
-def test_check_notes_lengths_in_metres_of_what_is_small(tmp_path, capsys, text, note):
+def test_check_notes_suspiciously_long_links(tmp_path, capsys, text, note):
     file = tmp_path / 'linkage.yaml'
     file.write_text(text)
     assert main(['check', str(file)]) == 0
@@ -206,7 +206,7 @@ def test_check_notes_lengths_in_metres_of_what_is_small(tmp_path, capsys, text, 
 
 
 @pytest.mark.parametrize(('ground', 'count'), [('100', 1), ('0.1', 0), ('5', 0)])
-def test_a_design_notes_a_ground_in_millimetres(ground, count, capsys):
+def test_synthesize_notes_a_ground_in_millimetres(ground, count, capsys):
     pairs = ['--pair', '30', '60', '--pair', '60', '70', '--pair', '90', '85']
     assert main(['synthesize', *pairs, '--ground', ground]) == 0
     note = f'note: --ground: {ground} m is long; if it is in millimetres, divide by 1000\n'

@@ -72,7 +72,7 @@ def load(files, folder, *, alone):
 
 
 @pytest.mark.parametrize(('group', 'text', 'line', 'known'), CASES)
-def test_a_bad_file_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(
+def test_bad_file_is_refused_by_reader_and_schema(
     tmp_path_factory, valid, group, text, line, known
 ):
     files = files_of(group, text)
@@ -110,7 +110,7 @@ LARGE = {
 
 
 @pytest.mark.parametrize('kind', LARGE)
-def test_a_file_that_is_hardly_one_is_refused_in_a_line(build, kind):
+def test_oversized_file_is_refused_in_one_line(build, kind):
     text, expected = LARGE[kind]
     with pytest.raises(FileError) as caught:
         build(SCENE + text)
@@ -127,7 +127,7 @@ def test_a_file_that_is_hardly_one_is_refused_in_a_line(build, kind):
         (b'n' * 1000, 'nnn'),
     ],
 )
-def test_a_linkage_that_is_no_file(build, named, shown):
+def test_scene_with_a_missing_linkage_file_is_refused(build, named, shown):
     with pytest.raises(FileError) as caught:
         build(b'rate: 5\nlinkage: ' + named)
     assert is_one_line(caught.value)
@@ -135,12 +135,12 @@ def test_a_linkage_that_is_no_file(build, named, shown):
 
 
 @pytest.mark.parametrize('named', [b'hoekens', b'hoeken.yaml'])
-def test_a_linkage_that_comes_with_the_package_is_meant(build, named):
+def test_misnamed_gallery_linkage_error_suggests_the_name(build, named):
     with pytest.raises(FileError, match=f"{named.decode()}' is not a file; did you mean 'hoeken'"):
         build(b'linkage: ' + named)
 
 
-def test_the_name_of_a_file_far_down_is_told(tmp_path):
+def test_long_path_error_keeps_the_file_name(tmp_path):
     folder = tmp_path / 'a_folder_with_a_long_name' / 'that_is_in_one_of_its_kind' / 'and_so_on'
     folder.mkdir(parents=True)
     (folder / 'scene.yaml').write_bytes(b'linkage: nowhere.yaml')
@@ -149,7 +149,7 @@ def test_the_name_of_a_file_far_down_is_told(tmp_path):
 
 
 @pytest.mark.parametrize('name', ['nowhere.yaml', '.', 'n' * 1000, 'nul\0', 'scene.yaml/x'])
-def test_a_scene_that_cannot_be_read(tmp_path, name):
+def test_unreadable_scene_is_refused(tmp_path, name):
     (tmp_path / 'scene.yaml').write_bytes(SCENE)
     with pytest.raises(FileError) as caught:
         load_scene(f'{tmp_path}/{name}')

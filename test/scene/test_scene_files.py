@@ -29,7 +29,7 @@ ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
 
 
 @pytest.mark.parametrize('file', sorted((CONFIG / 'scenes').glob('*.yaml')), ids=lambda f: f.stem)
-def test_every_shipped_scene_is_read_and_closes(file):
+def test_shipped_scene_loads_and_closes(file):
     scene = load_scene(file)
     assert scene.name == file.stem
     for closure in Pipeline(scene).closures:
@@ -39,7 +39,7 @@ def test_every_shipped_scene_is_read_and_closes(file):
 @pytest.mark.parametrize(
     'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda f: f.stem
 )
-def test_shipped_linkage(build, file):
+def test_shipped_linkage_loads_and_closes(build, file):
     _, pipeline = build(SCENE, file.read_bytes())
     assert_it_closes(*pipeline.closures)
 
@@ -55,7 +55,7 @@ def assert_it_closes(closure):
         assert closure.position(*inputs).joints
 
 
-def test_a_seed_that_is_not_said_follows_from_the_name_of_the_scene():
+def test_default_seed_follows_from_the_scene_name():
     files = {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
     one, other = (parse_scene(name, 'here', files).seed for name in ('press', 'leg'))
     assert one != other
@@ -66,7 +66,7 @@ def test_a_seed_that_is_not_said_follows_from_the_name_of_the_scene():
     assert parse_scene('press', 'bag', said, seed=3).seed == 7
 
 
-def test_a_scene_that_says_nothing(build):
+def test_minimal_scene_gets_the_defaults(build):
     scene, _ = build()
     assert scene.rate == 1000.0
     assert not scene.wrapped
@@ -81,7 +81,7 @@ def test_a_scene_that_says_nothing(build):
     assert scene.files == {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
 
 
-def test_a_scene_that_says_all(build):
+def test_full_scene_keeps_every_value(build):
     scene, _ = build(
         SCENE
         + b"""
@@ -103,12 +103,12 @@ record: {directory: bags, name: first, queue: 1000}
     assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
 
 
-def test_a_record_that_says_nothing(build):
+def test_empty_record_gets_the_defaults(build):
     scene, _ = build(SCENE + b'record: {}')
     assert scene.record == RecordParameters(directory='runs', name='', queue=20_000)
 
 
-def test_a_record_that_says_how_it_is_stored(build):
+def test_record_storage_values_are_read(build):
     scene, _ = build(
         SCENE
         + b"""
@@ -131,7 +131,7 @@ record:
     )
 
 
-def test_a_record_that_is_kept_in_memory(build):
+def test_snapshot_record_values_are_read(build):
     scene, _ = build(SCENE + b'record: {snapshot_seconds: 30, min_free_bytes: 1}')
     assert scene.record.storage == StorageParameters(
         snapshot_seconds=30.0, snapshot_bytes=256_000_000, min_free_bytes=1
@@ -142,13 +142,13 @@ def test_a_record_that_is_kept_in_memory(build):
     ('text', 'value'),
     [('1e3', 1000.0), ('2E+1', 20.0), ('1e-1', 0.1), ('.5', 0.5), ('7.', 7.0), ('010', 10.0)],
 )
-def test_numbers_are_those_of_yaml_1_2(build, text, value):
+def test_numbers_follow_yaml_1_2(build, text, value):
     scene, _ = build(SCENE + f'rate: {text}'.encode())
     assert scene.rate == value
 
 
 @pytest.mark.parametrize('name', ['yes', 'off', 'NO', '1:30', '1_000', 'gelenk_ä', '関節', "a'b"])
-def test_what_yaml_1_1_would_change_is_a_name(build, name):
+def test_yaml_1_1_keywords_stay_names(build, name):
     joint = f'{{parent: ground, child: {name}}}'
     linkage = (CONFIG / 'linkages' / 'four_bar.yaml').read_text()
     linkage = linkage.replace('rocker:', f'{name}:')
@@ -167,7 +167,7 @@ def test_what_yaml_1_1_would_change_is_a_name(build, name):
     ],
     ids=['byte order mark', 'CRLF', 'document marks', 'flow style'],
 )
-def test_the_same_file_written_otherwise(build, rewrite):
+def test_equivalent_file_encodings_give_the_same_scene(build, rewrite):
     assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].linkages == build()[0].linkages
 
 
@@ -210,7 +210,7 @@ joints:
     ],
     ids=['four_bar', 'inverted_slider_crank'],
 )
-def test_a_shorthand_stands_for_the_file_written_out(build, shorthand, written_out, sides):
+def test_shorthand_equals_the_file_written_out(build, shorthand, written_out, sides):
     default, _ = build(SCENE, shorthand)
     for side in sides:
         short, loop = linkage_of(build(SCENE, shorthand.replace(b'}', b', assembly: %s}' % side)))
@@ -229,7 +229,7 @@ def linkage_of(built):
     return scene.linkages[0].linkage, pipeline.closures[0]
 
 
-def test_joints_come_in_the_order_of_the_file(build):
+def test_joints_keep_the_order_of_the_file(build):
     full = FOUR_BAR_WRITTEN_OUT % b'left'
     scene, pipeline = build(SCENE, full)
     assert list(scene.linkages[0].linkage.joints) == ['coupler_joint', 'rocker_joint']
@@ -240,7 +240,7 @@ def test_joints_come_in_the_order_of_the_file(build):
     assert one == two[::-1]
 
 
-def test_joints_turn_or_slide(build):
+def test_joints_are_read_as_revolute_or_slide(build):
     scene, pipeline = build(SCENE, SLIDER_WRITTEN_OUT % b'ahead')
     assert scene.linkages[0].linkage.joints == {
         'rod_joint': RevoluteJoint('crank', 'rod'),
@@ -249,7 +249,7 @@ def test_joints_turn_or_slide(build):
     assert pipeline.closures[0].turning == (True, False)
 
 
-def test_a_bag_holds_enough_to_build_the_scene_again(build):
+def test_scene_is_rebuilt_from_its_bag_files(build):
     scene, pipeline = build(SCENE + b'effects: {velocity: {}}')
     again = parse_scene(scene.name, 'a bag', scene.files)
     assert again == scene
@@ -283,7 +283,7 @@ LIMITED = {
 @pytest.mark.parametrize(
     'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda file: file.stem
 )
-def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(file):
+def test_shipped_linkage_runs_five_seconds_with_closed_loops(file):
     scene = load_scene(file)
     assert (scene.name, scene.rate, scene.record) == (file.stem, 1000.0, None)
     pipeline = Pipeline(scene)
@@ -345,7 +345,7 @@ STARTS = {
 
 
 @pytest.mark.parametrize('kind', STARTS)
-def test_a_run_begins_where_the_pose_says(tmp_path, kind):
+def test_linkage_run_begins_at_its_pose(tmp_path, kind):
     text, start, lowest, highest = STARTS[kind]
     file = tmp_path / 'designed.yaml'
     file.write_text(f'{text}pose: {{inputs: [{start!r}]}}\n')
@@ -365,7 +365,7 @@ def test_a_run_begins_where_the_pose_says(tmp_path, kind):
 
 @pytest.mark.parametrize('end', [LOW, HIGH])
 @pytest.mark.parametrize('beyond', [0.0, 1e-12, -1e-12])
-def test_a_start_at_a_toggle_is_where_the_swing_turns_back(tmp_path, end, beyond):
+def test_start_at_a_toggle_becomes_the_swing_end(tmp_path, end, beyond):
     file = tmp_path / 'designed.yaml'
     file.write_text(f'{FOLDS}pose: {{inputs: [{end + beyond!r}]}}\n')
     pipeline = Pipeline(load_scene(file))
@@ -393,7 +393,7 @@ def test_a_start_at_a_toggle_is_where_the_swing_turns_back(tmp_path, end, beyond
         ),
     ],
 )
-def test_a_start_where_no_loop_closes(tmp_path, text, said):
+def test_start_without_a_closed_loop_is_refused(tmp_path, text, said):
     (tmp_path / 'designed.yaml').write_text(text)
     with pytest.raises(FileError) as caught:
         load_scene(tmp_path / 'designed.yaml')
@@ -402,14 +402,14 @@ def test_a_start_where_no_loop_closes(tmp_path, text, said):
     assert f'designed.yaml:{line}: pose.inputs: {said}' in str(caught.value)
 
 
-def test_a_pose_with_points_is_where_an_iteration_starts_and_no_run(tmp_path):
+def test_pose_points_do_not_set_the_run_start(tmp_path):
     text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
     assert 'inputs: [0.0], points:' in text
     (tmp_path / 'posed.yaml').write_text(text)
     assert load_scene(tmp_path / 'posed.yaml').linkages[0].drive[1].start == SIXTY
 
 
-def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path):
+def test_iterated_linkage_needs_the_pose_points(tmp_path):
     text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
     head, _, tail = text.partition(', points: {')
     (tmp_path / 'posed.yaml').write_text(head + tail.partition('}')[2])
@@ -422,7 +422,7 @@ def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path):
     )
 
 
-def test_a_bag_holds_all_of_it(tmp_path):
+def test_linkage_run_is_rebuilt_from_its_files(tmp_path):
     (tmp_path / 'designed.yaml').write_bytes(FOUR_BAR)
     scene = load_scene(tmp_path / 'designed.yaml')
     assert set(scene.files) == {'scene.yaml', 'linkage.yaml'}
@@ -435,7 +435,7 @@ def test_a_bag_holds_all_of_it(tmp_path):
         assert one.tick(now).message == other.tick(now).message != b''
 
 
-def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path):
+def test_generated_scene_text_loads_as_a_scene(tmp_path):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     alone = load_scene(tmp_path / 'linkage.yaml')
     (tmp_path / 'scene.yaml').write_bytes(alone.files['scene.yaml'])
@@ -444,7 +444,7 @@ def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path):
     assert (beside.linkages, beside.rate) == (alone.linkages, alone.rate)
 
 
-def test_a_scene_names_a_linkage_that_comes_with_the_package(tmp_path):
+def test_scene_may_name_a_gallery_linkage(tmp_path):
     file = tmp_path / 'scene.yaml'
     for name in ('hoeken', 'four_bar'):
         file.write_text(f'linkage: {name}')

@@ -84,14 +84,14 @@ def content_of(data: bytes) -> Any:
 
 
 @pytest.mark.parametrize('kind', SCHEMAS)
-def test_the_schema_is_one(kind):
+def test_schema_is_valid_json_schema(kind):
     schema = SCHEMAS[kind]()
     assert schema['$schema'] == 'https://json-schema.org/draft/2020-12/schema'
     Validator.check_schema(schema)
 
 
 @pytest.mark.parametrize('kind', SCHEMAS)
-def test_the_published_file_is_what_the_code_says(kind):
+def test_published_schema_file_equals_the_code(kind):
     published = (CONFIG / 'schema' / f'{kind}.schema.json').read_text('utf-8')
     assert published == as_text(SCHEMAS[kind]()), 'run make schema'
 
@@ -106,7 +106,7 @@ def test_a_shipped_file_is_valid_and_names_its_schema(path, valid):
     assert (path.parent / first.partition('=')[2]).is_file()
 
 
-def test_all_that_scenes_can_name_is_in_the_schema():
+def test_schema_lists_all_drives_effects_and_faults():
     schema = scene_schema()
     own = schema['$defs']
     assert list(own['drive']['properties']) == list(DRIVES)
@@ -120,7 +120,7 @@ def test_all_that_scenes_can_name_is_in_the_schema():
             ]
 
 
-def test_no_mapping_lets_strangers_in():
+def test_schema_mappings_allow_no_unknown_keys():
     def mappings(schema):
         if isinstance(schema, dict):
             if schema.get('type') == 'object':
@@ -161,7 +161,7 @@ def test_no_mapping_lets_strangers_in():
         'linkage: linkage.yaml\ndrive: {}\neffects: {}',
     ],
 )
-def test_the_schema_takes_good_scenes(scene, build, valid):
+def test_schema_accepts_valid_scenes(scene, build, valid):
     build(scene.encode())
     assert valid('scene', content_of(scene.encode()))
 
@@ -193,7 +193,7 @@ SHIPPED = [files_of(path) for path in SCENES]
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
-def test_what_the_reader_takes_of_damaged_files_the_schema_takes_too(data, valid):
+def test_schema_accepts_all_files_the_reader_accepts(data, valid):
     contents = deepcopy(data.draw(st.sampled_from(SHIPPED)))
     damaged = contents[data.draw(st.sampled_from(sorted(contents)))]
     for _ in range(data.draw(st.integers(1, 2))):
@@ -325,7 +325,7 @@ def reads(content: dict[str, Any], of: Any) -> bool:
 
 @pytest.mark.sample(10)
 @pytest.mark.parametrize('what', TYPES)
-def test_schema_and_reader_take_the_same_parameters(what):
+def test_schema_and_reader_accept_the_same_parameters(what):
     of = TYPES[what]
     validator = Validator(parameters_schema(of))
 
@@ -384,13 +384,13 @@ GOOD = {
     ],
     ids=str,
 )
-def test_what_a_declaration_takes(change, taken):
+def test_schema_and_reader_agree_on_parameter_declarations(change, taken):
     content = GOOD | change
     assert Validator(parameters_schema(AllKinds)).is_valid(content) == taken
     assert reads(content, AllKinds) == taken
 
 
-def test_an_editor_is_told_meaning_unit_bounds_and_default():
+def test_schema_describes_unit_bounds_and_default():
     said = parameters_schema(AllKinds)
     assert said['description'] == 'Parameters of every kind.'
     assert said['required'] == ['must', 'table', 'path', 'ones']
@@ -408,21 +408,21 @@ def test_an_editor_is_told_meaning_unit_bounds_and_default():
     }  # fmt: skip
 
 
-def test_a_schema_takes_a_bounded_length_in_every_unit_of_a_file():
+def test_schema_bounds_cover_every_file_unit():
     one = Number('where', 'rad/s or m/s', least=-0.5, most=2.0).json_schema()
     assert (one['minimum'], one['maximum']) == (-500, 2000)  # [mm/s]
     one = Number('where', 'rad', least=0.0, most=0.5 * pi).json_schema()
     assert (one['minimum'], one['maximum']) == (0, 90)  # [deg]
 
 
-def test_every_shipped_scene_is_read_after_all():
+def test_every_shipped_scene_loads():
     # That a file is valid says nothing if nobody reads it.
     for path in SCENES:
         assert load_scene(path).linkages
     assert json.loads(as_text(scene_schema()))['title'] == 'Scene'
 
 
-def test_play_under_torque_is_refused_where_both_stand_in_one_place(valid):
+def test_schema_refuses_backlash_beside_a_torque_drive(valid):
     play, torque = {'backlash': {'play': 0.1}}, {'torque': {}}
     here = {'linkage': 'l', 'drive': torque, 'effects': play}
     assert not valid('scene', here)

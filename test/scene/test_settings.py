@@ -48,7 +48,7 @@ SET = {
 
 
 @pytest.mark.parametrize('kind', SET)
-def test_keys_with_dots_are_reached(kind, scene):
+def test_set_option_reaches_keys_with_dots(kind, scene):
     text, settings, expected = SET[kind]
     loaded = scene(text, *settings)
     (scene_linkage,) = loaded.linkages
@@ -71,7 +71,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('setting', REFUSED)
-def test_what_is_no_key_is_refused_in_one_line(setting, scene):
+def test_set_option_refuses_unknown_keys_in_one_line(setting, scene):
     with pytest.raises(FileError) as caught:
         scene(FORCES, setting)
     line = str(caught.value)

@@ -64,19 +64,19 @@ def write(tmp_path):
     return write
 
 
-def test_a_linkage_in_millimetres_and_degrees_is_that_in_si_to_the_last_bit(write):
+def test_linkage_in_millimetres_equals_the_si_one(write):
     assert load(write(IN_MM)).linkage == load(write(IN_SI, 'si.yaml')).linkage
 
 
 @pytest.mark.parametrize('unit', LENGTHS)
 @given(digits=st.integers(-(10**12), 10**12), places=st.integers(0, 9))
-def test_a_length_is_the_nearest_double_to_the_decimal_in_the_file(unit, digits, places):
+def test_converted_length_is_the_nearest_double(unit, digits, places):
     exact = Fraction(digits, 10**places)
     metres = Units(unit).to_si(float(exact), 'm')
     assert metres == float(exact * Fraction(LENGTHS[unit]))
 
 
-def test_right_angles_are_those_of_the_library():
+def test_right_angles_convert_exactly():
     turns = {90: 0.5 * pi, 180: pi, 360: 2.0 * pi, -180: -pi}
     read = Units(angle='degrees').to_si
     assert {degrees: read(degrees, 'rad') for degrees in turns} == turns
@@ -105,7 +105,7 @@ SHORTHANDS = {
 
 
 @pytest.mark.parametrize('kind', SHORTHANDS)
-def test_a_shorthand_has_units_too(write, kind):
+def test_shorthand_linkages_accept_units(write, kind):
     with_units, in_si = (load(write(text)).linkage for text in SHORTHANDS[kind])
     assert with_units == in_si
 
@@ -142,20 +142,20 @@ loads: {gravity: [0, -9.81], springs: {s: {from: ground.O4, to: coupler.B, stiff
 """
 
 
-def test_a_scene_has_its_own_units_and_other_quantities_stay_in_si(write):
+def test_scene_units_convert_only_lengths_and_angles(write):
     write(IN_SI, 'linkage.yaml')
     scene, in_si = load_scene(write(SCENE)), load_scene(write(SCENE_IN_SI, 'si.yaml'))
     assert scene.wrapped
     assert scene.linkages == in_si.linkages
 
 
-def test_a_bag_holds_the_file_as_written_and_is_read_the_same(write):
+def test_scene_in_units_is_rebuilt_from_its_files(write):
     write(IN_MM, 'linkage.yaml')
     scene = load_scene(write(SCENE))
     assert parse_scene('file', 'bag', scene.files).linkages == scene.linkages
 
 
-def test_a_scene_in_units_runs_as_that_in_si(write):
+def test_scene_in_units_runs_as_in_si(write):
     write(IN_MM, 'linkage.yaml')
     seconds = [0, 10**7, 2 * 10**7]
     runs = []
@@ -190,7 +190,7 @@ TORQUE = 'drive: {torque: {start: 30}}\n'
 PUSHED = 'drive: {torque: {start: 500}}\n'
 
 
-def test_a_driven_slide_is_given_as_a_length(write):
+def test_slide_drive_parameters_are_lengths(write):
     write(SLIDE, 'linkage.yaml')
     drive = 'drive: {sine: {amplitude: 40, frequency: 1, mean: 500, phase: 90}}'
     scene = load_scene(write(f'linkage: linkage.yaml\nunits: mm\nangles: degrees\n{drive}'))
@@ -198,7 +198,7 @@ def test_a_driven_slide_is_given_as_a_length(write):
     assert (sine.amplitude, sine.mean, sine.phase) == (0.04, 0.5, 0.5 * pi)
 
 
-def test_what_is_set_has_the_units_of_the_scene(write):
+def test_set_option_uses_the_units_of_the_scene(write):
     write(IN_SI, 'linkage.yaml')
     settings = ['drive.sine.amplitude=30', 'effects.tolerance.given={crank.A: [0.2, 0]}']
     (scene_linkage,) = load_scene(write(SCENE), settings).linkages
@@ -210,7 +210,7 @@ def test_what_is_set_has_the_units_of_the_scene(write):
     assert metres.effects['tolerance'].given == {'crank.A': (0.2, 0.0)}
 
 
-def test_an_error_in_what_is_set_is_told_in_the_units_of_the_scene(write):
+def test_set_option_error_uses_the_scene_units(write):
     write(IN_SI, 'linkage.yaml')
     with pytest.raises(FileError) as caught:
         load_scene(write(SCENE), ['loads.gravity=[0, -1.0e+9]'])
@@ -220,7 +220,7 @@ def test_an_error_in_what_is_set_is_told_in_the_units_of_the_scene(write):
     )
 
 
-def test_a_linkage_in_units_comes_back_from_its_urdf_in_si(write, tmp_path):
+def test_urdf_round_trip_returns_si_units(write, tmp_path):
     tree = IN_MM.replace('joints: {', 'joints: {coupler_joint: {parent: crank, child: coupler}, ')
     linkage, urdf, back = write(tree), tmp_path / 'x.urdf', tmp_path / 'back.yaml'
     assert main(['urdf', str(linkage), '-o', str(urdf)]) == 0
@@ -235,7 +235,7 @@ def test_a_linkage_in_units_comes_back_from_its_urdf_in_si(write, tmp_path):
     assert other.gap == one.gap == 0.0
 
 
-def test_a_design_in_millimetres_needs_one_line_more(write, tmp_path):
+def test_synthesized_design_in_millimetres_needs_a_units_line(write, tmp_path):
     pairs = ['--pair', '50', '100', '--pair', '80', '110', '--pair', '110', '125']
     files = {ground: tmp_path / f'{ground}.yaml' for ground in ('0.1', '100')}
     for ground, file in files.items():
@@ -255,7 +255,7 @@ effects:
 """
 
 
-def test_tables_over_an_input_and_rates_of_pins_have_the_unit_of_what_moves(write):
+def test_force_tables_use_the_unit_of_their_joint(write):
     write(SLIDE_WITH_MASSES, 'linkage.yaml')
     in_si = load_scene(
         write(FORCES.format(start=0.5, rate=0.045, stribeck=0.005, turn=0.5 * pi), 'si.yaml')
@@ -273,7 +273,7 @@ WORDS = {
 
 
 @pytest.mark.parametrize('words', WORDS)
-def test_angles_of_a_scene_name_how_they_are_published_and_their_unit(write, words):
+def test_angles_key_sets_publishing_and_unit(write, words):
     write(IN_SI, 'linkage.yaml')
     scene = load_scene(write(f'linkage: linkage.yaml\nangles: {words}'))
     assert (scene.wrapped, scene.linkages[0].content.units.angle) == WORDS[words]

@@ -98,7 +98,7 @@ def test_a_killed_worker_loses_no_finished_run(capsys):
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('workers', ['1', '2'])
 @pytest.mark.parametrize('ended_by', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_study_that_is_ended_itself_goes_on(ended_by, workers, capsys):
+def test_stopped_study_continues_with_the_same_command(ended_by, workers, capsys):
     study, kept = begun('--workers', workers)
     study.send_signal(ended_by)
     _, said = study.communicate(timeout=PATIENCE)
@@ -123,7 +123,7 @@ def finished(monkeypatch):
     return Path('x.csv.part'), [*options, '-o', 'x.csv']
 
 
-def test_a_line_that_was_cut_anywhere_costs_one_run(finished, capsys):
+def test_truncated_line_of_a_study_repeats_one_run(finished, capsys):
     kept, again = finished
     whole = kept.read_bytes()
     *_, last = whole.splitlines(keepends=True)
@@ -143,7 +143,7 @@ def test_a_line_that_was_cut_anywhere_costs_one_run(finished, capsys):
     'lines',
     [b'{}\n', b'[]\n', b'null\n', b'{"run": 99}\n', b'\xff\n', b'1' * 100_000, b'[' * 100_000],
 )
-def test_lines_of_somebody_else_count_as_none(lines, finished, capsys):
+def test_foreign_lines_in_a_study_file_are_ignored(lines, finished, capsys):
     kept, again = finished
     head = kept.read_bytes().splitlines(keepends=True)[0]
     kept.write_bytes(head + lines)
@@ -155,7 +155,7 @@ def test_lines_of_somebody_else_count_as_none(lines, finished, capsys):
 @pytest.mark.parametrize(
     'other', ['--set=seed=3', '--seconds=0.2', '--seeds=4', '--sweep=rate=1,2']
 )
-def test_the_runs_of_another_study_are_not_taken(other, finished, capsys):
+def test_runs_of_another_study_are_refused(other, finished, capsys):
     kept, again = finished
     whole = kept.read_bytes()
     assert main([*again, other]) == 2
@@ -163,7 +163,7 @@ def test_the_runs_of_another_study_are_not_taken(other, finished, capsys):
     assert kept.read_bytes() == whole
 
 
-def test_a_run_that_raises_what_nobody_expected_is_a_line(monkeypatch, capsys):
+def test_unexpected_exception_in_a_run_is_one_line(monkeypatch, capsys):
     def fail(*_):
         raise ZeroDivisionError('\x1b[2J')
 
@@ -175,7 +175,7 @@ def test_a_run_that_raises_what_nobody_expected_is_a_line(monkeypatch, capsys):
     assert not Path('x.csv.part').exists()
 
 
-def test_a_study_that_fails_at_once_ends_its_processes_in_order():
+def test_study_that_fails_at_once_ends_its_processes():
     # Torn down while the interpreter ended, they wrote a traceback in one of some ten studies.
     for _ in range(6):
         study = started('x.csv', '--sweep', 'rate=-1,-2', '--seeds', '1', '--workers', '2')
@@ -185,7 +185,7 @@ def test_a_study_that_fails_at_once_ends_its_processes_in_order():
         assert said.count('\n') == 2, said
 
 
-def test_the_runs_are_not_kept_where_a_link_leads(capsys):
+def test_study_does_not_write_through_a_symbolic_link(capsys):
     precious = Path('precious')
     precious.write_text('content')
     Path('worn.csv.part').symlink_to(precious)

@@ -50,7 +50,7 @@ def study_of(scene, seconds, instants=11):
     return Study(scene.name, scene.files, scene.folder, seconds, instants)
 
 
-def test_all_combinations_run_with_every_seed():
+def test_study_runs_all_combinations_with_every_seed():
     sweeps = [
         ParameterSweep('rate', (100.0, 200.0)),
         ParameterSweep('loads.drive_inertia', (1e-4, 1e-3, 1e-2)),
@@ -62,7 +62,7 @@ def test_all_combinations_run_with_every_seed():
     assert runs_of([], 1, 9) == [()]
 
 
-def test_values_of_a_sweep():
+def test_sweep_reads_a_range_or_a_list():
     assert sweep_of('rate=1:2:5') == ParameterSweep('rate', (1.0, 1.25, 1.5, 1.75, 2.0))
     assert sweep_of('a.b=-1,2e3') == ParameterSweep('a.b', (-1.0, 2000.0))
 
@@ -72,12 +72,12 @@ def test_values_of_a_sweep():
     ['rate', '=1,2', 'rate=', 'rate=a,b', 'rate=1:2', 'rate=1:2:1', 'rate=1:2:3:4', 'rate=1:2:x',
      'rate=nan,1', 'rate=1:inf:3', 'drive.torque.method=rk4,gauss_legendre'],
 )  # fmt: skip
-def test_a_sweep_that_is_none_is_refused(text):
+def test_malformed_sweep_is_refused(text):
     with pytest.raises(LinkageError, match='is neither KEY=LOW:HIGH:N nor KEY=a,b,c'):
         sweep_of(text)
 
 
-def test_a_study_is_bounded():
+def test_study_limits_its_number_of_runs():
     with pytest.raises(LinkageError, match='has 1,000,000,000 runs, more than 100,000'):
         sweep_of('rate=1:2:1000000000')
     with pytest.raises(LinkageError, match='has 1,000,000 runs, more than 100,000'):
@@ -92,7 +92,7 @@ def test_a_study_is_bounded():
         assert runs * joints * instants <= 24_000_000
 
 
-def test_a_run_is_reduced_to_what_its_messages_say(noisy):
+def test_run_statistics_equal_those_of_its_messages(noisy):
     outcome = run_one(study_of(noisy, 1.0), (('seed', 3), ('drive.constant_rate.rate', 5.0)))
     scene = load_scene('noisy.yaml', ['seed=3', 'drive.constant_rate.rate=5.0'])
     pipeline, reader = Pipeline(scene), JointStateReader(scene.joint_names)
@@ -109,7 +109,7 @@ def test_a_run_is_reduced_to_what_its_messages_say(noisy):
         assert list(outcome.positions[index]) == at
 
 
-def test_the_spread_over_seeds_is_that_of_the_noise(noisy):
+def test_spread_over_seeds_equals_the_noise(noisy):
     ideal = load_scene('noisy.yaml', ['effects={}'])
     (line,) = Pipeline(ideal).linkages
     line.interpret(BEGIN)
@@ -120,7 +120,7 @@ def test_the_spread_over_seeds_is_that_of_the_noise(noisy):
     assert kstest((np.array(found) - exact) / 0.001, 'norm').pvalue > 1e-3
 
 
-def test_processes_give_the_same_table_as_one(noisy):
+def test_two_processes_give_the_table_of_one(noisy):
     for workers in ('1', '2'):
         assert main(['simulate', 'noisy.yaml', '--seconds', '0.3', '--seeds', '5', '--workers',
                      workers, '-o', f'{workers}.csv']) == 0  # fmt: skip
@@ -131,7 +131,7 @@ def test_processes_give_the_same_table_as_one(noisy):
     assert len({row['rocker_joint mean [rad]'] for row in rows}) == 5
 
 
-def test_a_run_that_fails_is_named_and_loses_no_other(noisy, capsys):
+def test_failed_run_is_named_and_the_others_finish(noisy, capsys):
     assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--sweep', 'rate=100,-5,200',
                  '--workers', '1', '-o', 'x.csv']) == 0  # fmt: skip
     named, counted = capsys.readouterr().err.splitlines()
@@ -145,7 +145,7 @@ def test_a_run_that_fails_is_named_and_loses_no_other(noisy, capsys):
     assert not Path('y.csv').exists()
 
 
-def test_runs_that_fail_for_one_reason_name_it_once(noisy, capsys):
+def test_runs_failing_for_one_reason_name_it_once(noisy, capsys):
     # The numbers in the reason are those of the runs.
     values = ','.join(f'-{value}' for value in range(1, 6))
     assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--sweep', f'rate={values}',
@@ -156,7 +156,7 @@ def test_runs_that_fail_for_one_reason_name_it_once(noisy, capsys):
     assert counted == 'linkage simulate: 5 of 5 runs failed'
 
 
-def test_the_spread_is_drawn(noisy):
+def test_study_draws_the_spread_of_joints(noisy):
     assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--seeds', '3', '--workers', '1',
                  '-o', 'x.parquet', '--picture', 'x.svg']) == 0  # fmt: skip
     drawn = Path('x.svg').read_text()
@@ -164,7 +164,7 @@ def test_the_spread_is_drawn(noisy):
         assert f'<!-- {text} -->' in drawn
 
 
-def test_options_of_a_study_need_one(noisy, capsys):
+def test_study_options_without_a_study_are_refused(noisy, capsys):
     for option in (['--picture', 'x.png'], ['--workers', '2'], ['--dask', 'tcp://x:1']):
         assert main(['simulate', 'noisy.yaml', '-o', 'x.csv', *option]) == 2
         assert f'{option[0]}: is for a study; add --seeds or --sweep' in capsys.readouterr().err

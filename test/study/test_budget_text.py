@@ -49,11 +49,11 @@ TEXTS = {
 
 
 @pytest.mark.parametrize('value', TEXTS)
-def test_errors_as_people_read_them(value: float) -> None:
+def test_error_texts_are_human_readable(value: float) -> None:
     assert error_text(value) == TEXTS[value]
 
 
-def test_an_error_keeps_two_digits() -> None:
+def test_error_text_keeps_two_digits() -> None:
     random = Random(1)
     for _ in range(3000):
         value = 10.0 ** random.uniform(-20.0, 6.0)
@@ -73,7 +73,7 @@ def test_an_error_keeps_two_digits() -> None:
         ((0.0, 0.0, 0.0), '0.000'),
     ],
 )
-def test_times_have_the_digits_that_their_spread_allows(
+def test_time_text_has_the_digits_of_its_spread(
     spread: tuple[float, float, float], text: str
 ) -> None:
     assert time_text(Spread(*spread)) == text
@@ -91,7 +91,7 @@ def test_times_have_the_digits_that_their_spread_allows(
         (-0.031, '−3.1 %'),
     ],
 )
-def test_shares_of_a_core(share: float, text: str) -> None:
+def test_share_text_gives_the_core_percentage(share: float, text: str) -> None:
     assert share_text(share) == text
 
 
@@ -100,7 +100,7 @@ def test_shares_of_a_core(share: float, text: str) -> None:
     [(1.0, 0.9, 1.1, False), (-33.85, -34.0, -33.0, False), (-0.2, -3.0, 2.0, True),
      (0.1, 0.0, 0.2, True), (0.3, 0.25, 0.35, False)],
 )  # fmt: skip
-def test_a_price_within_its_spread_is_no_number(
+def test_price_within_its_spread_is_printed_as_noise(
     middle: float, low: float, high: float, is_noise: bool
 ) -> None:
     price = Price(Spread(low, middle, high), 1000.0)
@@ -112,7 +112,7 @@ def test_a_price_within_its_spread_is_no_number(
 CHEAPEST = STEP.settings[2].instruction
 
 
-def test_the_first_lines_answer() -> None:
+def test_lead_lines_name_worst_error_and_cheapest_remedy() -> None:
     assert lead_lines(BUDGET) == [
         'hil: 0.023 rad off at worst after 10 s, mostly by the step of the drive',
         f'less than a fifth of it: {CHEAPEST} (+6.1 µs a tick, 0.6 % of a core)',
@@ -120,7 +120,7 @@ def test_the_first_lines_answer() -> None:
     ]
 
 
-def test_another_greatest_error_has_another_answer() -> None:
+def test_lead_lines_follow_the_greatest_error() -> None:
     age = AGE._replace(chosen=0)
     lines = lead_lines(BUDGET._replace(knobs=[age, SOLVING]))
     assert lines[0] == 'hil: 0.030 rad off at worst, by the age in use'
@@ -129,7 +129,7 @@ def test_another_greatest_error_has_another_answer() -> None:
     assert lines[1] == 'no measured setting reduces it'
 
 
-def test_the_first_line_names_the_greatest_error_and_the_sum() -> None:
+def test_lead_line_names_greatest_error_and_sum() -> None:
     for budget in random_budgets():
         _check_first_line(budget)
 
@@ -151,7 +151,7 @@ def _check_first_line(budget: Budget) -> None:
         assert f' {error_text(sum(errors.values()))} rad off' in lines[0]
 
 
-def test_what_is_advised_can_be_asked_for_and_is_what_it_is_called() -> None:
+def test_advised_settings_can_be_requested() -> None:
     for budget in random_budgets():
         _check_advice(budget)
 
@@ -170,7 +170,7 @@ def _check_advice(budget: Budget) -> None:
             assert better.error.worst < knob.own_setting.error.worst
 
 
-def test_rows_are_sorted_complete_and_print_no_noise() -> None:
+def test_budget_rows_are_sorted_complete_and_without_noise() -> None:
     for budget in random_budgets():
         _check_rows(budget)
 
@@ -198,7 +198,7 @@ def _check_rows(budget: Budget) -> None:
     assert not count or f'; {count} of ' in closing_lines(budget)[0]
 
 
-def test_json_holds_all_of_it() -> None:
+def test_budget_json_holds_every_knob() -> None:
     for budget in random_budgets():
         _check_json(budget)
 
@@ -214,6 +214,6 @@ def _check_json(budget: Budget) -> None:
         assert own['core'] == pytest.approx(said['tick']['core'])
 
 
-def test_a_line_is_yaml() -> None:
+def test_setting_instruction_is_valid_yaml() -> None:
     setting = Setting('x', JointError(0.0, 0.0), None, [('a.b', 1e-5), ('c', 500.0), ('d', False)])
     assert setting.instruction == 'a.b: 0.00001, c: 500, d: false'

@@ -135,9 +135,7 @@ def joints_of(name, theta):
 @pytest.mark.parametrize(
     ('name', 'text', 'method', 'limits', 'like', 'truth'), TORQUE, ids=lambda each: str(each)[:24]
 )
-def test_the_step_of_a_drive_is_as_far_off_as_a_run_is(
-    tmp_path, name, text, method, limits, like, truth
-):
+def test_claimed_drive_step_error_equals_a_run(tmp_path, name, text, method, limits, like, truth):
     scene = scene_of(tmp_path, text, method, limits)
     (motion,) = motions_of(scene, like, HORIZON)
     worst, rms, claimed = compared(scene, motion, HORIZON, name, partial(truth, motion))
@@ -153,7 +151,7 @@ WEIGHED = f"""{RSSR}masses:
 """
 
 
-def test_the_step_of_a_drive_in_space_is_as_far_off_as_bodies_say(tmp_path):
+def test_claimed_spatial_step_error_equals_lagrange_multipliers(tmp_path):
     """The truth is of Lagrange multipliers in absolute coordinates, by DOP853."""
     (tmp_path / 'rssr.yaml').write_text(WEIGHED)
     (tmp_path / 'scene.yaml').write_text(
@@ -202,7 +200,7 @@ SAMPLE = int(os.environ.get('LINKAGE_STATES', '3'))
 
 
 @pytest.mark.parametrize('seed', range(SAMPLE))
-def test_random_scenes_are_as_far_off_as_claimed(tmp_path, seed):
+def test_random_scene_errors_equal_the_claimed_ones(tmp_path, seed):
     rng = random.Random(seed)
     inertia, viscous = 10.0 ** rng.uniform(-3.5, -2.5), 10.0 ** rng.uniform(-5.0, -3.0)
     dry, gravity = rng.choice([0.0, rng.uniform(0.0, 0.004)]), rng.choice([0.0, 9.81])
@@ -237,7 +235,7 @@ def samples_of(motion, joints, rate, phase, horizon):
 
 
 @pytest.mark.parametrize('carried', [True, False])
-def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
+def test_claimed_command_age_error_equals_sampled_runs(tmp_path, carried):
     (tmp_path / 'scene.yaml').write_text(
         'linkage: four_bar\nrate: 100\ndrive: {topic: {carry_forward: '
         f'{str(carried).lower()}}}}}\n'
@@ -263,7 +261,7 @@ def test_the_age_of_a_command_is_that_of_samples_at_100_hz(tmp_path, carried):
         ('rssr', 100.0), ('delta', 200.0), ('ankle_motors', 200.0), ('wishbone', 100.0),
     ],
 )  # fmt: skip
-def test_the_age_in_use_is_that_of_a_listener(tmp_path, name, rate):
+def test_claimed_age_in_use_error_equals_a_listener(tmp_path, name, rate):
     (tmp_path / 'scene.yaml').write_text(
         f'linkage: {name}\nrate: {rate}\neffects: {{velocity: {{}}}}\n'
     )
@@ -332,7 +330,7 @@ def of_all_phases(closure, speed, age):
 @pytest.mark.parametrize('rpm', SPEEDS)
 @pytest.mark.parametrize('name', ['four_bar', 'whitworth_quick_return', 'slider_crank'])
 @pytest.mark.parametrize('periods', [QUICK, 300])
-def test_the_age_in_use_knows_all_phases_of_a_steady_crank(tmp_path, name, rpm, periods):
+def test_age_in_use_error_covers_all_crank_phases(tmp_path, name, rpm, periods):
     speed, rates = rpm * tau / 60.0, [100.0, 1000.0, 2000.0]
     (tmp_path / 'scene.yaml').write_text(
         f'linkage: {name}\ndrive: {{constant_rate: {{rate: {speed}, start: 2.0}}}}\n'
@@ -350,7 +348,7 @@ def test_the_age_in_use_knows_all_phases_of_a_steady_crank(tmp_path, name, rpm, 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('rpm', SPEEDS)
 @pytest.mark.parametrize('carried', [True, False])
-def test_the_age_of_a_command_knows_all_phases_of_a_steady_crank(tmp_path, rpm, carried):
+def test_command_age_error_covers_all_crank_phases(tmp_path, rpm, carried):
     speed, rate = rpm * tau / 60.0, 500.0
     (tmp_path / 'scene.yaml').write_text(
         'linkage: four_bar\nrate: 1000\n'
@@ -373,7 +371,7 @@ def test_the_age_of_a_command_knows_all_phases_of_a_steady_crank(tmp_path, rpm, 
 
 
 @pytest.mark.parametrize('most', [48, 500])
-def test_times_that_are_judged_meet_all_phases_of_a_round_period(most):
+def test_sampled_times_cover_all_phases_evenly(most):
     # Of solving (48 times) and of the drive's step (500 ticks), over 10 s.
     for hertz in (*range(1, 41), 50, 60, 75, 100, 125):
         of_ticks = gcd(1000, hertz) / 1000  # distance of the phases that ticks have at all

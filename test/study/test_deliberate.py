@@ -52,7 +52,7 @@ def rockers(times: object) -> np.ndarray:
 TIMES = np.arange(TICKS) / RATE
 
 
-def test_the_reference_is_what_is_published() -> None:
+def test_reference_rocker_angles_equal_the_published_states() -> None:
     states = [
         state['rocker_joint'] for _, state in published_states(scene_of(''), turn_crank, 100)
     ]
@@ -89,7 +89,7 @@ EXPECTED: dict[str, tuple[float, float]] = {
 
 
 @pytest.mark.parametrize('effect', EXPECTED)
-def test_an_effect_alone(effect: str) -> None:
+def test_single_effect_error_equals_its_closed_form(effect: str) -> None:
     (found,) = compare_runs(scene_of(f'effects: {{{effect}}}'), [scene_of('')], turn_crank, TICKS)
     rms, worst = EXPECTED[effect]
     assert found.error.rms == pytest.approx(rms, rel=0.1)
@@ -97,13 +97,13 @@ def test_an_effect_alone(effect: str) -> None:
     assert found.silent == 0.0
 
 
-def test_a_state_that_is_withheld_is_old_for_who_holds_it() -> None:
+def test_rate_limit_error_equals_a_held_state() -> None:
     one = scene_of('effects: {rate_limit: {rate: 100}}')
     (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
     assert found.error == pytest.approx(shown(np.arange(TICKS) // 10 * 10), rel=1e-6)
 
 
-def test_lost_states_are_told() -> None:
+def test_dropout_error_reports_the_silent_share() -> None:
     one = scene_of('effects: {dropout: {probability: 0.3}}')
     (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
     news = [is_new for is_new, _ in published_states(one, turn_crank, TICKS)]
@@ -115,7 +115,7 @@ def test_lost_states_are_told() -> None:
     assert found.error == pytest.approx(shown(last), rel=1e-6)
 
 
-def test_a_delay_is_the_motion_within_it() -> None:
+def test_delay_error_equals_the_motion_within_it() -> None:
     one = scene_of('effects: {delay: {seconds: 0.02}}')
     (found,) = compare_runs(one, [scene_of('')], turn_crank, TICKS)
     ticks = np.arange(TICKS)
@@ -123,7 +123,7 @@ def test_a_delay_is_the_motion_within_it() -> None:
     assert found.error == pytest.approx(shown(late), rel=1e-6)
 
 
-def test_a_fault_shows_at_the_times_of_the_scene() -> None:
+def test_freeze_fault_error_appears_at_its_times() -> None:
     one = scene_of('faults: {f: {freeze: {}, at: [0.5], seconds: 0.25}}')
     bare = scene_of('')
     (found,) = compare_runs(one, [bare], turn_crank, TICKS)
@@ -139,14 +139,14 @@ def test_a_fault_shows_at_the_times_of_the_scene() -> None:
     assert found.error.rms == pytest.approx(rms, rel=0.02)
 
 
-def test_a_clock_that_jumps_back_does_not_end_the_run() -> None:
+def test_clock_jump_back_does_not_end_the_run() -> None:
     one = scene_of('faults: {f: {time_jump: {by: -0.3}, at: [0.5], seconds: 0.2}}')
     ticks = list(islice(published_states(one, turn_crank, TICKS), TICKS))
     assert len(ticks) == TICKS
     assert all(is_new for is_new, _ in ticks)
 
 
-def test_rows_of_a_scene() -> None:
+def test_budget_lists_every_effect_and_fault() -> None:
     scene = scene_of(
         'effects: {encoder: {joints: {rocker_joint: {counts: 1000}}}, velocity: {}, effort: {}}\n'
         'loads: {gravity: [0, -9.81]}\n'
@@ -165,7 +165,7 @@ def test_rows_of_a_scene() -> None:
     assert by_name['encoder'].after is None
 
 
-def test_few_lost_states_are_not_told_as_none() -> None:
+def test_rare_silence_is_reported_in_the_note() -> None:
     # One of 1,000 ticks publishes nothing.
     knobs = measure_deliberate(
         scene_of('faults: {f: {silence: {}, at: [0.5], seconds: 0.001}}'), quick=True, horizon=1.0
@@ -174,7 +174,7 @@ def test_few_lost_states_are_not_told_as_none() -> None:
     assert note == 'nothing is published at 0.1 % of the ticks'
 
 
-def test_a_torque_scene_says_after_which_time() -> None:
+def test_torque_scene_error_names_its_duration() -> None:
     scene = scene_of(
         'effects: {friction: {joints: {O2: {viscous: 1.0e-4}}}}\nloads: {gravity: [0, -9.81]}\n',
         'torque: {start: 0.5}',
@@ -184,10 +184,10 @@ def test_a_torque_scene_says_after_which_time() -> None:
     assert friction.own_setting.error.worst > 0.0
 
 
-def test_a_scene_without_any_has_no_rows() -> None:
+def test_scene_without_effects_has_no_rows() -> None:
     assert measure_deliberate(scene_of('')) == []
 
 
-def test_what_does_not_go_together_is_one_line() -> None:
+def test_friction_without_forces_is_refused_in_one_line() -> None:
     with pytest.raises(FileError):
         measure_deliberate(scene_of('effects: {friction: {joints: {O2: {coulomb: 1.0e-3}}}}\n'))

@@ -72,7 +72,7 @@ def coefficient(truth: Any, joint: int, order: int, unit: float) -> mpf:
 
 
 @pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
-def test_linkages_of_every_family_are_as_the_campaign_has_them(family):
+def test_interval_enclosures_contain_the_power_series_solutions(family):
     """By dyads and power series, and by the constraints: they share the linkage alone."""
     compared = 0
     for index in range(20):
@@ -116,7 +116,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize('loop', LOOPS)
-def test_the_loops_that_the_kinematics_are_held_against_are_proved(loop):
+def test_interval_enclosures_contain_the_reference_loops(loop):
     make_mechanism, count, solve_loop, cases = LOOPS[loop]
     compared = 0
     for *lengths, phi, side in cases(loop.split(', ')[1], 60):
@@ -139,7 +139,7 @@ def test_the_loops_that_the_kinematics_are_held_against_are_proved(loop):
     assert compared > 5
 
 
-def test_the_worked_inverted_slider_crank_to_twenty_digits():
+def test_interval_enclosure_equals_the_worked_slider_crank():
     # AB 15, A to D 25, D to C 10, crank at 60 degrees: r3 and θ3, as the sources' README has them.
     linkage = Linkage(
         links={
@@ -166,7 +166,7 @@ def test_the_worked_inverted_slider_crank_to_twenty_digits():
 
 
 @pytest.mark.parametrize('distance', [1e-3, -1e-3, 1e-6, 1e-9, -1e-9, 1e-12])
-def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance):
+def test_interval_enclosure_follows_a_parallelogram_near_change_points(distance):
     found = prove(linkage_of('parallelogram'), [distance], [1.0], [0.5])
     for order, value in enumerate((distance, 1.0, 0.5)):
         rod, follower = found[order]
@@ -177,7 +177,7 @@ def test_a_parallelogram_next_to_its_change_point_turns_as_its_crank(distance):
 @pytest.mark.parametrize(
     'name', ['class_3', 'five_bar', 'excavator_bucket', 'whitworth_quick_return']
 )
-def test_derivatives_are_those_of_its_positions(name):
+def test_interval_derivatives_equal_numerical_ones(name):
     linkage = linkage_of(name)
     inputs = usual_inputs(Closure(linkage))
     rates = [0.7 - 1.1 * k for k in range(len(inputs))]
@@ -211,7 +211,7 @@ def test_derivatives_are_those_of_its_positions(name):
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'scotch_yoke', 'class_3'])
-def test_thirty_digits_are_those_of_the_balls(name):
+def test_thirty_digit_solver_equals_the_interval_enclosure(name):
     linkage = linkage_of(name)
     inputs = usual_inputs(Closure(linkage))
     for found, ball in zip(
@@ -220,11 +220,11 @@ def test_thirty_digits_are_those_of_the_balls(name):
         assert abs(float((found - ball).mid())) < 1e-28
 
 
-def test_at_a_change_point_nothing_is_proved():
+def test_interval_proof_refuses_a_change_point():
     with pytest.raises(SingularError, match='nothing is proved'):
         prove(linkage_of('parallelogram'), [0.0])
 
 
-def test_what_does_not_close_has_no_balls():
+def test_interval_proof_refuses_an_open_loop():
     with pytest.raises(ValueError, match='open'):
         prove(linkage_of('double_rocker'), [3.0])

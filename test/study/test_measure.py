@@ -55,7 +55,7 @@ TOPIC = 'linkage: four_bar'
         (TOPIC, 'nowhere', 'nowhere: does not exist'),
     ],
 )  # fmt: skip
-def test_bad_input_is_one_line(tmp_path, text, like, words):
+def test_budget_refuses_bad_input_in_one_line(tmp_path, text, like, words):
     (tmp_path / 'scene.yaml').write_text(text)
     scene = load_scene(tmp_path / 'scene.yaml')
     with pytest.raises(LinkageError) as raised:
@@ -64,7 +64,7 @@ def test_bad_input_is_one_line(tmp_path, text, like, words):
     assert '\n' not in str(raised.value)
 
 
-def test_a_remedy_of_a_runaway_works(tmp_path):
+def test_runaway_remedy_gives_a_measurable_horizon(tmp_path):
     (tmp_path / 'scene.yaml').write_text(RUNAWAY)
     scene = load_scene(tmp_path / 'scene.yaml')
     (motion,) = motions_of(scene, None, 10.0)
@@ -75,7 +75,7 @@ def test_a_remedy_of_a_runaway_works(tmp_path):
     assert 0.0 < knob.own_setting.error.worst < 0.1
 
 
-def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
+def test_topic_scene_budget_has_sorted_knobs(tmp_path):
     (tmp_path / 'scene.yaml').write_text('linkage: four_bar\nrate: 100\neffects: {velocity: {}}')
     scene = load_scene(tmp_path / 'scene.yaml')
     shares = []
@@ -94,14 +94,14 @@ def test_a_topic_scene_has_its_knobs_sorted(tmp_path):
     assert budget.knobs[2].own_setting.error.worst < 1e-14
 
 
-def test_of_twice_the_rate_half_the_error_is_left_and_a_quarter_where_it_is_carried():
+def test_doubled_rate_halves_the_held_error():
     motions = motions_of(load_scene('demo'), 'sine', 4.0)
     (held, carried), (held_then, carried_then) = errors_in_use(motions, [500.0, 1000.0], 4.0)
     assert held.rms / held_then.rms == pytest.approx(2.0, rel=0.02)
     assert carried.rms / carried_then.rms == pytest.approx(4.0, rel=0.02)
 
 
-def test_without_published_rates_carrying_forward_asks_for_them(tmp_path):
+def test_carry_forward_advice_adds_the_velocity_effect(tmp_path):
     (tmp_path / 'scene.yaml').write_text(TOPIC)
     scene = load_scene(tmp_path / 'scene.yaml')
     knob = measure_age_in_use(scene, motions_of(scene, 'sine', 1.0), 1.0, quick=True)
@@ -119,7 +119,7 @@ def test_two_linkages_are_measured_together():
     assert both.rms >= max(one.rms for one in each) * (1.0 - 1e-12)
 
 
-def test_the_order_of_a_method_shows_in_its_steps(tmp_path):
+def test_step_errors_follow_the_method_order(tmp_path):
     (tmp_path / 'scene.yaml').write_text(
         'linkage: four_bar\nrate: 500\nloads: {gravity: [0, -9.81], drive_inertia: 0.001}\n'
         'drive: {torque: {start: 0.5, step: 0.008, timeout: 10}}\n'
@@ -136,7 +136,7 @@ EVALUATIONS = {'semi_implicit_euler': 1, 'rk4': 4, 'gauss_legendre': 14}
 
 
 @pytest.mark.parametrize('seconds', [0.0, 2.5, 5.0, inf])
-def test_of_the_settings_those_are_left_out_that_take_too_long(tmp_path, monkeypatch, seconds):
+def test_slow_settings_are_left_out_and_listed(tmp_path, monkeypatch, seconds):
     """A run of a clock of our own takes a second at the scene's own setting."""
     (tmp_path / 'scene.yaml').write_text(
         'linkage: four_bar\nrate: 100\nloads: {gravity: [0, -9.81], drive_inertia: 0.001}\n'
@@ -175,7 +175,7 @@ def test_of_the_settings_those_are_left_out_that_take_too_long(tmp_path, monkeyp
     assert left_out == ([f'for lack of time: {told}'] if without else [])
 
 
-def test_comparisons_stand_in_their_order():
+def test_solver_comparison_orders_errors_as_expected():
     motions = motions_of(load_scene('demo'), 'sine', 10.0)
     knob = measure_solving(motions, 1000.0, 10.0, quick=True, seconds=0.1)
     errors = {each.label: each.error.worst for each in knob.settings}
@@ -184,7 +184,7 @@ def test_comparisons_stand_in_their_order():
     assert all(each.changes is None for each in knob.settings if each is not knob.own_setting)
 
 
-def test_in_hard_cases_the_closed_form_never_fails_and_the_textbook_does():
+def test_closed_form_solves_hard_cases_the_textbook_fails():
     cases = list(compare_hard_cases())
     failed = {(case.place, case.solver): case.failed for case in cases}
     places = {place for place, _ in failed}
@@ -234,7 +234,7 @@ PENDULUM_SCENE = 'linkage: pendulum.yaml\nrate: 1000\n'
 
 
 @pytest.mark.parametrize(('seconds', 'finest'), [(1e9, 16), (0.0, 4)])
-def test_of_a_winding_the_step_is_divided_as_the_note_says(tmp_path, monkeypatch, seconds, finest):
+def test_winding_reference_step_matches_the_note(tmp_path, monkeypatch, seconds, finest):
     # A winding has no exact motion, and the time decides how short a step stands in for it.
     (tmp_path / 'scene.yaml').write_text(
         'linkage: four_bar\nrate: 200\nloads: {gravity: [0, -9.81], drive_inertia: 1.0e-3}\n'

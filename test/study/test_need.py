@@ -72,7 +72,7 @@ def choices_of(budget):
 
 
 @pytest.mark.parametrize('seed', range(100))
-def test_the_answer_is_the_cheapest_of_all_that_reach_it(seed):
+def test_answer_is_the_cheapest_choice_meeting_the_need(seed):
     rng = random.Random(seed)
     budget = random_budget(rng)
     need = 10.0 ** rng.uniform(-8.0, 0.0)
@@ -94,7 +94,7 @@ def test_the_answer_is_the_cheapest_of_all_that_reach_it(seed):
 
 
 @pytest.mark.parametrize('seed', range(20))
-def test_answers_fall_in_error_and_rise_in_cost_and_end_with_what_stands_in_the_way(seed):
+def test_answers_are_ordered_by_falling_error(seed):
     budget = random_budget(random.Random(seed))
     *met, unmet = answers_of(budget)
     assert met
@@ -144,7 +144,7 @@ def price_of(scene, setting):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('text', [SWINGS, FOLLOWS], ids=['torque', 'sine'])
-def test_a_need_is_met_when_it_is_run(tmp_path, text):
+def test_answered_need_is_met_by_a_run(tmp_path, text):
     """What was written for a need is measured anew, with its advice followed."""
     (tmp_path / 'scene.yaml').write_text(text)
     scene = load_scene(tmp_path / 'scene.yaml')

@@ -47,14 +47,12 @@ def shown(browser: Any, file: Path) -> Iterator[Opened]:
 
 
 @pytest.mark.parametrize('typed', TYPED)
-def test_the_field_says_the_cheapest_answer_that_reaches_the_need(
-    shown: Opened, typed: str
-) -> None:
+def test_page_field_shows_the_cheapest_answer(shown: Opened, typed: str) -> None:
     shown.page.fill('#need', typed)
     assert shown.page.text_content('#answer') == TYPED[typed]
 
 
-def test_it_has_the_lines_the_picture_and_the_table(shown: Opened) -> None:
+def test_page_shows_lead_lines_picture_and_table(shown: Opened) -> None:
     leads = shown.page.locator('.lead').all_text_contents()
     assert leads == lead_lines(BUDGET)
     assert shown.page.locator('figure svg').count() == 1
@@ -64,7 +62,7 @@ def test_it_has_the_lines_the_picture_and_the_table(shown: Opened) -> None:
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])
 @pytest.mark.parametrize('width', [400, 1600])
-def test_it_opens_without_a_word_a_request_or_a_scroll_bar(
+def test_page_opens_without_errors_requests_or_scrolling(
     browser: Any, file: Path, width: int, scheme: str
 ) -> None:
     with opened(browser, file, width=width, color_scheme=scheme) as page:
@@ -73,9 +71,9 @@ def test_it_opens_without_a_word_a_request_or_a_scroll_bar(
         assert not page.is_wider_than_its_window()
 
 
-def test_without_an_answer_there_is_no_field() -> None:
+def test_page_without_answers_has_no_field() -> None:
     assert 'id="need"' not in budget_html(BUDGET, [])
 
 
-def test_it_is_small() -> None:
+def test_budget_page_stays_below_60_kilobytes() -> None:
     assert len(budget_html(BUDGET, ANSWERS)) < 60_000

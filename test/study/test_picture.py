@@ -72,7 +72,7 @@ def center_of(mark: ET.Element) -> tuple[float, float]:
     return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
 
-def test_every_setting_has_a_mark_and_each_of_the_scene_a_ring() -> None:
+def test_picture_marks_every_setting_and_rings_own() -> None:
     for budget, drawn in PICTURES:
         marks = marks_of(drawn)
         knobs = errors_of(budget)
@@ -81,7 +81,7 @@ def test_every_setting_has_a_mark_and_each_of_the_scene_a_ring() -> None:
         assert len(rings) == len(knobs)
 
 
-def test_what_another_setting_beats_in_both_is_pale() -> None:
+def test_picture_fades_dominated_settings() -> None:
     for budget, drawn in PICTURES:
         marks = iter(marks_of(drawn))
         for knob in sorted(errors_of(budget), key=lambda knob: -knob.own_setting.error.worst):
@@ -92,7 +92,7 @@ def test_what_another_setting_beats_in_both_is_pale() -> None:
                 assert (opacity < 1.0) == beaten, budget
 
 
-def test_labels_lie_on_no_mark_no_other_text_and_no_curve() -> None:
+def test_picture_labels_overlap_nothing() -> None:
     for _, drawn in PICTURES:
         texts = [text for text in drawn.iter(f'{SVG}text') if 'x' in text.attrib]
         labels = [letters_of(text) for text in texts if text.get('class') == 'label']
@@ -124,7 +124,7 @@ def _places_on_curves(drawn: ET.Element) -> list[tuple[float, float]]:
     return found
 
 
-def test_all_lies_within_the_picture() -> None:
+def test_picture_contents_lie_within_its_frame() -> None:
     for _, drawn in PICTURES:
         width, height = map(float, drawn.attrib['viewBox'].split()[2:])
         for text in drawn.iter(f'{SVG}text'):
@@ -139,17 +139,17 @@ def test_all_lies_within_the_picture() -> None:
             assert 0.0 < y < height - 40.0
 
 
-def test_most_settings_have_their_label() -> None:
+def test_picture_labels_most_settings() -> None:
     drawn = ET.fromstring(budget_svg(BUDGET))
     labels = {text.text for text in drawn.iter(f'{SVG}text') if text.get('class') == 'label'}
     assert labels >= {'rk4, 1 ms', '1 kHz, held', 'closed form', 'rk4, 0.25 ms', '30 digits'}
 
 
-def test_without_errors_there_is_no_picture() -> None:
+def test_budget_without_errors_has_no_picture() -> None:
     assert budget_svg(BUDGET._replace(knobs=[STEP._replace(is_deliberate=True)])) == ''
 
 
-def test_names_from_elsewhere_are_no_markup() -> None:
+def test_picture_escapes_markup_in_names() -> None:
     odd: Any = '</svg><script>x</script>&'
     knob = STEP._replace(name=odd, settings=[STEP.settings[1]._replace(label=odd)], chosen=0)
     drawn = ET.fromstring(budget_svg(BUDGET._replace(scene=odd, knobs=[knob])))

@@ -82,7 +82,7 @@ def named(name: str) -> Scene:
 
 
 @pytest.mark.parametrize('seed', range(20))
-def test_a_difference_is_found_beneath_drift_and_disturbances(
+def test_price_difference_is_found_despite_clock_drift(
     false_clock: Callable[..., FalseClock], seed: int
 ) -> None:
     random = Random(seed)
@@ -96,7 +96,7 @@ def test_a_difference_is_found_beneath_drift_and_disturbances(
     assert not price.is_noise
 
 
-def test_no_difference_is_noise_nearly_always(false_clock: Callable[..., FalseClock]) -> None:
+def test_equal_costs_are_reported_as_noise(false_clock: Callable[..., FalseClock]) -> None:
     noisy = 0
     for seed in range(40):
         false_clock({'own': 10.0, 'other': 10.0}, 0.01, 0.5, seed)
@@ -105,7 +105,7 @@ def test_no_difference_is_noise_nearly_always(false_clock: Callable[..., FalseCl
     assert noisy >= 38
 
 
-def test_blocks_of_scenes_that_tick_at_different_rates_take_the_same_simulated_time(
+def test_price_blocks_cover_the_same_simulated_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     blocks: list[tuple[float, int]] = []
@@ -122,7 +122,7 @@ def test_blocks_of_scenes_that_tick_at_different_rates_take_the_same_simulated_t
     assert min(block for _, block in blocks) >= 20
 
 
-def test_every_round_begins_where_the_scene_does() -> None:
+def test_price_rounds_begin_at_the_scene_start() -> None:
     begun: list[int] = []
 
     def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
@@ -138,7 +138,7 @@ def test_every_round_begins_where_the_scene_does() -> None:
     assert len(set(begun)) == 1
 
 
-def test_a_part_of_the_motion_that_costs_more_counts_by_its_share(
+def test_price_weights_expensive_parts_by_their_share(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 0.0
@@ -165,7 +165,7 @@ def test_a_part_of_the_motion_that_costs_more_counts_by_its_share(
     assert not price.is_noise
 
 
-def test_a_change_is_what_set_does() -> None:
+def test_changed_scene_equals_the_set_option() -> None:
     changes = [
         ('rate', 250.0),
         ('effects', {'noise': {'joints': {'rocker_joint': {'white': 1e-3}}}}),
@@ -179,7 +179,7 @@ def test_a_change_is_what_set_does() -> None:
         change_scene(DEMO, [('rate', -1)])
 
 
-def test_prices_are_added_where_a_scene_can_ask_for_them() -> None:
+def test_prices_are_added_only_to_requestable_settings() -> None:
     error = JointError(0.0, 0.0)
     knob = Knob(
         'age in use',
@@ -199,7 +199,7 @@ def test_prices_are_added_where_a_scene_can_ask_for_them() -> None:
     assert filled._replace(settings=knob.settings) == knob
 
 
-def test_a_scene_that_publishes_nothing_has_no_price() -> None:
+def test_silent_scene_has_no_price() -> None:
     late = change_scene(DEMO, [('drive.topic.max_age', 0.05)])
 
     def feed(_scene: Scene, _pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
@@ -211,7 +211,7 @@ def test_a_scene_that_publishes_nothing_has_no_price() -> None:
 
 
 @pytest.mark.parametrize('name', ['demo', 'two_fingers', 'torque_crank', 'jansen_leg'])
-def test_a_crank_turns_or_swings_where_it_closes(name: str) -> None:
+def test_price_crank_moves_only_where_loops_close(name: str) -> None:
     scene = load_scene(name)
     pipeline = Pipeline(scene)
     published = 0

@@ -22,7 +22,7 @@ import pytest
 SCENE = load_scene('demo', ['record={directory: runs, flush_period: 0.1}'])
 
 
-def test_a_crash_loses_about_the_flush_period(tmp_path: Path) -> None:
+def test_crash_loss_equals_about_the_flush_period(tmp_path: Path) -> None:
     (own,) = measure_recording(SCENE, tmp_path, quick=True)
     assert own.instruction == 'record.flush_period: 0.1'
     assert 0.08 < own.seconds < 2.0
@@ -31,7 +31,7 @@ def test_a_crash_loses_about_the_flush_period(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_other_flush_periods_stand_beside_it(tmp_path: Path, monkeypatch: Any) -> None:
+def test_recording_rows_compare_other_flush_periods(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setattr('linkage_ros.tools.study.recording._ROUNDS', 1)
     shares: list[float] = []
     own, *others = measure_recording(SCENE, tmp_path, progress=shares.append)
@@ -43,12 +43,12 @@ def test_other_flush_periods_stand_beside_it(tmp_path: Path, monkeypatch: Any) -
 
 
 @pytest.mark.parametrize('settings', [['record={snapshot_seconds: 5}'], []])
-def test_what_records_no_bag_has_no_row(tmp_path: Path, settings: list[str]) -> None:
+def test_scene_without_a_bag_has_no_row(tmp_path: Path, settings: list[str]) -> None:
     scene = load_scene('demo' if settings else 'bare', settings)
     assert measure_recording(scene, tmp_path) == []
 
 
-def test_a_disk_that_fails_is_one_line(tmp_path: Path, monkeypatch: Any) -> None:
+def test_failing_disk_is_reported_in_one_line(tmp_path: Path, monkeypatch: Any) -> None:
     def fail(_writer: BagWriter) -> None:
         raise RecordingError(tmp_path, 'no space left', 'free some')
 

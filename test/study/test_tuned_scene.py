@@ -30,7 +30,7 @@ NAMED = {
 
 
 @pytest.mark.parametrize('what', NAMED)
-def test_it_loads_from_another_folder(
+def test_tuned_scene_loads_from_another_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     mine, other = tmp_path / 'mine', tmp_path / 'other' / 'deep'
@@ -51,7 +51,7 @@ def test_it_loads_from_another_folder(
         assert one.effects == before.effects
 
 
-def test_the_bag_of_a_drive_is_found_from_there(tmp_path: Path) -> None:
+def test_tuned_scene_finds_the_drive_bag(tmp_path: Path) -> None:
     source = scene_file(tmp_path, 'rate: 100\n')
     Recorded(tmp_path / 'bag', source, lambda tick: {'crank_joint': (0.06 * tick, 6.0)}).run(50)
     (tmp_path / 'play.yaml').write_text('linkage: four_bar\ndrive: {bag: {file: bag}}\nrate: 50\n')

@@ -18,7 +18,7 @@ import pytest
 from ..support.commands import linkage
 
 
-def test_textbook_crank_rocker_is_the_best():
+def test_best_crank_rocker_equals_the_textbook_design():
     """Ground 120 mm, swing 80°, ratio 10/9: crank 46.7, coupler 116, rocker 73.9 mm."""
     best = crank_rockers(DeadCentreTask(radians(80.0), 10 / 9, 0.120), 1)[0]
     found = [1e3 * length for length in best.four_bar.lengths]
@@ -27,7 +27,7 @@ def test_textbook_crank_rocker_is_the_best():
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('seed', range(25))
-def test_analysis_finds_the_swing_and_the_times_again(seed):
+def test_crank_rockers_have_the_requested_swing_and_time_ratio(seed):
     rng = random.Random(seed)
     swing, ratio = rng.uniform(0.1, 1.6), rng.choice([1.0, rng.uniform(1.0, 1.5)])
     designs = crank_rockers(DeadCentreTask(swing, ratio, 0.3), 5)
@@ -56,7 +56,7 @@ def test_analysis_finds_the_swing_and_the_times_again(seed):
         DeadCentreTask(1.0, 1e9, 1.0),
     ],
 )
-def test_what_no_crank_rocker_does_is_refused(task):
+def test_impossible_dead_centre_task_is_refused(task):
     with pytest.raises(SynthesisError):
         crank_rockers(task, 1)
 
@@ -71,14 +71,14 @@ def test_what_no_crank_rocker_does_is_refused(task):
         ('--swing 80 --time-ratio 10/9 --pose 0 0 0', 'stand for two tasks'),
     ],
 )
-def test_wrong_tasks_are_one_line(tmp_path, arguments, line):
+def test_synthesize_refuses_wrong_tasks_in_one_line(tmp_path, arguments, line):
     answer = linkage(tmp_path, 'synthesize', *arguments.split())
     assert answer.returncode == 2
     assert line in answer.stderr
     assert len(answer.stderr.splitlines()) == 1
 
 
-def test_command_writes_the_best(tmp_path):
+def test_synthesize_writes_the_best_crank_rocker(tmp_path):
     asked = '--swing 80 --time-ratio 10/9 --ground 0.12 -o quick.yaml'
     answer = linkage(tmp_path, 'synthesize', *asked.split())
     assert answer.returncode == 0, answer.stderr

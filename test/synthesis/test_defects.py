@@ -136,7 +136,7 @@ CASES = {
 
 @pytest.mark.parametrize('name', CASES)
 @pytest.mark.parametrize('frame', ['plain', 'odd'])
-def test_defects_are_named(name, frame):
+def test_assessment_names_the_defects_of_a_design(name, frame):
     lengths, positions, defects, travel = CASES[name]
     if frame == 'plain':
         made, zero = design(lengths, positions), 0.0
@@ -150,7 +150,7 @@ def test_defects_are_named(name, frame):
         assert found.travel == pytest.approx([radians(angle) + zero for angle in travel])
 
 
-def test_the_text_s_own_design_cannot_be_moved_through_its_pairs():
+def test_textbook_design_has_a_branch_defect():
     """sources/003: a crank of 5.6 and a rocker of 4.9 on a ground of 1, a coupler of 0.17."""
     found = assess(THREE_PAIRS)
     (defect,) = found.defects
@@ -195,14 +195,14 @@ def test_the_text_s_own_design_cannot_be_moved_through_its_pairs():
         ((0.7, 0.1, 0.7 - 1e-16, 0.1), 'S2X', True),
     ],
 )
-def test_what_turns_is_named(lengths, code, turns):
+def test_assessment_names_kind_and_full_turns(lengths, code, turns):
     found = assess(design(lengths, [(60, L)]))
     assert found.kind.code == code
     assert found.turns == turns
     assert (found.full_transmission is not None) == turns
 
 
-def test_what_cannot_be_assembled_is_said_first():
+def test_open_positions_are_the_only_reported_defect():
     """Stretched, the right angle's coupler and rocker are 5 long; at 180° A is 7 from O4."""
     four_bar = FourBar.of_lengths(*RIGHT_ANGLE)
     found = assess(Design(four_bar, (DesignRequest(1.0), DesignRequest(pi), DesignRequest(2.0))))
@@ -213,14 +213,14 @@ def test_what_cannot_be_assembled_is_said_first():
     assert found.transmission == 0.0
 
 
-def test_links_that_never_close_have_no_kind():
+def test_links_that_never_close_have_no_type():
     found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (DesignRequest(1.0, 2.0),)))
     assert found.kind.code == ''
     assert [defect.name for defect in found.defects] == ['open']
     assert not found.turns
 
 
-def test_texts_name_positions_and_angles():
+def test_defect_texts_name_positions_and_angles():
     texts = {
         'two assemblies of a crank that turns': (
             'positions 1 and 2 on the left assembly, position 3 on the right one; only taking it '
@@ -254,7 +254,7 @@ def test_texts_name_positions_and_angles():
         assert defect.text == text
 
 
-def test_a_crank_rocker_s_transmission_angle_is_least_along_the_ground():
+def test_crank_rocker_transmission_angle_equals_the_textbook_formula():
     """There cos μ = (b² + c² − (d ∓ a)²)/2bc (Norton, Design of Machinery, ch. 4)."""
     a, b, c, d = CRANK_ROCKER
     inward, outward = (acos((b * b + c * c - s * s) / (2.0 * b * c)) for s in (d - a, d + a))
@@ -272,7 +272,7 @@ def test_a_crank_rocker_s_transmission_angle_is_least_along_the_ground():
     assert around.at == pytest.approx(tau)
 
 
-def test_without_a_way_the_transmission_angle_is_that_of_the_positions():
+def test_defective_design_reports_the_transmission_angle_at_positions():
     found = assess(design(DOUBLE_ROCKER, [(55, L), (65, L), (80, R)]))
     angles = {t: transmission(DOUBLE_ROCKER, radians(t)) for t in (55, 65, 80)}
     at = min(angles, key=angles.__getitem__)
@@ -373,7 +373,7 @@ def random_angles(rng: random.Random, lengths: Lengths) -> list[float]:
     return sorted(angles)[:: rng.choice((1, -1))] if rng.random() < 0.7 else angles
 
 
-def test_random_four_bars_against_the_simulator():
+def test_random_four_bar_defects_equal_a_simulator():
     rng = random.Random(17)
     seen: dict = {}
     tried = 0
@@ -423,7 +423,7 @@ def test_random_four_bars_against_the_simulator():
         assert seen.get(key, 0) > 3, f'{key} is hardly tried: {seen}'
 
 
-def test_random_travels_against_a_dense_sweep_of_the_transmission_angle():
+def test_least_transmission_angle_equals_a_dense_sweep():
     rng = random.Random(18)
     tried = 0
     while tried < 100:
@@ -453,9 +453,7 @@ def test_random_travels_against_a_dense_sweep_of_the_transmission_angle():
 @pytest.mark.parametrize(
     ('ground', 'direction', 'rocker', 'sign'), [(4.0, pi, 3.0, 1.0), (6.0, 0.0, 7.0, -1.0)]
 )
-def test_near_folding_flat_the_transmission_angle_keeps_its_digits(
-    ground, direction, rocker, sign, delta
-):
+def test_transmission_angle_stays_exact_near_folding(ground, direction, rocker, sign, delta):
     """
     A crank of 1 along the ground makes the diagonal 5, a coupler of 2 and a rocker nearly fit it.
 

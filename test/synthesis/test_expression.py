@@ -77,24 +77,24 @@ RULES = {
 
 
 @pytest.mark.parametrize('text', FORMULAS)
-def test_values_are_those_of_50_digits(text):
+def test_formula_values_equal_50_digit_references(text):
     with mp.workdps(50):
         expected = [float(FORMULAS[text](mp.mpf(float(x)))) for x in SPAN]
     # Of a sum, digits are lost where it is near 0.
     assert Expression(text)(SPAN) == pytest.approx(expected, rel=4e-15, abs=1e-15)
 
 
-def test_every_function_is_in_that_table():
+def test_formula_table_covers_every_function():
     assert all(any(f'{name}(' in text for text in FORMULAS) for name in FUNCTIONS)
 
 
 @pytest.mark.parametrize(('text', 'value'), RULES.items())
-def test_signs_powers_and_quotients_bind_as_in_books(text, value):
+def test_formula_operators_bind_as_in_textbooks(text, value):
     assert Expression(text)(3.0) == pytest.approx(value, rel=1e-15)
 
 
 @pytest.mark.parametrize('text', ['x', '2', '2*x - 1', 'ln(x)'])
-def test_arrays_keep_their_shape_and_numbers_stay_numbers(text):
+def test_formula_keeps_array_shapes_and_scalars(text):
     formula = Expression(text)
     x = np.array([[0.5, 1.0, 1.5], [2.0, 2.5, 3.0]])
     values = formula(x)
@@ -113,7 +113,7 @@ def test_arrays_keep_their_shape_and_numbers_stay_numbers(text):
         ('x^x', 0.0, 1.0), ('(0 - 8)^(1/3)', 0.0, nan), ('x - x', inf, nan),
     ],
 )  # fmt: skip
-def test_what_has_no_value_is_inf_or_nan_without_a_warning(text, x, value):
+def test_formula_without_a_value_returns_inf_or_nan(text, x, value):
     formula = Expression(text)
     with warnings.catch_warnings():
         warnings.simplefilter('error')
@@ -123,7 +123,7 @@ def test_what_has_no_value_is_inf_or_nan_without_a_warning(text, x, value):
     assert np.array_equal(several, [value, value], equal_nan=True)
 
 
-def test_formulas_are_equal_by_their_text_and_can_be_sent_elsewhere():
+def test_formulas_compare_by_text_and_can_be_pickled():
     formula = Expression('log10(x) + 1')
     assert formula == Expression('log10(x) + 1') != Expression('log10(x)+1')
     assert pickle.loads(pickle.dumps(formula))(100.0) == 3.0
@@ -164,14 +164,14 @@ def test_formulas_are_equal_by_their_text_and_can_be_sent_elsewhere():
         ('(' * 41, "'(' at character 41 is more than 40 levels deep; write it with fewer"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(text, message):
+def test_wrong_formula_error_names_the_place(text, message):
     with pytest.raises(SynthesisError) as caught:
         Expression(text)
     assert message in str(caught.value)
     assert str(caught.value).startswith('function ')
 
 
-def test_what_is_just_short_and_flat_enough_is_taken():
+def test_formula_at_the_size_limits_is_accepted():
     assert Expression('x' + '+x' * 99 + ' ')(1.0) == 100.0
     assert Expression('(' * 39 + 'x' + ')' * 39)(2.0) == 2.0
     assert Expression('-' * 39 + 'x')(2.0) == -2.0
@@ -207,7 +207,7 @@ _AUDIT = _Audit()
 
 
 @pytest.mark.parametrize('text', ATTACKS, ids=lambda text: ascii(text[:20]))
-def test_attacks_are_refused_in_one_line_and_nothing_is_run(text):
+def test_malicious_formulas_are_refused_without_running_code(text):
     _AUDIT.told = []
     try:
         with pytest.raises(SynthesisError) as caught:
@@ -220,7 +220,7 @@ def test_attacks_are_refused_in_one_line_and_nothing_is_run(text):
     assert message.isprintable(), 'no character reaches a terminal that could do something there'
 
 
-def test_the_audit_hears_what_it_is_there_for():
+def test_audit_hook_detects_compilation():
     _AUDIT.told = []
     try:
         eval('1 + 1')
@@ -257,7 +257,7 @@ def test_any_bytes_are_a_formula_or_refused(raw):
         max_size=30,
     )
 )
-def test_any_parts_of_formulas_are_a_formula_or_refused(parts):
+def test_any_formula_parts_are_a_formula_or_refused(parts):
     _is_a_formula_or_refused(''.join(parts))
 
 
@@ -308,7 +308,7 @@ def _walked(node: ast.AST, x: float) -> np.float64:
 @given(_texts(), strategies.sampled_from([0.5, 2.0, -1.25]))
 @example('2**-x**2', 2.0)
 @example('-x**-x**2', 2.0)
-def test_formulas_are_understood_as_the_grammar_of_python_understands_them(text, x):
+def test_formula_values_equal_pythons_own_parser(text, x):
     with np.errstate(all='ignore'):
         expected = float(_walked(ast.parse(text, mode='eval').body, x))
     assert np.array_equal(Expression(text)(x), expected, equal_nan=True)

@@ -163,7 +163,7 @@ def check(case: Case) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize('mixed', [False, True], ids=['one assembly', 'both'])
 @pytest.mark.parametrize('free', [ROCKER, CRANK, BOTH])
-def test_a_linkage_is_among_the_solutions_of_its_pairs(free, mixed):
+def test_known_linkage_is_among_the_solutions_of_its_pairs(free, mixed):
     count = 120
     rng = np.random.default_rng([len(free), 'alpha' in free, mixed])
     told = 0
@@ -177,7 +177,7 @@ def test_a_linkage_is_among_the_solutions_of_its_pairs(free, mixed):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(('free', 'spread'), [(ROCKER, 0.01), (CRANK, 0.01), (BOTH, 0.1)])
-def test_pairs_near_each_other_are_worth_what_is_told(free, spread):
+def test_close_pairs_keep_the_reported_accuracy(free, spread):
     rng = np.random.default_rng(3)
     worst = 0.0
     for _ in range(100):
@@ -200,7 +200,9 @@ def test_pairs_near_each_other_are_worth_what_is_told(free, spread):
     steps=st.lists(st.floats(0.05, 1.2), min_size=4, max_size=4),
     side=st.sampled_from([-1, 1]),
 )
-def test_so_is_any_that_turns_all_round(free, a, over, part, zeros, first, steps, side):
+def test_fully_turning_linkage_is_among_its_solutions(
+    free, a, over, part, zeros, first, steps, side
+):
     # b + c is more than 1 + a, b - c less than 1 - a: it closes at all crank angles.
     b, c = (0.5 * (1.0 + a + over + sign * part * abs(1.0 - a)) for sign in (1, -1))
     alpha, beta = (zero * (name in free) for zero, name in zip(zeros, BOTH, strict=True))
@@ -286,7 +288,7 @@ def resultants(case: Case) -> list[tuple[Any, Any]]:
 
 
 @pytest.mark.sample(0)
-def test_five_pairs_have_the_solutions_that_resultants_have():
+def test_five_pair_solutions_equal_the_resultants():
     rng = np.random.default_rng(5)
     seen = set()
     with mp.workdps(50):
@@ -308,7 +310,7 @@ def test_five_pairs_have_the_solutions_that_resultants_have():
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('moved', ['rocker', 'crank'])
-def test_four_pairs_have_as_many_solutions_as_the_determinant_changes_its_sign(moved):
+def test_four_pair_solutions_equal_the_determinant_sign_changes(moved):
     rng = np.random.default_rng(4)
     zero = np.linspace(-pi / 2, pi / 2, 20_001)[:, None]
     seen = set()
@@ -348,7 +350,7 @@ def discriminant(theta: list[float], phi: list[Any]) -> Any:
     return ((high - low) / 2) ** 2 - 4 * ((high + low) / 2 - middle) * middle
 
 
-def test_two_solutions_meet_and_vanish():
+def test_double_solutions_vanish_at_the_discriminant_zero():
     rng = np.random.default_rng(6)
     folds = 0
     while folds < 10:
@@ -369,7 +371,7 @@ def test_two_solutions_meet_and_vanish():
         folds += 1
 
 
-def test_the_five_pairs_of_the_weaving_machine_have_one_linkage():
+def test_weaving_machine_pairs_have_one_linkage():
     crank, rocker = ([radians(angle) for angle in angles] for angles in WEAVING)
     (found,) = five_pairs(crank, rocker, 0.18)
     with mp.workdps(50):
@@ -384,7 +386,7 @@ def test_the_five_pairs_of_the_weaving_machine_have_one_linkage():
         assert met.angle == pytest.approx(0.0, abs=1e-13)
 
 
-def test_a_link_counted_from_its_other_end_is_the_same_linkage():
+def test_half_turn_crank_offset_gives_the_same_linkage():
     case = drawn(np.random.default_rng(1), BOTH, mixed=False)
     turned = case._replace(crank=[theta - pi for theta in case.crank])
     for one, other in zip(solve(case), solve(turned), strict=True):
@@ -395,7 +397,7 @@ def test_a_link_counted_from_its_other_end_is_the_same_linkage():
         assert -pi / 2 <= one.alpha <= pi / 2
 
 
-def test_lengths_are_those_of_the_ground():
+def test_solution_lengths_scale_with_the_ground():
     case = drawn(np.random.default_rng(2), BOTH, mixed=False)
     for one, other in zip(solve(case), five_pairs(case.crank, case.rocker, 0.125), strict=True):
         assert other.lengths == tuple(0.125 * length for length in one.lengths)
@@ -406,7 +408,7 @@ def test_lengths_are_those_of_the_ground():
         assert other.sensitivity == scaled
 
 
-def test_a_linkage_that_needs_no_zero_is_listed_once():
+def test_linkage_with_zero_offsets_is_listed_once():
     case = case_of([0.4, 1.1, 0.9, 0.0, 0.0], [0.3, 1.1, 2.0, 2.9], [1] * 4, ROCKER)
     assert case is not None
     found = solve(case)
@@ -433,7 +435,7 @@ SINGULAR_OF_FIVE = {
     ('count', 'name'),
     [(4, name) for name in SINGULAR] + [(5, name) for name in SINGULAR | SINGULAR_OF_FIVE],
 )
-def test_pairs_that_fix_no_zeros_are_refused(count, name, swapped):
+def test_dependent_pairs_are_refused(count, name, swapped):
     theta, phi = THETA[:count], (SINGULAR | SINGULAR_OF_FIVE)[name][:count]
     with pytest.raises(SynthesisError) as refused:
         (four_pairs if count == 4 else five_pairs)(*(phi, theta) if swapped else (theta, phi), 1.0)
@@ -441,13 +443,13 @@ def test_pairs_that_fix_no_zeros_are_refused(count, name, swapped):
 
 
 @pytest.mark.parametrize('solve_for', [four_pairs, five_pairs])
-def test_a_rocker_that_stands_still_is_refused(solve_for):
+def test_pairs_with_a_standing_rocker_are_refused(solve_for):
     count = 4 if solve_for is four_pairs else 5
     with pytest.raises(SynthesisError, match='equations depend on each other'):
         solve_for(THETA[:count], [0.4] * count, 1.0)
 
 
-def test_pairs_that_are_one_spot_are_refused():
+def test_nearly_coincident_pairs_are_refused():
     theta = [1.0 + 1e-9 * step for step in range(5)]
     phi = [0.5 + 1.2e-9 * step + 1e-10 * step**2 for step in range(5)]
     with pytest.raises(SynthesisError, match='too close to decide'):
@@ -455,7 +457,7 @@ def test_pairs_that_are_one_spot_are_refused():
 
 
 @pytest.mark.sample(0)
-def test_a_linkage_that_rounding_changes_by_a_tenth_is_counted_but_not_returned():
+def test_ill_conditioned_solutions_are_counted_but_not_returned():
     rng = np.random.default_rng(9)
     counted = 0
     for _ in range(100):
@@ -469,14 +471,14 @@ def test_a_linkage_that_rounding_changes_by_a_tenth_is_counted_but_not_returned(
     assert counted
 
 
-def test_the_same_pair_twice_is_refused_with_its_numbers():
+def test_repeated_pair_error_names_both_numbers():
     with pytest.raises(SynthesisError, match='pairs 2 and 4: are the same'):
         four_pairs([0.1, 0.5, 1.0, 0.5], [0.2, 0.7, 0.9, 0.7], 1.0)
     with pytest.raises(SynthesisError, match='pairs 1 and 5: are the same'):
         five_pairs([0.1, 0.5, 1.0, 1.5, 0.1], [0.2, 0.7, 0.9, 0.1, 0.2 + 2.0 * pi], 1.0)
 
 
-def test_four_pairs_with_imaginary_zeros_only_are_refused():
+def test_four_pairs_without_a_real_solution_are_refused():
     rng = np.random.default_rng(7)
     reasons = {reason(*rng.uniform(-pi, pi, (2, 4)).tolist()) for _ in range(40)}
     (refused,) = reasons - {''}
@@ -486,7 +488,7 @@ def test_four_pairs_with_imaginary_zeros_only_are_refused():
     )
 
 
-def test_five_pairs_of_a_slider_have_no_other_four_bar_or_two():
+def test_five_slider_pairs_report_an_infinite_link():
     # k1 = 0, the crank infinitely long: cos(θ + α − φ − β) = k2·cos(θ + α) + k3
     rng = np.random.default_rng(8)
     reasons = set()

@@ -73,7 +73,7 @@ def least_squares(crank: Angles, rocker: Angles) -> tuple[list[mpf], list[mpf]]:
     return [k1, k2, k3], [a, sqrt(a * a + c * c + 1 - 2 * a * c * k3), c]
 
 
-def test_the_source_to_its_last_digit():
+def test_freudenstein_solution_equals_the_source_to_full_digits():
     design, found = exact_four_bar(*PUBLISHED['coordinated'])
     assert found.lengths == pytest.approx(
         (5.5965383934988620854, 0.16985782027961906789, 4.8786334643580194266), rel=4e-15
@@ -87,7 +87,7 @@ def test_the_source_to_its_last_digit():
 
 
 @pytest.mark.parametrize('name', THREES)
-def test_three_published_pairs(name):
+def test_three_published_pairs_give_the_exact_four_bar(name):
     crank, rocker, ground = PUBLISHED[name]
     k, lengths = least_squares(crank, rocker)
     design, found = exact_four_bar(crank, rocker, ground)
@@ -101,7 +101,7 @@ def test_three_published_pairs(name):
     assert all(met.is_closed and abs(met.angle) < 1e-11 for met in prove(design))
 
 
-def test_more_pairs_by_least_squares():
+def test_five_pairs_are_fitted_by_least_squares():
     crank, rocker, ground = PUBLISHED['weaving']
     _, (a, b, c) = least_squares(crank, rocker)
     four_bar = fit_equation(crank, rocker, ground).four_bar
@@ -117,7 +117,7 @@ def test_least_squares_of_three_pairs_is_exact(name):
     )
 
 
-def test_reversed_links_keep_the_crank_angle_that_was_asked_for():
+def test_reversed_links_keep_the_requested_crank_angles():
     """Crank and rocker that come out negative point backwards in their own frames."""
     crank, rocker = rad(20, 40, 60), rad(65, 75, 85)
     design, found = exact_four_bar(crank, rocker, 2.0)
@@ -142,7 +142,7 @@ def tallies():
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_round_trips(tallies, family):
+def test_random_four_bars_are_recovered_from_their_pairs(tallies, family):
     """
     Every length within 4·2⁻⁵³·κ, or flagged.
 
@@ -160,7 +160,7 @@ def test_round_trips(tallies, family):
         assert tally.kappa == pytest.approx((1.0, 1.0), abs=1e-3)
 
 
-def test_linkages_that_no_double_tells_apart_are_flagged(tallies):
+def test_indistinguishable_pairs_are_flagged(tallies):
     """Crank angles within 1e-9 to 1e-4 rad of each other: half of them say nothing."""
     assert 0.3 < tallies['one spot'].flagged / tallies['one spot'].cases < 0.8
     assert tallies['ordinary'].digits / tallies['ordinary'].cases > 13.0
@@ -170,7 +170,7 @@ angles = st.tuples(*[st.integers(-3141, 3141).map(lambda n: n / 1000)] * 3)
 
 
 @given(angles, angles)
-def test_sensitivity_is_that_of_changes(crank, rocker):
+def test_length_sensitivity_equals_numerical_derivatives(crank, rocker):
     """The gradient against differences of solutions at 60 digits."""
     found = three_pairs(crank, rocker)
     assume((found.reliable_digits > 4.0).all())
@@ -192,7 +192,7 @@ def test_sensitivity_is_that_of_changes(crank, rocker):
 
 
 @given(angles, angles)
-def test_condition_is_that_of_the_matrix(crank, rocker):
+def test_condition_number_equals_that_of_the_matrix(crank, rocker):
     found = three_pairs(crank, rocker)
     rows = np.stack((np.cos(rocker), np.cos(crank), np.ones(3)), 1)
     true = np.linalg.cond(rows)
@@ -202,7 +202,7 @@ def test_condition_is_that_of_the_matrix(crank, rocker):
         assert not found.condition < 1e8
 
 
-def test_one_code_for_one_and_for_many():
+def test_batch_of_pairs_equals_single_solutions():
     """Bit by bit, across the blocks that many are worked on in."""
     rng = np.random.default_rng(SEED)
     crank, rocker = rng.uniform(-pi, pi, (2, 5, 900, 3))
@@ -218,7 +218,7 @@ def test_one_code_for_one_and_for_many():
             assert np.array_equal(getattr(one, name), getattr(many, name)[place])
 
 
-def test_what_does_not_exist_is_told_without_a_word():
+def test_impossible_pairs_give_nan_without_a_warning():
     with np.errstate(all='raise'):
         found = three_pairs([[0.1, 0.1, 0.3], [nan, 0.2, 0.3]], [[0.2, 0.2, 0.5], [0.1, 0.2, 0.4]])
     assert not np.isfinite(found.lengths).any()
@@ -234,7 +234,7 @@ SINES = {
 
 @pytest.mark.parametrize('kind', SINES)
 @given(data=st.data())
-def test_sines_of_twofold_angles(kind, data):
+def test_double_double_sine_and_cosine_are_exact(kind, data):
     """Relative error below 2⁻⁶⁸, or what an error of 2⁻¹⁰⁴ of the angle makes of it."""
     high = data.draw(SINES[kind])
     low = high * 2.0**-54 * data.draw(st.floats(-0.9, 0.9))
@@ -301,7 +301,7 @@ REFUSED: dict[str, tuple[Angles, Angles, str]] = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_what_cannot_be_is_refused_in_one_line(name):
+def test_impossible_pairs_are_refused_in_one_line(name):
     crank, rocker, said = REFUSED[name]
     with pytest.raises(SynthesisError) as caught:
         exact_four_bar(rad(*crank), rad(*rocker), 1.0)
@@ -309,7 +309,7 @@ def test_what_cannot_be_is_refused_in_one_line(name):
 
 
 @pytest.mark.parametrize('link', ['crank', 'rocker'])
-def test_a_link_without_end_is_refused(link):
+def test_infinitely_long_link_is_refused(link):
     """With k1 = 0 the crank has no inverse, with k2 = 0 the rocker."""
     one = np.array([0.3, 1.1, 2.0])
     other = one - np.arccos(0.5 * np.cos(one) + 0.2)
@@ -320,20 +320,20 @@ def test_a_link_without_end_is_refused(link):
 
 
 @pytest.mark.parametrize('ground', [0.0, -1.0, nan, float('inf')])
-def test_a_ground_of_no_length_is_refused(ground):
+def test_ground_without_a_length_is_refused(ground):
     with pytest.raises(SynthesisError, match=r'^ground: '):
         exact_four_bar(rad(25, 35, 50), rad(30, 40, 60), ground)
 
 
 @pytest.mark.parametrize('name', ['parallel', 'mirrored', 'contradicting', 'the same twice'])
-def test_a_fit_refuses_what_does_not_fix_a_four_bar(name):
+def test_fit_refuses_pairs_that_determine_no_four_bar(name):
     crank, rocker, said = REFUSED[name]
     with pytest.raises(SynthesisError) as caught:
         fit_equation(rad(*crank), rad(*rocker), 1.0)
     assert str(caught.value) == said
 
 
-def test_pairs_too_near_to_tell_the_links():
+def test_pairs_too_close_to_each_other_are_refused():
     """Three pairs of a known linkage within 2e-8 rad: doubles do not hold what they differ by."""
     crank = (1.0, 1.00000001, 1.00000002)
     rocker = tuple(1.5 + 0.4 * (theta - 1.0) + 0.2 * (theta - 1.0) ** 2 for theta in crank)

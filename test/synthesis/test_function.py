@@ -55,7 +55,7 @@ LOG = task_of(TASKS['log'][0])
 
 @pytest.mark.parametrize('count', range(1, 12))
 @pytest.mark.parametrize(('low', 'high'), [(1.0, 2.0), (-3.0, 5.0), (2.0, 1.0), (1e6, 1e6 + 1)])
-def test_precision_points_lie_as_the_cosines_say(low, high, count):
+def test_precision_points_equal_the_chebyshev_zeros(low, high, count):
     found = chebyshev_points(low, high, count)
     with mp.workdps(30):
         middle, half = (mp.mpf(low) + high) / 2, (mp.mpf(high) - low) / 2
@@ -69,20 +69,20 @@ def test_precision_points_lie_as_the_cosines_say(low, high, count):
     assert np.max(np.abs(chebval(inner, [0.0] * count + [1.0]))) < 1e-13 * max(abs(low), 1.0) * 10
 
 
-def test_points_near_the_beginning_have_all_their_digits():
+def test_precision_points_near_the_start_stay_exact():
     with mp.workdps(30):
         expected = float(mp.sin(mp.pi / 4000) ** 2)
     assert chebyshev_points(0.0, 1.0, 1000)[0] == pytest.approx(expected, rel=1e-15)
 
 
-def test_of_no_points_there_are_none_and_too_many_are_refused():
+def test_precision_point_count_is_bounded():
     assert chebyshev_points(1.0, 2.0, 0).tolist() == chebyshev_points(1.0, 2.0, -3).tolist() == []
     with pytest.raises(SynthesisError, match=r'^points: 1001 of them; 1000 do$'):
         chebyshev_points(1.0, 2.0, 1001)
 
 
 @pytest.mark.parametrize('name', TASKS)
-def test_pairs_are_those_of_50_digits(name):
+def test_angle_pairs_equal_50_digit_references(name):
     case, function = TASKS[name]
     _, (x0, x1), cranks, rockers = case
     xs = chebyshev_points(x0, x1, 5)
@@ -100,7 +100,7 @@ def test_pairs_are_those_of_50_digits(name):
 
 
 @pytest.mark.parametrize('name', TASKS)
-def test_ends_are_exactly_the_ends(name):
+def test_range_ends_map_exactly_to_angle_ends(name):
     task = task_of(TASKS[name][0])
     crank, rocker = angle_pairs(task, task.x_range)
     assert tuple(crank) == task.crank_range
@@ -109,13 +109,13 @@ def test_ends_are_exactly_the_ends(name):
 
 
 @pytest.mark.parametrize('name', TASKS)
-def test_the_wanted_curve_runs_through_the_pairs(name):
+def test_wanted_curve_passes_through_the_pairs(name):
     task = task_of(TASKS[name][0])
     crank, rocker = angle_pairs(task, chebyshev_points(*task.x_range, 9))
     assert wanted_rocker(task, crank) == pytest.approx(rocker, abs=2e-15)
 
 
-def test_the_wanted_curve_keeps_the_shape_of_what_it_is_given():
+def test_wanted_curve_keeps_the_array_shape():
     angles = np.linspace(*LOG.crank_range, 6)
     assert np.array_equal(
         wanted_rocker(LOG, angles.reshape(2, 3)).ravel(), wanted_rocker(LOG, angles)
@@ -126,7 +126,7 @@ finite = strategies.floats(-3.0, 3.0)
 
 
 @given(finite, finite, finite, finite, strategies.floats(0.0, 1.0))
-def test_an_even_function_turns_the_rocker_evenly(c0, c1, r0, r1, part):
+def test_linear_function_turns_the_rocker_proportionally(c0, c1, r0, r1, part):
     if min(abs(c1 - c0), abs(r1 - r0)) < 0.1:
         return
     task = FunctionTask(Expression('7 - 3*x'), (-1.0, 4.0), (c0, c1), (r0, r1))
@@ -134,20 +134,20 @@ def test_an_even_function_turns_the_rocker_evenly(c0, c1, r0, r1, part):
     assert wanted_rocker(task, crank) == pytest.approx(r0 + (r1 - r0) * part, abs=1e-13)
 
 
-def test_a_function_may_go_beyond_its_ends_and_the_rocker_with_it():
+def test_function_beyond_its_ends_moves_the_rocker_beyond():
     task = task_of(TASKS['beyond its ends'][0])
     # x = 0 is a third of the way, and y there a third of its range below its beginning.
     assert wanted_rocker(task, radians(30.0)) == pytest.approx(radians(10.0), abs=1e-15)
 
 
-def test_a_square_root_is_not_asked_for_what_is_below_its_range_by_rounding():
+def test_square_root_is_not_evaluated_below_its_range():
     task = task_of(('sqrt(x - 0.1)', (0.1, 0.7), (10, 100), (20, 80)))
     crank = np.linspace(*task.crank_range, 997)
     assert np.isfinite(wanted_rocker(task, crank)).all()
     assert np.isfinite(wanted_rocker(task, np.nextafter(crank, -inf))).all()
 
 
-def test_an_error_is_read_on_the_scale_of_the_function():
+def test_structural_error_is_converted_to_the_function_scale():
     found = on_scale(LOG, radians(75.0), radians(-0.9))
     assert found.x == pytest.approx(1.5)
     assert found.y == pytest.approx(0.17609125905568124)
@@ -155,7 +155,7 @@ def test_an_error_is_read_on_the_scale_of_the_function():
     assert found.error == pytest.approx(-0.0030102999566398120)
 
 
-def test_an_error_along_a_rocker_that_turns_back_has_the_sign_that_it_has_for_y():
+def test_error_of_a_falling_function_keeps_its_sign():
     """1/x falls from 1 to 1/2, and the rocker from 120° to 30°: they go the same way."""
     found = on_scale(task_of(TASKS['reciprocal'][0]), radians(30.0), radians(9.0))
     assert found.error == pytest.approx(0.05)
@@ -171,7 +171,7 @@ def test_an_error_along_a_rocker_that_turns_back_has_the_sign_that_it_has_for_y(
         ([nan], 'point 1: x = nan lies outside of the range 1 to 2; choose it within'),
     ],
 )
-def test_points_that_are_none_are_refused(xs, message):
+def test_invalid_precision_points_are_refused(xs, message):
     with pytest.raises(SynthesisError) as caught:
         angle_pairs(LOG, xs)
     assert str(caught.value) == message
@@ -205,13 +205,13 @@ GOOD = ((0, 1), (45, 105), (135, 225))
       'the rocker would swing by 4567.61°; choose a range without its summits and '
       'valleys, or a smaller rocker range')),
 ])  # fmt: skip
-def test_what_cannot_be_generated_is_refused_in_one_line(case, message):
+def test_impossible_function_task_is_refused_in_one_line(case, message):
     with pytest.raises(SynthesisError) as caught:
         task_of(case)
     assert str(caught.value) == message
 
 
-def test_a_range_may_be_narrow():
+def test_function_range_may_be_narrow():
     task = FunctionTask(Expression('x^2'), (1.0, 1.0 + 1e-9), (0.0, 1.0), (0.0, 1.0))
     assert wanted_rocker(task, 0.5) == pytest.approx(0.5, abs=1e-6)
 
@@ -237,7 +237,7 @@ def test_a_range_may_be_narrow():
     ('ln(abs(x - 0.50031))', 0, 1, 'jumps, or goes to infinity, at x = 0.50031'),
     ('atan(1/(x - 0.3))', 0, 1.01, 'jumps, or goes to infinity, at x = 0.3'),
 ])  # fmt: skip
-def test_where_a_function_has_no_value_is_told(text, low, high, message):
+def test_undefined_function_error_names_the_place(text, low, high, message):
     with pytest.raises(SynthesisError) as caught:
         check_defined(Expression(text), low, high)
     assert f"function '{text}': " in str(caught.value)
@@ -253,5 +253,5 @@ def test_where_a_function_has_no_value_is_told(text, low, high, message):
         ('3', 0, 1), ('sin(x)^2 + cos(x)^2', 0, 1),
     ],
 )  # fmt: skip
-def test_a_steep_function_is_taken(text, low, high):
+def test_steep_functions_are_accepted(text, low, high):
     check_defined(Expression(text), low, high)

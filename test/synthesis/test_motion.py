@@ -117,7 +117,7 @@ ROUTES = [(fixed_pivots, False), (moving_pivots, True)]
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize(('find', 'fixed'), ROUTES)
-def test_pivots_are_right_to_what_rounding_the_poses_makes_of_them(find, fixed, kind):
+def test_pivots_stay_within_the_reported_accuracy(find, fixed, kind):
     places, angles, given = kind(np.random.default_rng(5), 400)
     found = find(places, angles, given)
     for index, point in enumerate(given):
@@ -132,7 +132,7 @@ def test_pivots_are_right_to_what_rounding_the_poses_makes_of_them(find, fixed, 
 
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize(('find', 'fixed'), ROUTES)
-def test_sensitivity_is_what_the_poses_do_to_a_pivot(find, fixed, kind):
+def test_pivot_sensitivity_equals_numerical_derivatives(find, fixed, kind):
     places, angles, given = kind(np.random.default_rng(7), 20)
     found = find(places, angles, given)
     for index, point in enumerate(given):
@@ -155,7 +155,7 @@ def test_sensitivity_is_what_the_poses_do_to_a_pivot(find, fixed, kind):
         assert found.sensitivity[index] == pytest.approx(float(total), rel=1e-6)
 
 
-def test_one_at_a_time_is_as_all_at_once():
+def test_pivot_batch_equals_single_solutions():
     places, angles, given = anywhere(np.random.default_rng(3), 10)
     for find, _ in ROUTES:
         many = find(places, angles, given)
@@ -194,7 +194,7 @@ def driven(generator):
 @pytest.mark.sample(60)
 @pytest.mark.parametrize('seed', range(150))
 @pytest.mark.parametrize('way', ['fixed', 'moving'])
-def test_a_four_bar_is_found_again_from_its_poses(seed, way):
+def test_four_bar_is_recovered_from_three_poses(seed, way):
     (o2, o4), (a, b), poses, cranks, side = driven(np.random.default_rng(seed))
     if way == 'moving':
         design, links = from_moving_pivots(poses, a, b)
@@ -238,7 +238,7 @@ SPECIFIED_GROUND = [
 ]
 
 
-def test_a_task_with_moving_pivots():
+def test_moving_pivots_give_a_four_bar_through_poses():
     poses = [Pose(start, phase(end - start)) for start, end in LINE]
     pins = [(point - poses[0].place) * rect(1.0, -poses[0].angle) for point in ENDS]
     design, _ = from_moving_pivots(poses, *pins)
@@ -248,7 +248,7 @@ def test_a_task_with_moving_pivots():
     assert all(met.distance < 1e-12 and abs(met.angle) < 1e-13 for met in prove(design))
 
 
-def test_a_task_with_fixed_pivots():
+def test_fixed_pivots_give_a_four_bar_through_poses():
     # The script searches for the moving pivots until the fixed ones are met to 0.001.
     design, links = from_fixed_pivots(SPECIFIED_GROUND, 0j, 4.354 + 0j)
     there, _ = from_moving_pivots(SPECIFIED_GROUND, *design.four_bar.coupler)
@@ -261,7 +261,7 @@ def test_a_task_with_fixed_pivots():
 # By hand.
 
 
-def test_a_coupler_that_does_not_turn_is_carried_by_a_parallelogram():
+def test_non_rotating_coupler_gives_a_parallelogram():
     # Its origin goes around (0, 2) by quarters, and every other point with it.
     poses = [pose(1, 2, 0), pose(0, 3, 0), pose(-1, 2, 360)]
     design, _ = from_moving_pivots(poses, 0j, 3 + 0j)
@@ -273,7 +273,7 @@ def test_a_coupler_that_does_not_turn_is_carried_by_a_parallelogram():
     assert abs(np.subtract(same.four_bar.coupler, (0j, 3 + 0j))).max() < 1e-15
 
 
-def test_the_assembly_is_the_one_that_meets_most_poses():
+def test_motion_design_uses_the_assembly_meeting_most_poses():
     # A goes around 0 through 1, i and −1; B = A + 2·e^{iθ} through (3, 0), (0, 3) and (1, 0),
     # which are √5 from (2, 2). In the second pose it has come to the other side of A→O4.
     poses = [pose(1, 0, 0), pose(0, 1, 90), pose(-1, 0, 0)]
@@ -285,7 +285,7 @@ def test_the_assembly_is_the_one_that_meets_most_poses():
 
 
 @pytest.mark.parametrize('turns', [-3, 1, 1000])
-def test_whole_turns_are_the_same_pose(turns):
+def test_whole_turns_do_not_change_a_pose(turns):
     turned = [Pose(at.place, at.angle + turns * tau) for at in SPECIFIED_GROUND]
     design, _ = from_fixed_pivots(turned, 0j, 4.354 + 0j)
     other, _ = from_fixed_pivots(SPECIFIED_GROUND, 0j, 4.354 + 0j)
@@ -326,7 +326,7 @@ OFF_THE_POLE = 1e-15 + 1e-15j
     ('moving', [pose(1, 0, 0), pose(0, 1, 90), OVER], (1j, -1 + 1e-14j), 'B',
      'so near a pole that its fixed pivot has no certain digit'),
 ])  # fmt: skip
-def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):
+def test_impossible_motion_task_is_refused(way, poses, pivots, where, reason):
     design = from_moving_pivots if way == 'moving' else from_fixed_pivots
     with pytest.raises(SynthesisError, match=reason) as caught:
         design(poses, *pivots)
@@ -334,7 +334,7 @@ def test_what_does_not_exist_is_told(way, poses, pivots, where, reason):
     assert '\n' not in str(caught.value)
 
 
-def test_near_a_line_the_digits_that_are_left_are_told():
+def test_nearly_collinear_poses_report_fewer_reliable_digits():
     nearly = [ON_A_LINE[0], ON_A_LINE[1], pose(2, 3 + 1e-7, -30)]
     _, links = from_moving_pivots(nearly, 0j, 1j)
     assert 6.0 < links.reliable_digits[0] < 9.0

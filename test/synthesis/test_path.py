@@ -92,7 +92,7 @@ HALF = np.linspace(80.0, 280.0, 21)
         ('hoeken', HALF, False, False),  # its straight line, which other linkages nearly draw too
     ],
 )
-def test_a_linkage_is_found_again_from_its_curve(name, degrees, closed, timed):
+def test_four_bar_is_recovered_from_its_coupler_curve(name, degrees, closed, timed):
     timing = tuple(float(angle) for angle in np.radians(degrees)) if timed else None
     task = PathTask(curve(name, degrees), closed, timing)
     found = generate_path(task, seed=1, count=FEW).found
@@ -153,7 +153,7 @@ ON_A_LINE = (0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0
         (ON_A_LINE, False, 1e-13),
     ],
 )
-def test_published_points_are_passed(points, closed, error):
+def test_published_path_points_are_met(points, closed, error):
     task = PathTask(points, closed)
     best = generate_path(task, seed=1, count=FEW).found[0]
     assert max(distances(best)) < error * task.size
@@ -190,7 +190,7 @@ THIRTIES = tuple(radians(30.0 * i) for i in range(1, 6))
 @pytest.mark.parametrize(
     ('points', 'closed', 'timing'), [(EGG, True, TWENTIES), (ARC, False, THIRTIES)]
 )
-def test_timing_is_kept(points, closed, timing, zero_free):
+def test_path_design_keeps_the_crank_timing(points, closed, timing, zero_free):
     task = PathTask(points, closed, timing, zero_free)
     for result in generate_path(task, seed=1, count=FEW).found:
         assert tuple(wanted.crank for wanted in result.design.wanted) == timing
@@ -202,13 +202,13 @@ def test_timing_is_kept(points, closed, timing, zero_free):
         )
 
 
-def test_five_points_with_timing_are_passed_exactly():
+def test_five_timed_points_are_met_exactly():
     # As many equations as unknowns: pivots, three more lengths than the crank's, P, and the zero.
     best = generate_path(PathTask(ARC, False, THIRTIES), seed=1, count=FEW).found[0]
     assert max(distances(best)) < 1e-13
 
 
-def test_no_linkage_near_the_best_one_is_better():
+def test_best_path_design_is_a_local_minimum():
     task = PathTask(EGG, True, TWENTIES)
     best = generate_path(task, seed=1, count=FEW).found[0]
     four_bar = best.design.four_bar
@@ -236,7 +236,7 @@ def test_no_linkage_near_the_best_one_is_better():
     assert sqrt(2.0 * again.cost / len(EGG)) == pytest.approx(best.rms, rel=1e-6)
 
 
-def test_results_are_sorted_distinct_and_within_the_box():
+def test_path_results_are_sorted_distinct_and_bounded():
     task = PathTask(EGG, True, links=(0.3, 2.0))
     found = generate_path(task, seed=1, count=FEW, keep=5).found
     assert len(found) == 5
@@ -261,20 +261,20 @@ def alike(one: Design, other: Design) -> bool:
     return first.side == second.side and max(apart) < 0.01 * max(first.lengths)
 
 
-def test_more_points_than_are_searched_for_count_too():
+def test_path_fit_uses_all_200_points():
     task = PathTask(curve('four_bar', np.linspace(20.0, 200.0, 200)))
     best = generate_path(task, seed=1, count=FEW).found[0]
     assert len(best.design.wanted) == 200
     assert max(distances(best)) < 1e-6 * task.size
 
 
-def test_an_open_path_may_be_asked_for_a_crank_that_turns_fully():
+def test_open_path_may_require_a_fully_turning_crank():
     task = PathTask(ARC, full_turn=True)
     for result in generate_path(task, seed=1, count=FEW).found:
         assert_in_order(result.design, 1)
 
 
-def test_what_is_refused_comes_apart():
+def test_rejected_path_designs_are_returned_separately():
     task = PathTask(EGG, True, TWENTIES)
 
     def left(design: Design) -> bool:
@@ -291,7 +291,7 @@ def test_what_is_refused_comes_apart():
     assert none.refused == every.found[:2]
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_other_ones():
+def test_path_search_seed_determines_the_result():
     told: list[tuple[int, int]] = []
     task = PathTask(ON_A_LINE)
     first = generate_path(task, seed=3, count=FEW, progress=lambda *done: told.append(done))
@@ -303,7 +303,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_other_ones():
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(('size', 'at'), [(1e-3, 5.0 - 7.0j), (1e6, 1e6 + 0j), (1e-12, 0j)])
-def test_size_and_place_of_a_path_do_not_matter(size, at):
+def test_path_search_is_independent_of_size_and_place(size, at):
     points = tuple(size * point + at for point in ON_TWO_CIRCLES)
     best = generate_path(PathTask(points), seed=1, count=FEW).found[0]
     assert max(distances(best)) < 1e-12 * size + 1e-15 * abs(at)
@@ -344,13 +344,13 @@ NEITHER = (
     ({'points': (0j, 1e-200 + 0j, 1e-200j)},
      'path: its size is 1.41421e-200 m; make it 1e-12 to 1e+09 m'),
 ])  # fmt: skip
-def test_what_is_no_path_is_said_in_one_line(arguments, line):
+def test_invalid_path_task_is_refused_in_one_line(arguments, line):
     with pytest.raises(SynthesisError) as caught:
         PathTask(**arguments)
     assert str(caught.value) == line
 
 
-def test_points_out_of_reach_are_said():
+def test_unreachable_path_points_are_refused():
     task = PathTask(EGG, True, TWENTIES, links=(0.01, 0.02))
     with pytest.raises(SynthesisError, match=r'links of 0\.01 to 0\.02 times its size reaches'):
         generate_path(task, seed=1, count=FEW)

@@ -59,7 +59,7 @@ def drawn(aim: Aim, closed: bool) -> tuple[Any, np.ndarray[Any, Any], np.ndarray
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_a_start_is_what_its_score_says_and_closes(aim, closed):
+def test_path_search_start_matches_its_score(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
     starts = problem.place_candidates(candidates)
     assert are_allowed(starts, aim).all()
@@ -76,7 +76,7 @@ def test_a_start_is_what_its_score_says_and_closes(aim, closed):
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_it_is_laid_on_as_well_as_can_be(aim, closed):
+def test_path_search_start_is_placed_optimally(aim, closed):
     """Neither pivot, ground direction, size nor traced point can be better, one at a time."""
     problem, candidates, scores = drawn(aim, closed)
     starts = problem.place_candidates(candidates)
@@ -104,7 +104,7 @@ def test_it_is_laid_on_as_well_as_can_be(aim, closed):
         assert scores[start] == pytest.approx(left, rel=1e-6, abs=1e-9)
 
 
-def test_what_would_need_links_outside_of_the_box_has_no_score():
+def test_candidates_with_links_out_of_bounds_score_infinity():
     aim = Aim(POINTS, TIMING, True, True, 0.2, 1.5)
     problem = problem_of(aim, True)
     candidates = problem.sample(np.random.default_rng(7), COUNT)
@@ -115,7 +115,7 @@ def test_what_would_need_links_outside_of_the_box_has_no_score():
 
 
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_a_problem_goes_to_another_process_and_scores_the_same(aim, closed):
+def test_pickled_path_problem_scores_the_same(aim, closed):
     problem, candidates, scores = drawn(aim, closed)
     again = pickle.loads(pickle.dumps(problem))
     assert (again.score(candidates) == scores).all()
@@ -125,7 +125,7 @@ def test_a_problem_goes_to_another_process_and_scores_the_same(aim, closed):
 
 @pytest.mark.parametrize('guard', [0.0, 1e-3])
 @pytest.mark.parametrize(('aim', 'closed'), AIMS.values(), ids=AIMS)
-def test_steps_keep_what_was_asked_for(aim, closed, guard):
+def test_path_improvement_keeps_timing_and_bounds(aim, closed, guard):
     problem, candidates, scores = drawn(aim, closed)
     fitted, squares = improve(problem.place_candidates(candidates), aim, 20, guard)
     assert are_allowed(fitted, aim).all()
@@ -159,7 +159,7 @@ def row(lengths: Lengths, at: complex, ground: float, point: complex) -> np.ndar
 
 
 @given(lengths_of_any, angle, st.sampled_from(('left', 'right')), angle)
-def test_the_traced_point_is_where_circles_put_it(lengths, direction, side, ground):
+def test_traced_point_equals_the_circle_construction(lengths, direction, side, ground):
     assume(pins(lengths, direction) is not None)
     assume(transmission(lengths, direction) > 0.01)
     near, far = rect(lengths[0], direction), on(side, lengths, direction)
@@ -186,7 +186,7 @@ STEP = 1e-6
 
 
 @pytest.mark.parametrize('column', range(len(COLUMNS)), ids=COLUMNS)
-def test_derivatives_by_dimensions_are_those_of_differences(column):
+def test_dimension_derivatives_equal_numerical_ones(column):
     aside = np.zeros(len(COLUMNS))
     aside[column] = STEP
     places = [point_slopes(ROWS + sign * aside, ANGLES, SIDE).places for sign in (1.0, -1.0)]
@@ -197,7 +197,7 @@ def test_derivatives_by_dimensions_are_those_of_differences(column):
     assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
 
 
-def test_derivatives_by_the_crank_are_those_of_differences():
+def test_crank_derivatives_equal_numerical_ones():
     places = [point_slopes(ROWS, ANGLES + by, SIDE).places for by in (STEP, -STEP)]
     folded = [transmission_cotangents(ROWS, ANGLES + by)[0] for by in (STEP, -STEP)]
     by_place = point_slopes(ROWS, ANGLES, SIDE).by_angle
@@ -207,7 +207,7 @@ def test_derivatives_by_the_crank_are_those_of_differences():
 
 
 @given(lengths_of_any, angle)
-def test_a_fold_is_told_by_the_transmission_angle(lengths, direction):
+def test_fold_measure_equals_the_transmission_angle_cotangent(lengths, direction):
     assume(pins(lengths, direction) is not None)
     acute = transmission(lengths, direction)
     assume(acute > 0.01)
@@ -216,7 +216,7 @@ def test_a_fold_is_told_by_the_transmission_angle(lengths, direction):
 
 
 @given(lengths_of_any, angle, st.floats(0.0, 6.2))
-def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(lengths, low, travel):
+def test_closing_check_covers_every_crank_angle(lengths, low, travel):
     closed = bool(
         stay_closed(row(lengths, 0j, 0.0, 0j), np.array([low]), np.array([low + travel]))[0]
     )
@@ -230,7 +230,7 @@ def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(lengths, low, tra
         assert not all(found) or min(folded) < 1e-3
 
 
-def test_places_along_a_curve_are_found_by_the_length_of_its_chords():
+def test_curve_is_resampled_by_chord_length():
     curves = np.array([[0j, 3.0, 3.0 + 1.0j], [0j, 1.0j, 4.0j]])
     way = curve_distances(curves)
     assert way == pytest.approx(np.array([[0.0, 0.75, 1.0], [0.0, 0.25, 1.0]]))

@@ -46,14 +46,14 @@ THREE_PAIRS = Design(
 CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
 
 
-def test_the_exact_design_of_the_text_meets_two_positions_left_and_one_right():
+def test_textbook_design_meets_positions_on_both_sides():
     met = prove(THREE_PAIRS)
     assert [one.side for one in met] == ['left', 'left', 'right']
     assert all(one.status is Status.CLOSED for one in met)
     assert max(abs(one.angle) for one in met) < 1e-13
 
 
-def test_the_links_as_printed_in_the_text_miss_its_angles():
+def test_rounded_textbook_links_miss_the_angles():
     """Of four-digit cosines: a = 5.598, b = 0.176, c = 4.88. Here by circles, with 40 digits."""
     met = prove(THREE_PAIRS._replace(four_bar=FourBar.of_lengths(5.598, 0.176, 4.88, 1.0)))
     with mp.workdps(40):
@@ -71,7 +71,7 @@ def test_the_links_as_printed_in_the_text_miss_its_angles():
             assert abs(best) > mpf('0.001')
 
 
-def test_an_error_is_what_the_linkage_has_over_what_was_asked():
+def test_position_error_equals_actual_minus_requested_angle():
     exact = design(CRANK_ROCKER, [(40.0, 'left'), (90.0, 'left')])
     asked = (
         exact.wanted[0]._replace(rocker=exact.wanted[0].rocker - 0.25),
@@ -81,14 +81,14 @@ def test_an_error_is_what_the_linkage_has_over_what_was_asked():
     assert [one.angle for one in met] == pytest.approx([0.25, -0.001])
 
 
-def test_whole_turns_make_no_error():
+def test_whole_turns_cause_no_position_error():
     exact = design(CRANK_ROCKER, [(40.0, 'left')])
     turned = DesignRequest(exact.wanted[0].crank - 4 * pi, exact.wanted[0].rocker + 6 * pi)
     (met,) = prove(exact._replace(wanted=(turned,)))
     assert met.angle == pytest.approx(0.0, abs=1e-14)
 
 
-def test_coupler_angles_and_places_are_proved():
+def test_proof_checks_coupler_angles_and_places():
     """The coupler carries P at 3 + 1i of a frame whose x axis is at 20° to A→B."""
     a, b, c, d = CRANK_ROCKER
     tilt = rect(1.0, radians(20.0))
@@ -108,7 +108,7 @@ def test_coupler_angles_and_places_are_proved():
         assert one.distance == pytest.approx(0.5)
 
 
-def test_the_worse_of_rocker_and_coupler_is_told():
+def test_proof_reports_the_larger_angle_error():
     exact = design(CRANK_ROCKER, [(40.0, 'left')]).wanted[0]
     coupler = phase(on('left', CRANK_ROCKER, exact.crank) - rect(2.0, exact.crank))
     asked = DesignRequest(exact.crank, exact.rocker + 0.01, coupler - 0.02)
@@ -116,7 +116,7 @@ def test_the_worse_of_rocker_and_coupler_is_told():
     assert met.angle == pytest.approx(0.02)
 
 
-def test_a_position_that_cannot_be_assembled_is_open_by_a_gap():
+def test_unreachable_position_is_open_with_its_gap():
     """With the crank outwards A is 9 m from O4, and the links reach 3."""
     four_bar = FourBar.of_lengths(4.0, 2.0, 1.0, 5.0)
     (met,) = prove(Design(four_bar, (DesignRequest(pi, 0.0),)))
@@ -126,7 +126,7 @@ def test_a_position_that_cannot_be_assembled_is_open_by_a_gap():
 
 
 @pytest.mark.parametrize('off', [-3e-16, 0.0, 3e-16, 1e-14])
-def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off):
+def test_position_at_a_toggle_tolerates_rounding(off):
     """3, 4 and 5: at a right angle of the crank coupler and rocker are stretched."""
     four_bar = FourBar.of_lengths(3.0, 2.0 - off, 3.0, 4.0)
     for side in ('left', 'right'):
@@ -137,13 +137,13 @@ def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off):
         assert abs(met.angle) < 1e-6
 
 
-def test_beyond_a_toggle_by_more_than_rounding_it_is_open():
+def test_position_beyond_a_toggle_is_open():
     four_bar = FourBar.of_lengths(3.0, 2.0 - 1e-6, 3.0, 4.0)
     (met,) = prove(Design(four_bar, (DesignRequest(0.5 * pi, phase(3j - 4)),)))
     assert met.status is Status.OPEN
 
 
-def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does():
+def test_crank_only_positions_use_the_design_assembly():
     for side in ('left', 'right'):
         four_bar = FourBar.of_lengths(*CRANK_ROCKER, side=side)
         assert [
@@ -154,7 +154,7 @@ def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does():
         ]
 
 
-def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one():
+def test_place_reached_by_both_assemblies_keeps_the_side():
     """A point traced 0.1 nm beside the crank's pin is the same on both, for all that matters."""
     beside = 1e-10
     lengths, direction = (2.0, 7.0, 9.0, 6.0), radians(40.0)
@@ -178,13 +178,13 @@ def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one():
     ],
 )
 @pytest.mark.parametrize('given', ['left', 'right'])
-def test_a_design_is_put_on_the_assembly_that_meets_most(sides, best, given):
+def test_design_uses_the_assembly_that_meets_most_positions(sides, best, given):
     angles = (40.0, 100.0, 250.0)
     found = assemble(design(CRANK_ROCKER, list(zip(angles, sides)), side=given))  # noqa: B905
     assert found.four_bar.side == best
 
 
-def test_a_position_at_a_toggle_has_no_vote():
+def test_toggle_position_does_not_decide_the_assembly():
     lengths = (3.0, 2.0, 3.0, 4.0)
     toggle = DesignRequest(0.5 * pi, phase(3j - 4))
     elsewhere = design(lengths, [(50.0, 'right')])
@@ -193,7 +193,7 @@ def test_a_position_at_a_toggle_has_no_vote():
     assert [one.side for one in prove(found)] == ['right', 'right']
 
 
-def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly():
+def test_small_errors_do_not_decide_the_assembly():
     """Near the toggle at 90° both assemblies are a little off, and the other one less so."""
     lengths = (3.0, 2.0, 3.0, 4.0)
     left, right = (phase(on(side, lengths, radians(89.99)) - 4.0) for side in ('left', 'right'))
@@ -204,7 +204,7 @@ def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly(
     assert met.side == 'left'
 
 
-def test_random_designs_in_odd_frames_are_met_where_they_were_made():
+def test_random_designs_in_odd_frames_are_proved():
     rng = random.Random(5)
     for _ in range(200):
         lengths = (*(rng.uniform(1.0, 3.0) for _ in range(3)), 2.0)
@@ -267,7 +267,7 @@ def closing(lengths: Lengths) -> float:
 
 @pytest.mark.parametrize('word', WORDS)
 @pytest.mark.parametrize('name', FOUR_BARS)
-def test_a_word_stands_for_kinds_of_four_bars(word, name):
+def test_need_word_selects_four_bar_kinds(word, name):
     lengths = FOUR_BARS[name]
     found = assess(design(lengths, [(closing(lengths), 'left')]))
     needs = Needs(word)
@@ -287,13 +287,13 @@ def test_a_word_stands_for_kinds_of_four_bars(word, name):
      ('name one of crank-rocker, rocker-crank, double-crank, drag-link, double-rocker, '
       'triple-rocker, grashof, non-grashof, turning')),
 ])  # fmt: skip
-def test_an_unknown_word_is_refused(word, remedy):
+def test_unknown_need_word_is_refused(word, remedy):
     with pytest.raises(SynthesisError) as caught:
         Needs(word).check()
     assert str(caught.value) == f'{word}: is not a kind of four-bar; {remedy}'
 
 
-def test_misses_say_what_was_found_and_what_was_wanted():
+def test_unmet_needs_name_found_and_required_values():
     """At 60° on a ground of 6, s² = 28: cos μ = (49 + 81 − 28)/126, so that μ = 35.95°."""
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     assert unmet_needs(found, Needs('double-crank', radians(40.0), 4.0)) == (
@@ -305,7 +305,7 @@ def test_misses_say_what_was_found_and_what_was_wanted():
     assert unmet_needs(found, Needs()) == ()
 
 
-def test_the_distance_grows_with_what_is_missing():
+def test_needs_penalty_grows_with_the_missing_amount():
     found = assess(design((2.0, 7.0, 9.0, 6.0), [(60.0, 'left')]))
     angle = found.transmission
     assert needs_penalty(found, Needs(transmission=2.0 * angle)) == pytest.approx(0.5)
@@ -318,7 +318,7 @@ def test_the_distance_grows_with_what_is_missing():
     assert by_wish[0] == 0.0 < by_wish[1]
 
 
-def test_a_defect_is_farther_than_any_number():
+def test_defect_outweighs_every_other_need():
     found = assess(THREE_PAIRS)
     assert unmet_needs(found, Needs(usable=True)) == ('branch defect',)
     assert unmet_needs(found, Needs(usable=False)) == ()
@@ -327,13 +327,13 @@ def test_a_defect_is_farther_than_any_number():
     assert needs_penalty(found, wishes._replace(link_ratio=inf)) > needs_penalty(sound, wishes)
 
 
-def test_links_that_never_close_are_of_no_kind():
+def test_links_that_never_close_meet_no_need():
     found = assess(Design(FourBar.of_lengths(1.0, 1.0, 1.0, 4.0), (DesignRequest(1.0, 2.0),)))
     for word in WORDS:
         assert unmet_needs(found, Needs(word)) == (f'a {found.kind.name}, not {word}',)
 
 
-def test_many_at_once_are_as_far_as_each_alone():
+def test_batch_needs_penalties_equal_single_ones():
     rng = random.Random(3)
     lengths, angles, found = [], [], []
     while len(found) < 300:
@@ -369,6 +369,6 @@ def _closes(lengths: Lengths, angle: float) -> bool:
         (Needs(link_ratio=nan), '^link ratio: nan is not a ratio'),
     ],
 )
-def test_what_cannot_be_needed_is_refused(needs, said):
+def test_impossible_needs_are_refused(needs, said):
     with pytest.raises(SynthesisError, match=said):
         needs.check()

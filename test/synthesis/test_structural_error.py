@@ -113,7 +113,7 @@ def _many_digits():
 
 
 @pytest.mark.parametrize('name', ['log', 'power', 'sine', 'reciprocal', 'down'])
-def test_the_error_of_a_function_generator_is_that_of_40_digits(name):
+def test_structural_error_equals_a_40_digit_reference(name):
     task, design, wanted = designed(name)
     reference = Generated(name)
     assert design.four_bar.lengths[:3] == pytest.approx(
@@ -136,7 +136,7 @@ def test_the_error_of_a_function_generator_is_that_of_40_digits(name):
 
 
 @pytest.mark.parametrize('name', ['log', 'power', 'sine', 'reciprocal', 'down'])
-def test_it_is_0_at_the_precision_points_and_changes_its_sign_there(name):
+def test_structural_error_changes_sign_at_precision_points(name):
     task, design, wanted = designed(name)
     found = structural_error(design, wanted, *task.crank_range)
     for one in design.wanted:
@@ -151,7 +151,7 @@ def test_it_is_0_at_the_precision_points_and_changes_its_sign_there(name):
 @pytest.mark.parametrize('amplitude', [1e-3, 1e-9])
 @pytest.mark.parametrize('side', ['left', 'right'])
 @pytest.mark.parametrize('direction', [1, -1])
-def test_a_known_error_is_found_with_its_summit_and_mean(amplitude, side, direction):
+def test_known_structural_error_peak_and_rms_are_found(amplitude, side, direction):
     def wanted(crank: np.ndarray) -> np.ndarray:
         wave = np.sin(3.0 * (crank - 0.2))
         return rocker_angles(CRANK_ROCKER, crank, side) - amplitude * wave
@@ -165,7 +165,7 @@ def test_a_known_error_is_found_with_its_summit_and_mean(amplitude, side, direct
     assert found.rms == pytest.approx(amplitude / sqrt(2.0), rel=1e-4)
 
 
-def test_of_nearly_equal_summits_the_highest_is_told():
+def test_highest_of_nearly_equal_peaks_is_reported():
     """The samples, half a degree apart, see other heights: the order of some is another there."""
     period = tau / 5.0
 
@@ -184,7 +184,7 @@ def test_of_nearly_equal_summits_the_highest_is_told():
     assert abs(found.greatest) == pytest.approx(np.max(heights), abs=1e-10)
 
 
-def test_an_even_error_is_its_own_mean():
+def test_constant_error_equals_its_rms():
     found = structural_error(
         four_bar(CRANK_ROCKER), lambda crank: rocker_angles(CRANK_ROCKER, crank) + 0.25, 0.1, 1.3
     )
@@ -193,7 +193,7 @@ def test_an_even_error_is_its_own_mean():
 
 
 @pytest.mark.parametrize('turns', [-2, 1, 7])
-def test_whole_turns_make_no_error(turns):
+def test_whole_turns_cause_no_structural_error(turns):
     def wanted(crank: np.ndarray) -> np.ndarray:
         return rocker_angles(CRANK_ROCKER, crank) + turns * tau
 
@@ -201,7 +201,7 @@ def test_whole_turns_make_no_error(turns):
     assert abs(found.greatest) < 1e-14
 
 
-def test_half_a_turn_is_never_told_as_half_a_turn_back():
+def test_half_turn_error_is_reported_positive():
     """A parallelogram's rocker stands as its crank does, to the last digit."""
     design = four_bar((1.0, 2.0, 1.0, 2.0))
     for by in (pi, -pi):
@@ -214,7 +214,7 @@ def test_half_a_turn_is_never_told_as_half_a_turn_back():
     (-80.0, 80.0, None), (80.0, -80.0, None), (30.0, 120.0, 90.0), (30.0, -120.0, -90.0),
     (100.0, 30.0, 100.0), (330.0, 500.0, 450.0), (100.0, 200.0, 100.0), (-90.0, 90.0, None),
 ])  # fmt: skip
-def test_where_the_loop_opens_on_the_way_is_told(low, high, opens_at):
+def test_structural_error_reports_the_opening_angle(low, high, opens_at):
     """3, 4 and 5: at ±90° coupler and rocker are stretched, 5 long."""
     found = structural_error(four_bar(TOGGLES_AT_90), np.zeros_like, radians(low), radians(high))
     if opens_at is None:
@@ -226,7 +226,7 @@ def test_where_the_loop_opens_on_the_way_is_told(low, high, opens_at):
     assert isnan(found.greatest) == isnan(found.rms) == (not closes.any())
 
 
-def test_between_two_ranges_the_loop_is_open():
+def test_structural_error_is_nan_between_two_ranges():
     """Crank 4, ground 4: A must stay 3 from O4 at least, and 5 at most."""
     lengths = (4.0, 4.0, 1.0, 4.0)
     near = 2.0 * np.arcsin(3.0 / 8.0)
@@ -235,7 +235,7 @@ def test_between_two_ranges_the_loop_is_open():
     assert np.array_equal(np.isfinite(found.error), np.abs(found.crank) > near)
 
 
-def test_the_greatest_is_looked_for_where_the_loop_closes():
+def test_greatest_error_is_searched_only_where_closed():
     """The rocker goes one way up to the toggle, and fastest there; then there is none."""
     (start,) = rocker_angles(TOGGLES_AT_90, np.array([radians(60.0)]))
     found = structural_error(
@@ -250,7 +250,7 @@ def test_the_greatest_is_looked_for_where_the_loop_closes():
     assert abs(found.greatest) > 0.3
 
 
-def test_links_that_point_the_other_way_and_free_zeros_are_those_of_the_design():
+def test_structural_error_uses_reversed_links_and_zeros():
     positions = [(20.0, 'left'), (60.0, 'left'), (100.0, 'left')]
     design = by_hand.design(CRANK_ROCKER, positions, zeros=(pi - 0.3, -2.0), ground=0.7)
     cranks = [one.crank for one in design.wanted]
@@ -272,7 +272,7 @@ def at_positions(design: Design) -> list[float]:
     return [float(found.error[found.crank == crank][0]) for crank in cranks]
 
 
-def test_errors_are_those_of_the_own_assembly() -> None:
+def test_structural_errors_use_the_design_assembly() -> None:
     design = by_hand.design(CRANK_ROCKER, [(40.0, 'left'), (90.0, 'right')])
     errors = at_positions(design)
     assert errors[0] == pytest.approx(0.0, abs=1e-13)
@@ -338,7 +338,7 @@ def random_design(rng: np.random.Generator, count: int) -> Design:
 
 
 @pytest.mark.parametrize('number', range(8))
-def test_a_linkage_is_found_again_from_seven_of_its_positions(number):
+def test_four_bar_is_recovered_from_seven_positions(number):
     """From the equation's fit, and from a start that is ten per cent off."""
     true = random_design(np.random.default_rng([SEED, number]), 7)
     a, b, c, d = true.four_bar.lengths
@@ -351,7 +351,7 @@ def test_a_linkage_is_found_again_from_seven_of_its_positions(number):
     assert found.wanted == true.wanted
 
 
-def test_zeros_are_found_again():
+def test_fit_recovers_free_zeros():
     """Both frames turned: seven positions tell the five unknowns."""
     true = FourBar.of_lengths(0.3, 0.9, 0.7, 1.0, alpha=0.4, beta=-0.3)
     design = sampled(true, np.linspace(-1.0, 3.0, 9).tolist())
@@ -367,7 +367,7 @@ def test_zeros_are_found_again():
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('number', range(12))
 @pytest.mark.parametrize('noise', [1e-3, 0.03])
-def test_pairs_that_none_has_are_met_better_than_by_the_equation(number, noise):
+def test_angle_fit_improves_the_equation_fit(number, noise):
     rng = np.random.default_rng([SEED, 1, number])
     design = with_noise(random_design(rng, 7), noise * rng.normal(size=7))
     start = start_of(design)
@@ -395,7 +395,7 @@ def fit_by_hand(
     return min(sums)
 
 
-def test_the_minimum_is_that_of_a_search_without_slopes():
+def test_angle_fit_equals_a_nelder_mead_minimum():
     """The published pairs, by the simplex of Nelder and Mead on an error written out again."""
     crank, rocker, ground = WEAVING
     start = fit_equation(crank, rocker, ground)
@@ -412,7 +412,7 @@ def test_the_minimum_is_that_of_a_search_without_slopes():
     assert found.four_bar.lengths[:3] == pytest.approx(np.exp(simplex.x) * ground, rel=1e-4)
 
 
-def test_free_zeros_come_nearer():
+def test_free_zeros_reduce_the_fit_error():
     crank, rocker, ground = WEAVING
     start = fit_equation(crank, rocker, ground)
     free = fit_angles(start, free_zeros=True)
@@ -421,7 +421,7 @@ def test_free_zeros_come_nearer():
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('number', range(12))
-def test_no_linkage_comes_nearer_than_the_nearest(number):
+def test_nearest_four_bar_has_the_least_error(number):
     """Noise on eight pairs: the linkage that they were taken of is one that must be beaten."""
     generator = np.random.default_rng([11, number])
     true = None
@@ -442,12 +442,12 @@ def test_no_linkage_comes_nearer_than_the_nearest(number):
     assert root_mean_square(found) <= root_mean_square(from_equation) * (1.0 + 1e-9)
 
 
-def test_the_same_each_time():
+def test_angle_fit_is_deterministic():
     start = fit_equation(*WEAVING)
     assert fit_angles(start) == fit_angles(start)
 
 
-def test_a_start_that_does_not_reach_is_led_to_where_it_does():
+def test_angle_fit_recovers_from_an_open_start():
     """A coupler too short for most positions: gaps are errors too, and slopes at an open loop."""
     true = sampled(FourBar.of_lengths(0.4, 1.2, 0.8, 1.0), np.linspace(0.0, 6.0, 7).tolist())
     assert true is not None
@@ -468,7 +468,7 @@ lengths = st.floats(-1.0, 1.0).map(lambda x: 10.0**x)
     st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
     st.floats(-pi, pi),
 )
-def test_errors_are_what_the_node_will_make(size, reversed_links, side, zeros, theta):
+def test_fit_errors_equal_the_closure_errors(size, reversed_links, side, zeros, theta):
     """The errors of a fit against the closure, also of reversed links and turned zeros."""
     a, b, c = size
     # Next to a parallelogram, kite or rhombus the closure changes sides as that one does.
@@ -491,7 +491,7 @@ def test_errors_are_what_the_node_will_make(size, reversed_links, side, zeros, t
         assert remainder(angle - rocker, tau) == pytest.approx(0.0, abs=1e-7)
 
 
-def test_three_pairs_leave_nothing_to_fit():
+def test_fit_with_too_few_pairs_is_refused():
     design = fit_equation(*WEAVING)
     with pytest.raises(SynthesisError, match=r'5 unknowns and 4 pairs'):
         fit_angles(design._replace(wanted=design.wanted[:4]), free_zeros=True)
@@ -499,7 +499,7 @@ def test_three_pairs_leave_nothing_to_fit():
         fit_angles(design._replace(wanted=design.wanted[:2]))
 
 
-def test_a_position_without_a_rocker_angle_is_named():
+def test_missing_rocker_angle_error_names_the_position():
     design = fit_equation(*WEAVING)
     wanted = (*design.wanted[:4], DesignRequest(1.0, place=1j))
     with pytest.raises(SynthesisError, match=r'^position 5: asks for no rocker angle'):

@@ -61,19 +61,19 @@ def every_candidate(problem, seed, count):
 
 @pytest.mark.parametrize('count', [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, CAST])
 @pytest.mark.parametrize('keep', [1, 100, 10 * CHUNK])
-def test_the_best_are_kept_in_the_order_of_score_then_chunk_then_index(count, keep):
+def test_search_keeps_the_best_in_score_order(count, keep):
     found = search(Steps(), seed=5, count=count, keep=keep)
     assert found == every_candidate(Steps(), 5, count)[:keep]
 
 
 @pytest.mark.parametrize('none', [np.inf, np.nan])
-def test_what_is_impossible_is_never_kept(none):
+def test_search_never_keeps_impossible_candidates(none):
     found = search(Steps(none=none), seed=5, count=CHUNK, keep=CHUNK)
     assert len(found) == len(every_candidate(Steps(), 5, CHUNK)) < CHUNK
     assert all(each.candidate[0] >= 0.0 for each in found)
 
 
-def test_where_nothing_is_possible_nothing_is_found():
+def test_search_without_possible_candidates_returns_nothing():
     class Nothing(Steps):
         def score(self, candidates):
             return np.full(len(candidates), np.inf)
@@ -81,18 +81,18 @@ def test_where_nothing_is_possible_nothing_is_found():
     assert search(Nothing(), seed=5, count=CAST, keep=10) == []
 
 
-def test_another_seed_is_another_study():
+def test_search_seed_changes_the_result():
     studies = [search(Steps(), seed=seed, count=1000, keep=3) for seed in (1, 2, 2**40)]
     assert studies[0] != studies[1] != studies[2] != studies[0]
 
 
-def test_progress_says_how_many_are_done_and_of_how_many():
+def test_search_progress_counts_done_and_total():
     told = []
     search(Steps(), seed=5, count=CAST, keep=1, progress=lambda *now: told.append(now))
     assert told == [(done, CAST) for done in (CHUNK, 2 * CHUNK, 3 * CHUNK, CAST)]
 
 
-def test_a_long_study_needs_no_more_memory_than_a_short_one():
+def test_search_memory_does_not_grow_with_its_length():
     assert _peak(40 * CHUNK) < 1.5 * _peak(4 * CHUNK)
 
 
@@ -104,7 +104,7 @@ def _peak(count):
     return peak
 
 
-def test_any_number_of_workers_finds_the_same():
+def test_search_result_does_not_depend_on_the_workers():
     distributed = pytest.importorskip('distributed')
     # Workers cannot import this module, whose name only pytest knows: the classes go along. A
     # local one keeps Dask from trying it by name.
@@ -142,7 +142,7 @@ def test_any_number_of_workers_finds_the_same():
     ('library', 'asked', 'extra'),
     [('scipy', scipy_optimize, 'design'), ('distributed', import_distributed, 'dask')],
 )
-def test_what_is_missing_is_told_with_what_installs_it(library, asked, extra, monkeypatch):
+def test_missing_library_error_names_the_install_command(library, asked, extra, monkeypatch):
     # None stands for a module that is not there.
     monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.delitem(sys.modules, 'scipy.optimize', raising=False)

@@ -73,11 +73,11 @@ def refusal(address):
     return str(caught.value)
 
 
-def test_every_part_is_worked_out_once(cluster):
+def test_workers_compute_every_part_once(cluster):
     assert squares(cluster.scheduler_address, 200) == {x: x * x for x in range(200)}
 
 
-def test_parts_are_asked_for_as_they_are_done(cluster):
+def test_workers_request_parts_only_as_needed(cluster):
     asked = []
 
     def parts(threads):
@@ -90,7 +90,7 @@ def test_parts_are_asked_for_as_they_are_done(cluster):
         assert len(asked) <= done + 2 * dask_workers._AHEAD
 
 
-def test_the_client_is_closed_where_nobody_asks_for_more(cluster):
+def test_closed_iterator_closes_the_dask_client(cluster):
     before = set(cluster.scheduler.clients)
     results = results_of(abs, numbers(100), cluster.scheduler_address)
     next(results)
@@ -99,12 +99,12 @@ def test_the_client_is_closed_where_nobody_asks_for_more(cluster):
     assert set(cluster.scheduler.clients) == before
 
 
-def test_an_error_of_the_work_comes_as_it_is(cluster):
+def test_worker_error_is_raised_unchanged(cluster):
     with pytest.raises(ZeroDivisionError):
         list(results_of(lambda x: 1 // x, numbers(3), cluster.scheduler_address))
 
 
-def test_a_worker_that_dies_is_replaced(cluster, tmp_path):
+def test_dead_worker_is_replaced(cluster, tmp_path):
     grave = str(tmp_path / 'grave')
 
     def dies_once(x):
@@ -118,26 +118,26 @@ def test_a_worker_that_dies_is_replaced(cluster, tmp_path):
     assert found == {x: -x for x in range(20)}
 
 
-def test_work_that_kills_every_worker_is_given_up(cluster):
+def test_work_that_kills_every_worker_is_abandoned(cluster):
     with pytest.raises(LinkageError, match='4 workers died one after another'):
         list(results_of(lambda x: os._exit(1), numbers(1), cluster.scheduler_address))
 
 
-def test_a_worker_of_another_version(cluster, monkeypatch):
+def test_worker_of_another_version_is_refused(cluster, monkeypatch):
     monkeypatch.setattr(linkage_ros, '__version__', '99.0')
     said = refusal(cluster.scheduler_address)
     assert 'this worker has linkage_ros' in said
     assert 'here is 99.0' in said
 
 
-def test_a_worker_without_this_package(tmp_path):
+def test_worker_without_the_package_is_refused(tmp_path):
     preload = tmp_path / 'without_us.py'
     preload.write_text(WITHOUT_US)
     with cluster_of(1, preload=[str(preload)]) as cluster:
         assert 'cannot import linkage_ros' in refusal(cluster.scheduler_address)
 
 
-def test_a_library_that_workers_lack(cluster):
+def test_missing_library_on_workers_is_named(cluster):
     def imports(x):
         import a_library_that_nobody_has  # type: ignore[import-not-found]  # noqa: F401
 
@@ -145,12 +145,12 @@ def test_a_library_that_workers_lack(cluster):
         list(results_of(imports, numbers(1), cluster.scheduler_address))
 
 
-def test_a_scheduler_without_workers(impatient):
+def test_scheduler_without_workers_is_refused(impatient):
     with cluster_of(0) as cluster:
         assert 'no workers; start `dask worker tcp://127' in refusal(cluster.scheduler_address)
 
 
-def test_workers_that_leave(impatient):
+def test_lost_workers_are_reported(impatient):
     with cluster_of(1) as cluster:
         results = results_of(abs, numbers(100), cluster.scheduler_address)
         next(results)
@@ -159,7 +159,7 @@ def test_workers_that_leave(impatient):
             list(results)
 
 
-def test_a_scheduler_that_leaves(impatient):
+def test_lost_scheduler_is_reported(impatient):
     with cluster_of(1) as cluster:
         results = results_of(abs, numbers(100), cluster.scheduler_address)
         next(results)
@@ -178,25 +178,25 @@ def test_a_scheduler_that_leaves(impatient):
         ('inproc://127.0.0.1/1/2', 'inproc'),
     ],
 )
-def test_what_is_no_address(address, reason, impatient):
+def test_invalid_scheduler_address_is_refused(address, reason, impatient):
     said = refusal(address)
     assert said.startswith(f'{address}: no Dask scheduler answers here (')
     assert reason in said
 
 
-def test_where_nobody_listens(impatient):
+def test_closed_scheduler_port_is_reported(impatient):
     with socket.socket() as closed:
         closed.bind(('127.0.0.1', 0))
         port = closed.getsockname()[1]
     assert 'Timed out trying to connect' in refusal(f'tcp://127.0.0.1:{port}')
 
 
-def test_who_listens_and_says_nothing(impatient):
+def test_silent_scheduler_is_reported(impatient):
     with socket.create_server(('127.0.0.1', 0)) as silent:
         said = refusal(f'tcp://127.0.0.1:{silent.getsockname()[1]}')
     assert 'no Dask scheduler answers here (it is silent)' in said
 
 
-def test_the_address_of_a_worker(cluster):
+def test_worker_address_is_refused_as_scheduler(cluster):
     worker = next(iter(cluster.scheduler.workers))
     assert refusal(worker).startswith(f'{worker}: is a Dask Worker')

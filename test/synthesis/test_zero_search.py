@@ -75,7 +75,7 @@ def near_a_limit(found: Assessment) -> bool:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('pairs', PAIRS)
-def test_scores_of_many_are_those_of_each_alone(pairs):
+def test_zero_search_scores_equal_single_assessments(pairs):
     needs = Needs('grashof', radians(40.0), 6.0)
     problem = ZeroProblem(*PAIRS[pairs], needs)
     candidates = problem.sample(np.random.default_rng(8), 300)
@@ -99,7 +99,7 @@ def test_scores_of_many_are_those_of_each_alone(pairs):
 
 
 @pytest.mark.parametrize('pairs', PAIRS)
-def test_what_is_found_meets_its_pairs_and_has_no_defect(pairs):
+def test_zero_search_designs_meet_pairs_without_defects(pairs):
     found = found_for(pairs=pairs)
     assert found
     for design in found:
@@ -114,7 +114,7 @@ def test_what_is_found_meets_its_pairs_and_has_no_defect(pairs):
         assert max(abs(met.angle) for met in result.met) < 1e-9
 
 
-def test_the_best_come_first_and_differ():
+def test_zero_search_designs_are_sorted_and_distinct():
     found = found_for(Needs('double-crank'))
     angles = [assess(design).transmission for design in found]
     assert len(found) == 4
@@ -127,7 +127,7 @@ def test_the_best_come_first_and_differ():
         assert hypot(*(remainder(p - q, pi) for p, q in zip(*zeros, strict=True))) > 0.09
 
 
-def test_no_place_of_a_grid_is_better():
+def test_zero_search_best_beats_a_grid():
     best = assess(found_for(keep=1)[0]).transmission
     for alpha in np.linspace(0.0, pi, 21):
         for beta in np.linspace(0.0, pi, 21):
@@ -137,19 +137,19 @@ def test_no_place_of_a_grid_is_better():
                 assert found.defects or found.transmission <= best
 
 
-def test_a_place_that_is_best_is_followed():
+def test_zero_search_converges_from_few_candidates():
     """A few candidates lead to where a hundred times as many do."""
     few, many = (assess(found_for(count=n, keep=1)[0]) for n in (1_000, 100_000))
     assert degrees(few.transmission) == pytest.approx(degrees(many.transmission), abs=0.05)
 
 
-def test_what_is_needed_is_found():
+def test_zero_search_designs_meet_the_needs():
     needs = Needs('double-crank', radians(40.0), 3.0)
     for design in found_for(needs):
         assert unmet_needs(assess(design), needs) == ()
 
 
-def test_where_nothing_has_what_is_needed_the_nearest_come():
+def test_zero_search_returns_the_nearest_designs():
     """No drag link of these pairs has a transmission angle of 60°."""
     needs = Needs('double-crank', radians(60.0))
     found = [assess(design) for design in found_for(needs)]
@@ -159,13 +159,13 @@ def test_where_nothing_has_what_is_needed_the_nearest_come():
     assert distances == sorted(distances)
 
 
-def test_one_seed_finds_the_same_and_another_comes_near():
+def test_zero_search_seed_determines_the_result():
     assert found_for(seed=3) == found_for(seed=3)
     one, other = (assess(found_for(seed=seed, keep=1)[0]).transmission for seed in (3, 4))
     assert one == pytest.approx(other, abs=1e-3)
 
 
-def test_the_progress_is_told():
+def test_zero_search_reports_its_progress():
     told: list[tuple[int, int]] = []
     search_zeros(
         CRANK, ROCKER, 1.0, Needs(), seed=1, count=40_000, keep=1,
@@ -175,14 +175,14 @@ def test_the_progress_is_told():
     assert len(told) == 3
 
 
-def test_a_problem_goes_to_a_worker():
+def test_pickled_zero_problem_scores_the_same():
     problem = ZeroProblem(CRANK, ROCKER, Needs('grashof'))
     sent = pickle.loads(pickle.dumps(problem))
     candidates = problem.sample(np.random.default_rng(1), 100)
     assert (sent.score(candidates) == problem.score(candidates)).all()
 
 
-def test_zeros_half_a_turn_apart_are_the_same_four_bar():
+def test_zeros_half_a_turn_apart_score_equally():
     problem = ZeroProblem(CRANK, ROCKER, Needs())
     candidates = problem.sample(np.random.default_rng(2), 500)
     for turn in ((pi, 0.0), (0.0, -pi), (pi, pi)):
@@ -190,19 +190,19 @@ def test_zeros_half_a_turn_apart_are_the_same_four_bar():
         assert turned == pytest.approx(problem.score(candidates), abs=1e-6)
 
 
-def test_equal_pairs_are_refused():
+def test_zero_search_refuses_equal_pairs():
     with pytest.raises(SynthesisError, match=r'^pairs 1 and 3: are the same, 25° → 30°'):
         search_zeros(
             (*CRANK[:2], CRANK[0]), (*ROCKER[:2], ROCKER[0]), 1.0, Needs(), seed=1, count=9, keep=1
         )
 
 
-def test_an_unknown_kind_is_refused():
+def test_zero_search_refuses_an_unknown_kind():
     with pytest.raises(SynthesisError, match='crank-rocker'):
         found_for(Needs('crank-roker'))
 
 
-def test_where_all_have_a_defect_it_is_said():
+def test_zero_search_without_sound_designs_is_refused():
     problem = ZeroProblem(CRANK, ROCKER, Needs())
     seed = next(
         seed

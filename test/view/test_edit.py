@@ -54,7 +54,7 @@ def changed_lines(before: str, after: str) -> list[str]:
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', sorted({*linkage_names()} - {'elliptic_trammel', 'scotch_yoke'}))
-def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -> None:
+def test_dragged_pin_moves_and_all_others_stay(name: str) -> None:
     text = text_of(name)
     closure = closure_of(text)
     start = tuple(given['value'] for given in build_model(text, name, whole=False)['inputs'])
@@ -77,7 +77,7 @@ def test_a_dragged_pin_is_at_its_new_place_and_all_others_at_theirs(name: str) -
     assert moved >= MOVES // 2
 
 
-def test_a_dragged_pin_changes_lengths_and_keeps_the_form_of_the_file() -> None:
+def test_dragged_pin_changes_lengths_and_keeps_comments() -> None:
     found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
     lines = changed_lines(FOUR_BAR, found.text)
     assert lines[:2] == [
@@ -89,7 +89,7 @@ def test_a_dragged_pin_changes_lengths_and_keeps_the_form_of_the_file() -> None:
     assert found.inputs == (0.7,)
 
 
-def test_a_crank_that_is_dragged_turns() -> None:
+def test_dragged_crank_pin_turns_the_crank() -> None:
     found = edit_text(
         FOUR_BAR, {'pin': 'A', 'to': [0.03, 0.03], 'inputs': [0.7 + 6.283185307179586]}
     )
@@ -97,20 +97,20 @@ def test_a_crank_that_is_dragged_turns() -> None:
     assert '  crank: {O2: [0, 0], A: [0.04242640687, 0]}' in found.text
 
 
-def test_a_pin_that_is_dragged_through_changes_the_assembly() -> None:
+def test_pin_dragged_across_its_toggle_changes_the_assembly() -> None:
     found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, -0.07], 'inputs': [0.7]})
     # The comment stays.
     assert 'assembly: {B: right}              # the side of A→O4 on which B lies' in found.text
 
 
-def test_a_pin_in_a_slot_stays_in_it() -> None:
+def test_dragged_pin_of_a_slider_stays_in_its_slot() -> None:
     text = text_of('slider_crank')
     found = edit_text(text, {'pin': 'B', 'to': [0.2, 0.3], 'inputs': [0.5]})
     pins = pins_of(closure_of(found.text), found.inputs)
     assert pins['B'] == pytest.approx(0.2 + 0.01j, abs=1e-9)
 
 
-def test_the_pin_of_a_cylinder_changes_its_stroke() -> None:
+def test_dragged_cylinder_pin_changes_the_stroke() -> None:
     text = text_of('excavator_bucket')
     found = edit_text(text, {'pin': 'C', 'to': [0.2, 0.4], 'inputs': [1.0]})
     # K is at (1.18, 0.3) in the ground.
@@ -118,7 +118,7 @@ def test_the_pin_of_a_cylinder_changes_its_stroke() -> None:
     assert pins_of(closure_of(found.text), found.inputs)['C'] == pytest.approx(0.2 + 0.4j)
 
 
-def test_snapped_places_are_on_the_grid() -> None:
+def test_snapped_pins_lie_on_the_grid() -> None:
     found = edit_text(
         FOUR_BAR, {'pin': 'O4', 'to': [0.1234, 0.0061], 'inputs': [0.7], 'snap': 0.005}
     )
@@ -148,20 +148,20 @@ EDITS: dict[str, tuple[dict[str, Any], list[str]]] = {
 
 
 @pytest.mark.parametrize('name', EDITS)
-def test_only_the_lines_that_an_edit_concerns_change(name: str) -> None:
+def test_edit_changes_only_its_own_lines(name: str) -> None:
     edit, lines = EDITS[name]
     found = edit_text(FOUR_BAR, edit)
     assert changed_lines(FOUR_BAR, found.text) == lines
     closure_of(found.text)
 
 
-def test_a_point_that_is_traced_no_more_goes() -> None:
+def test_untraced_point_is_removed_from_the_file() -> None:
     found = edit_text(FOUR_BAR, {'untrace': 'P'})
     assert 'P:' not in found.text
     assert 'traced' not in found.text
 
 
-def test_another_input_keeps_the_pose() -> None:
+def test_changed_input_keeps_the_pose() -> None:
     before = closure_of(FOUR_BAR)
     found = edit_text(FOUR_BAR, {'input': {'link': 'rocker'}, 'inputs': [0.7]})
     after = closure_of(found.text)
@@ -170,7 +170,7 @@ def test_another_input_keeps_the_pose() -> None:
     assert pins_of(after, found.inputs) == pytest.approx(pins_of(before, (0.7,)), abs=1e-12)
 
 
-def test_a_shorthand_stays_one_as_long_as_it_can_say_it() -> None:
+def test_four_bar_shorthand_is_kept_while_it_suffices() -> None:
     longer = edit_text(
         SHORT, {'length': {'link': 'coupler', 'from': 'A', 'to': 'B', 'value': 0.13}}
     )
@@ -180,7 +180,7 @@ def test_a_shorthand_stays_one_as_long_as_it_can_say_it() -> None:
     assert closure_of(found.text).linkage.traced == ('P',)
 
 
-def test_numbers_are_written_in_the_units_of_the_file() -> None:
+def test_edited_lengths_are_written_in_file_units() -> None:
     text = FOUR_BAR.partition('masses:')[0] + 'units: mm\n'
     text = text.replace('0.100', '100').replace('0.040', '40').replace('0.120', '120')
     text = text.replace('0.080', '80').replace('0.060, 0.030', '60, 30')
@@ -190,7 +190,7 @@ def test_numbers_are_written_in_the_units_of_the_file() -> None:
     assert changed_lines(text, found.text) == ['  rocker: {O4: [0, 0], B: [81.5, 0]}']
 
 
-def test_what_changes_nothing_leaves_the_text_to_the_last_letter() -> None:
+def test_edit_to_equal_values_leaves_the_text_unchanged() -> None:
     for name in linkage_names():
         link, points = next(iter(closure_of(text_of(name)).linkage.links.items()))
         point, at = next(iter(points.items()))
@@ -239,14 +239,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_a_wrong_edit_is_refused_in_one_line(name: str) -> None:
+def test_wrong_edit_is_refused_in_one_line(name: str) -> None:
     edit, message = REFUSED[name]
     with pytest.raises(LinkageError, match=message) as caught:
         edit_text(FOUR_BAR, edit)
     assert '\n' not in str(caught.value)
 
 
-def test_random_edits_are_done_or_refused_in_one_line() -> None:
+def test_random_edit_is_applied_or_refused_in_one_line() -> None:
     rng = random.Random(SEED)
     values: list[Any] = [
         None, True, 0, -1, 1e9, float('inf'), '', 'B', 'crank', [], [0.1, 0.05], {}, 'coupler',
@@ -263,7 +263,7 @@ def test_random_edits_are_done_or_refused_in_one_line() -> None:
     assert done > 5
 
 
-def test_an_error_is_told_at_the_pin_or_link_that_it_concerns() -> None:
+def test_error_names_its_pin_or_link() -> None:
     text = FOUR_BAR.replace('B: left', 'B: ahead')
     with pytest.raises(FileError) as caught:
         build_model(text, 'x')
@@ -274,7 +274,7 @@ def test_an_error_is_told_at_the_pin_or_link_that_it_concerns() -> None:
     assert pin_of(LinkageError('B', 'is wrong', 'mend it'), 'no: [linkage') is None
 
 
-def test_a_drag_and_the_way_back_close_as_before() -> None:
+def test_pin_dragged_back_restores_the_joint_angles() -> None:
     found = edit_text(FOUR_BAR, {'pin': 'B', 'to': [0.13, 0.07], 'inputs': [0.7]})
     first = pins_of(closure_of(FOUR_BAR), (0.7,))['B']
     back = edit_text(found.text, {'pin': 'B', 'to': [first.real, first.imag], 'inputs': [0.7]})

@@ -47,12 +47,12 @@ def exported(kind: str, name: str, inputs: list[float] | None = None) -> bytes:
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_yaml_is_the_text_itself(name: str) -> None:
+def test_yaml_export_equals_the_shipped_file(name: str) -> None:
     assert exported('yaml', name) == shipped_path(f'linkages/{name}.yaml').read_bytes()
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_svg_is_xml_and_shows_the_pose(name: str) -> None:
+def test_svg_export_is_xml_and_shows_the_pose(name: str) -> None:
     one, other = (
         exported('svg', name, [value] * len(lr.load(name).linkage.inputs)) for value in (1.0, 1.2)
     )
@@ -61,7 +61,7 @@ def test_svg_is_xml_and_shows_the_pose(name: str) -> None:
     assert one != other
 
 
-def test_gif_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gif_export_has_several_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exports, '_SECONDS', 0.5)
     picture = Image.open(BytesIO(exported('gif', 'four_bar')))
     assert picture.format == 'GIF'
@@ -70,7 +70,7 @@ def test_gif_moves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize('name', NAMES)
 @pytest.mark.parametrize('kind', ['c', 'h', 'js', 'py'])
-def test_source_is_that_of_linkage_compile(name: str, kind: str, tmp_path: Path) -> None:
+def test_source_export_equals_linkage_compile(name: str, kind: str, tmp_path: Path) -> None:
     answer = linkage(tmp_path, 'compile', name, '-o', f'{name}.{kind}')
     assert answer.returncode == 0
     assert exported(kind, name) == (tmp_path / f'{name}.{kind}').read_bytes()
@@ -80,13 +80,13 @@ def test_source_is_that_of_linkage_compile(name: str, kind: str, tmp_path: Path)
     ('kind', 'remedy'),
     [('exe', 'ask for one of yaml, '), ('gifs', "did you mean 'gif'?"), ('../x', '')],
 )
-def test_other_kinds_are_refused(kind: str, remedy: str) -> None:
+def test_unknown_export_kind_is_refused(kind: str, remedy: str) -> None:
     with pytest.raises(LinkageError) as refused:
         export_linkage(kind, lr.load('four_bar'), '', 'four_bar', None)
     assert str(refused.value).startswith(f"kind: '{kind}' cannot be written; {remedy}")
 
 
-def test_a_linkage_that_c_cannot_have_has_no_source_and_the_error_says_so() -> None:
+def test_source_export_of_two_iterated_inputs_is_refused() -> None:
     text = iterated_with_two_inputs()
     request = read_request(json.dumps({'id': 1, 'do': 'export', 'kind': 'c', 'text': text}))
     answer = json.loads(RequestHandler('class_3', None, pytest.fail).answer_request(1, request))

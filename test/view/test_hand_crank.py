@@ -25,7 +25,7 @@ def followed(crank: HandCrank, now: float) -> tuple[float, float]:
     return value, rate
 
 
-def test_the_rate_is_the_derivative_of_the_angle() -> None:
+def test_crank_rate_is_the_derivative_of_the_angle() -> None:
     crank = HandCrank([True])
     crank.set_target(0, 1.0, [0.2], 0.0)
     states = [followed(crank, STEP * k) for k in range(3000)]
@@ -33,7 +33,7 @@ def test_the_rate_is_the_derivative_of_the_angle() -> None:
         assert rate == pytest.approx((after - before) / (2 * STEP), abs=5e-4)
 
 
-def test_it_comes_to_rest_where_the_hand_is_and_does_not_pass_it() -> None:
+def test_hand_crank_reaches_its_target_without_overshoot() -> None:
     crank = HandCrank([True])
     crank.set_target(0, 1.0, [0.2], 0.0)
     values = [followed(crank, 0.01 * k)[0] for k in range(100)]
@@ -42,7 +42,7 @@ def test_it_comes_to_rest_where_the_hand_is_and_does_not_pass_it() -> None:
     assert followed(crank, 1.0) == (pytest.approx(1.0, abs=1e-12), pytest.approx(0.0, abs=1e-12))
 
 
-def test_steps_of_any_length_give_the_same_motion() -> None:
+def test_hand_crank_motion_is_independent_of_the_step() -> None:
     one, other = HandCrank([True]), HandCrank([True])
     for crank in (one, other):
         crank.set_target(0, 1.0, [0.0], 0.0)
@@ -51,7 +51,7 @@ def test_steps_of_any_length_give_the_same_motion() -> None:
     assert followed(other, 0.03) == pytest.approx(last, rel=1e-12)
 
 
-def test_an_angle_goes_on_across_whole_turns_and_a_bounded_one_does_not() -> None:
+def test_unbounded_crank_crosses_whole_turns() -> None:
     hand = [3.0 * k / 10 for k in range(60)]  # three turns, as angles within one
     for whole, end in ((True, hand[-1]), (False, hand[-1] % tau)):
         crank = HandCrank([whole])
@@ -62,13 +62,13 @@ def test_an_angle_goes_on_across_whole_turns_and_a_bounded_one_does_not() -> Non
         assert value == pytest.approx(end, abs=1e-9)
 
 
-def test_it_begins_where_the_crank_is_after_many_turns() -> None:
+def test_hand_crank_starts_from_its_many_turn_angle() -> None:
     crank = HandCrank([True])
     crank.set_target(0, pi / 2, [100 * tau], 0.0)
     assert followed(crank, 0.9)[0] == pytest.approx(100 * tau + pi / 2, abs=1e-9)
 
 
-def test_it_is_let_go_a_second_after_the_last_word() -> None:
+def test_hand_crank_is_released_after_its_timeout() -> None:
     crank = HandCrank([True, False])
     assert crank.advance_to(0.0) is None
     crank.set_target(1, 0.3, [1.0, 0.0], 5.0)

@@ -64,7 +64,7 @@ def live(script: Script) -> Callable[[Any], None]:
 
 
 @in_loop
-async def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
+async def test_live_page_receives_the_newest_of_each_kind() -> None:
     script = Script()
     for index in range(50):
         script.say('state', index)
@@ -80,7 +80,7 @@ async def test_a_page_gets_the_newest_of_each_kind_model_first() -> None:
 
 
 @in_loop
-async def test_a_request_is_answered_while_another_waits_and_others_are_counted() -> None:
+async def test_request_is_answered_while_another_waits() -> None:
     script = Script()
     bad = ['', '{', '[]', '{"do": 1}', '"do"', '[' * 5000, '{"d\ud800": 1}']
     with served([live(script)]) as server:
@@ -97,7 +97,7 @@ async def test_a_request_is_answered_while_another_waits_and_others_are_counted(
     assert [content['do'] for content in script.asked] == ['wait', 'reset']
 
 
-def test_a_page_that_never_reads_is_sent_no_more_than_fits_and_holds_nobody_up() -> None:
+def test_page_that_never_reads_gets_bounded_data() -> None:
     script = Script()
 
     async def reading(address: str) -> None:

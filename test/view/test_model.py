@@ -67,7 +67,7 @@ def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]
 @pytest.mark.sample(5)
 @needs_node
 @pytest.mark.parametrize('name', sorted(linkage_names()))
-def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: Path) -> None:
+def test_compiled_model_moves_every_link_as_the_closure(name: str, tmp_path: Path) -> None:
     found = build_model(text_of(name), name)
     closure = load(name)
     states = states_of(closure, found)
@@ -97,7 +97,7 @@ def test_the_program_moves_every_link_as_the_closure_does(name: str, tmp_path: P
 
 
 @needs_node
-def test_rates_of_frames_are_those_of_the_frames(tmp_path: Path) -> None:
+def test_frame_rates_equal_differences_of_frames(tmp_path: Path) -> None:
     found = build_model(text_of('jansen_leg'), 'jansen_leg')
     step = 1e-6
     states = [[[0.7 + shift], [1.0], [0.0]] for shift in (-step, 0.0, step)]
@@ -110,7 +110,7 @@ def test_rates_of_frames_are_those_of_the_frames(tmp_path: Path) -> None:
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', linkage_names())
-def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
+def test_model_names_joints_pins_and_lengths_of_the_file(name: str) -> None:
     found = build_model(text_of(name), name)
     json.dumps(found, allow_nan=False)
     closure = load(name)
@@ -133,21 +133,21 @@ def test_the_model_is_json_and_names_what_the_file_names(name: str) -> None:
     assert all(isfinite(angle) for angle in known)
 
 
-def test_the_other_assemblies_are_those_of_the_other_sides() -> None:
+def test_model_lists_the_other_assemblies() -> None:
     found = build_model(text_of('four_bar'), 'four_bar')
     assert found['choices'] == {'B': {'now': 'left', 'sides': ['left', 'right']}}
     assert [other['text'] for other in found['others']] == ['assembly: {B: right}']
     assert len(build_model(text_of('jansen_leg'), 'jansen_leg')['others']) == 7
 
 
-def test_what_takes_longer_is_left_out_during_a_drag() -> None:
+def test_quick_model_omits_ranges_and_quality() -> None:
     found = build_model(text_of('four_bar'), 'four_bar', whole=False)
     assert {'others', 'ranges', 'quality', 'warnings'}.isdisjoint(found)
 
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', linkage_names())
-def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> None:
+def test_quick_model_equals_the_whole_model_otherwise(name: str) -> None:
     found = build_model(text_of(name), name)
     start = tuple(given['value'] for given in found['inputs'])
     shown = ViewState(start, found['drawn']['size'])
@@ -162,19 +162,19 @@ def test_during_a_drag_it_is_the_same_but_for_where_the_links_go(name: str) -> N
         assert one['points'] == pytest.approx(other['points'], abs=1e-3 * wanted['size'])
 
 
-def test_a_drag_to_where_nothing_closes_is_refused_as_the_file_would_be() -> None:
+def test_drag_to_an_open_linkage_is_refused() -> None:
     text = text_of('four_bar').replace('B: [0.120, 0]', 'B: [1.2, 0]')
     with pytest.raises(FileError, match='the loops close at no value of the input'):
         build_model(text, 'x', whole=False, shown=ViewState((0.7,), 0.005))
 
 
-def test_a_closure_without_a_file_has_the_same_model() -> None:
+def test_model_of_a_closure_equals_that_of_its_file() -> None:
     found = build_model(text_of('four_bar'), 'four_bar')
     bare = model_of(load('four_bar'))
     assert bare == {**found, 'text': '', 'others': []}
 
 
-def test_units_of_the_file_are_told() -> None:
+def test_model_names_the_unit_of_the_file() -> None:
     text = 'units: mm\nfour_bar: {a: 40, b: 120, c: 80, d: 100}\n'
     found = build_model(text, 'mine')
     assert found['unit'] == {'length': 'mm', 'factor': 0.001}
@@ -183,7 +183,7 @@ def test_units_of_the_file_are_told() -> None:
     )
 
 
-def test_a_poor_transmission_angle_is_warned_of() -> None:
+def test_model_warns_of_a_poor_transmission_angle() -> None:
     # From the law of cosines at the crank angle 0: cos µ = (b² + c² - (d - a)²) / 2bc.
     assert build_model(text_of('four_bar'), 'x')['warnings'] == [
         'transmission angle down to 26.38°'
@@ -191,6 +191,6 @@ def test_a_poor_transmission_angle_is_warned_of() -> None:
     assert 'change point at 2 inputs' in build_model(text_of('parallelogram'), 'x')['warnings']
 
 
-def test_a_text_that_is_no_linkage_is_refused() -> None:
+def test_model_refuses_a_text_that_is_no_linkage() -> None:
     with pytest.raises(FileError, match=r'^mine:1: '):
         build_model('links: 3\n', 'mine')

@@ -116,7 +116,7 @@ def agrees(page: Any) -> None:
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', linkage_names())
-def test_every_shipped_linkage_opens_and_stands_where_the_closure_says(
+def test_page_shows_every_shipped_linkage_at_its_pose(
     browser: Any, stills: Callable[[str], Path], name: str
 ) -> None:
     with opened(browser, stills(name)) as shown:
@@ -139,9 +139,7 @@ def test_the_page_fits_its_window(
         assert not shown.is_wider_than_its_window()
 
 
-def test_the_keyboard_alone_turns_the_crank_and_plays(
-    browser: Any, stills: Callable[[str], Path]
-) -> None:
+def test_keyboard_turns_the_crank_and_plays(browser: Any, stills: Callable[[str], Path]) -> None:
     with opened(browser, stills('four_bar')) as shown:
         page = shown.page
         page.focus('#drawing')
@@ -156,7 +154,7 @@ def test_the_keyboard_alone_turns_the_crank_and_plays(
         page.keyboard.press(' ')
 
 
-def test_a_finger_turns_the_crank(browser: Any, stills: Callable[[str], Path]) -> None:
+def test_touch_turns_the_crank(browser: Any, stills: Callable[[str], Path]) -> None:
     context = browser.new_context(has_touch=True, viewport={'width': 400, 'height': 900})
     page = context.new_page()
     page.goto(stills('four_bar').as_uri())
@@ -178,7 +176,7 @@ def test_a_finger_turns_the_crank(browser: Any, stills: Callable[[str], Path]) -
     context.close()
 
 
-def test_curves_have_no_leaps_and_end_before_what_a_toggle_makes_unbounded(
+def test_curves_are_continuous_and_end_before_a_toggle(
     browser: Any, stills: Callable[[str], Path]
 ) -> None:
     with opened(browser, stills('five_bar')) as shown:
@@ -219,9 +217,7 @@ CURVES = """key => document.querySelector(`[data-key=${key}] .plot`).data.map(
   ({ x, y, line }) => ({ x, y, line }))"""
 
 
-def test_rates_are_those_at_the_rate_that_was_typed(
-    browser: Any, stills: Callable[[str], Path]
-) -> None:
+def test_rate_field_sets_the_plotted_rates(browser: Any, stills: Callable[[str], Path]) -> None:
     with opened(browser, stills('four_bar')) as shown:
         page = shown.page
         page.select_option('#angles', 'radians')
@@ -247,9 +243,7 @@ def test_rates_are_those_at_the_rate_that_was_typed(
         assert max(differences()) < 1e-9
 
 
-def test_lengths_are_in_the_unit_of_the_file_and_traced_points_have_coordinates(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_page_prints_lengths_in_the_unit_of_the_file(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / 'mm.html'
     file.write_text(page_of(build_model(SLIDER_CRANK_IN_MM, 'mm'), mode='still'), 'utf-8')
     closure = closure_of(SLIDER_CRANK_IN_MM)
@@ -266,7 +260,7 @@ def test_lengths_are_in_the_unit_of_the_file_and_traced_points_have_coordinates(
         assert complex(float(x), float(y)) == pytest.approx(place, abs=0.02)
 
 
-def test_the_page_of_a_four_bar_shows_all_points_both_assemblies_and_instant_centres(
+def test_four_bar_page_shows_curves_assemblies_and_instant_centres(
     browser: Any, stills: Callable[[str], Path]
 ) -> None:
     with opened(browser, stills('four_bar')) as shown:
@@ -297,7 +291,7 @@ def test_the_page_of_a_four_bar_shows_all_points_both_assemblies_and_instant_cen
 # With a server.
 
 
-def test_a_pin_is_dragged_and_all_is_undone_to_the_last_bit(browser: Any, tmp_path: Path) -> None:
+def test_dragged_pin_is_undone_to_the_last_bit(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, _):
         first = state(page)
         drag(page, 'B', 40, -30)
@@ -319,9 +313,7 @@ def test_a_pin_is_dragged_and_all_is_undone_to_the_last_bit(browser: Any, tmp_pa
         assert state(page)['joints'] == one['joints']
 
 
-def test_a_length_that_cannot_close_is_said_at_its_pin_and_the_page_goes_on(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_open_length_is_reported_at_its_pin(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, _):
         before = state(page)
         field = page.get_by_label('length coupler A–B')
@@ -347,9 +339,7 @@ def test_a_length_that_cannot_close_is_said_at_its_pin_and_the_page_goes_on(
         assert field.input_value() == '0.13'
 
 
-def test_what_is_saved_is_the_text_of_the_page_and_is_loaded_again(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_saved_file_is_the_edited_text(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, file, server):
         other = browser.new_page()
         other.goto(server.address)
@@ -370,7 +360,7 @@ def test_what_is_saved_is_the_text_of_the_page_and_is_loaded_again(
         agrees(page)
 
 
-def test_points_inputs_and_sides_are_chosen_by_clicking(browser: Any, tmp_path: Path) -> None:
+def test_clicks_choose_points_inputs_and_sides(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, _):
         page.select_option('#choices select', 'right')
         page.wait_for_function("() => View.state().text.includes('{B: right}')")
@@ -415,7 +405,7 @@ def middle(page: Any, one: str, other: str, share: float = 0.5) -> tuple[float, 
     return x + share * (u - x), y + share * (v - y)
 
 
-def test_the_keyboard_alone_moves_a_pin(browser: Any, tmp_path: Path) -> None:
+def test_keyboard_moves_a_pin(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, _, _):
         page.focus('#drawing')
         while page.evaluate('() => View.board.chosen') != 'B':
@@ -431,9 +421,7 @@ def test_the_keyboard_alone_moves_a_pin(browser: Any, tmp_path: Path) -> None:
             page.wait_for_function('text => View.state().text === text', arg=text)
 
 
-def test_a_shipped_linkage_is_opened_and_downloaded_and_not_saved_over_the_file(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_opened_shipped_linkage_is_not_saved_over_the_file(browser: Any, tmp_path: Path) -> None:
     with edited(browser, tmp_path) as (page, file, _):
         page.wait_for_function("() => document.getElementById('open').options.length > 5")
         page.select_option('#open', 'slider_crank')
@@ -450,9 +438,7 @@ def test_a_shipped_linkage_is_opened_and_downloaded_and_not_saved_over_the_file(
         assert file.read_text('utf-8') == FOUR_BAR
 
 
-def test_a_lost_connection_is_said_and_comes_back_while_the_linkage_moves(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_lost_connection_is_shown_until_it_returns(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR, 'utf-8')
     sockets: list[Any] = []
@@ -492,7 +478,7 @@ def test_a_lost_connection_is_said_and_comes_back_while_the_linkage_moves(
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
-def test_a_notebook_shows_the_page_of_a_closure(browser: Any, tmp_path: Path, name: str) -> None:
+def test_notebook_shows_the_page_of_a_closure(browser: Any, tmp_path: Path, name: str) -> None:
     closure = lr.load(name)
     notebook = tmp_path / 'notebook.html'
     notebook.write_text(
@@ -512,7 +498,7 @@ def test_a_notebook_shows_the_page_of_a_closure(browser: Any, tmp_path: Path, na
         assert cell.locator('h1').inner_text() == name
 
 
-def test_a_linkage_without_a_name_has_a_page() -> None:
+def test_unnamed_linkage_has_a_page() -> None:
     page = lr.Closure(lr.load('four_bar').linkage).view()
     assert '<h1 id="title">linkage</h1>' in page.text
     assert '<title>linkage' in page.text

@@ -51,14 +51,14 @@ def error(do: str, **content: Any) -> str:
 
 
 @pytest.mark.parametrize(('message', 'line'), BAD_MESSAGES.items())
-def test_what_is_no_request_is_refused(message: str, line: str) -> None:
+def test_malformed_request_is_refused(message: str, line: str) -> None:
     with pytest.raises(RequestError) as refused:
         read_request(message)
     assert str(refused.value).startswith(f'message: {line}')
     assert len(str(refused.value)) < 300
 
 
-def test_the_number_of_a_request_that_is_unknown_is_answered() -> None:
+def test_error_of_an_unknown_request_has_its_number() -> None:
     with pytest.raises(RequestError) as refused:
         read_request('{"id": 12, "do": "dance"}')
     assert refused.value.number == 12
@@ -67,13 +67,13 @@ def test_the_number_of_a_request_that_is_unknown_is_answered() -> None:
 # Answers.
 
 
-def test_the_model_of_a_text_has_this_text_and_its_name() -> None:
+def test_model_request_returns_text_and_name() -> None:
     found = ok('model', text=FOUR_BAR, whole=True)
     assert (found['name'], found['text']) == ('mine', FOUR_BAR)
     assert ok('model', text=FOUR_BAR, name='other')['name'] == 'other'
 
 
-def test_a_shipped_linkage_is_opened_by_its_name() -> None:
+def test_open_request_returns_a_shipped_linkage() -> None:
     names = ok('names')['linkages']
     assert names == lr.linkage_names()
     found = ok('open', name='jansen_leg')
@@ -82,7 +82,7 @@ def test_a_shipped_linkage_is_opened_by_its_name() -> None:
 
 
 @pytest.mark.parametrize('name', ['jansen_legs', '../scenes/demo', '/etc/passwd', '', None, 3, []])
-def test_nothing_but_a_shipped_linkage_is_opened(name: Any) -> None:
+def test_open_request_refuses_other_names(name: Any) -> None:
     assert 'is not a shipped linkage; ' in error('open', name=name)
 
 
@@ -95,7 +95,7 @@ def frames_of(closure: Closure, position: Position) -> list[tuple[float, float, 
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'class_3', 'elliptic_trammel', 'five_bar'])
-def test_poses_are_those_of_the_closure(name: str) -> None:
+def test_poses_request_equals_the_closure(name: str) -> None:
     text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
     closure: Closure = lr.load(name)
     pose = closure.linkage.pose
@@ -128,7 +128,7 @@ def test_poses_are_those_of_the_closure(name: str) -> None:
     'inputs',
     [None, 1, [1.0], [['1']], [[None]], [[True]], [[1.0, 2.0]], [[]], [[1e300]], [[0.0]] * 1001],
 )
-def test_poses_at_what_are_no_inputs_are_refused(inputs: Any) -> None:
+def test_poses_request_refuses_malformed_inputs(inputs: Any) -> None:
     assert error('poses', text=FOUR_BAR, inputs=inputs).startswith('inputs: ')
 
 
@@ -148,7 +148,7 @@ def test_poses_at_what_are_no_inputs_are_refused(inputs: Any) -> None:
         ({'text': '[' * 1000}, ''),
     ],
 )
-def test_an_error_names_its_key(content: dict[str, Any], where: str) -> None:
+def test_request_error_names_its_key(content: dict[str, Any], where: str) -> None:
     found = asked('model', **content)['error']
     assert found['where'] == where
     assert '\n' not in found['text']
@@ -166,7 +166,7 @@ def test_an_error_names_its_key(content: dict[str, Any], where: str) -> None:
         ({'length': 7}, None),
     ],
 )
-def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | None) -> None:
+def test_edit_error_names_its_pin(edit: dict[str, Any], pin: str | None) -> None:
     assert asked('edit', text=FOUR_BAR, edit=edit)['error']['pin'] == pin
 
 
@@ -174,9 +174,7 @@ def test_the_error_of_an_edit_names_its_pin(edit: dict[str, Any], pin: str | Non
     ('name', 'old', 'new'),
     [('four_bar', '0.080', '0.800'), ('five_bar', '0.120', '9.120')],
 )
-def test_an_edit_of_what_closes_nowhere_is_an_error_and_no_defect(
-    name: str, old: str, new: str
-) -> None:
+def test_edit_of_an_open_linkage_returns_an_error(name: str, old: str, new: str) -> None:
     text = shipped_path(f'linkages/{name}.yaml').read_text('utf-8')
     far = text.replace(old, new)
     assert far != text
@@ -185,20 +183,20 @@ def test_an_edit_of_what_closes_nowhere_is_an_error_and_no_defect(
         assert 'error' in asked('edit', text=far, edit=edit)
 
 
-def test_only_the_file_with_which_the_page_was_opened_is_saved() -> None:
+def test_save_request_writes_only_the_opened_file() -> None:
     assert ok('save', text=FOUR_BAR) == {}
     line = error('save', text=FOUR_BAR, name='jansen_leg')
     assert line.startswith("save: 'jansen_leg' is not the file with which this page was opened; ")
     assert error('save', text='links: 1').startswith('mine:1: links: 1 is not a mapping')
 
 
-def test_a_linkage_has_no_sensors() -> None:
+def test_sensor_request_for_a_linkage_is_refused() -> None:
     assert error('read', t=0, inputs=[0], rates=[0]) == (
         'read: a linkage has no sensors; open a scene'
     )
 
 
-def test_a_defect_is_one_line_on_the_page_and_one_in_the_report(
+def test_internal_error_is_one_line_on_page_and_report(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fails(*_: Any, **__: Any) -> None:

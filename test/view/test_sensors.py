@@ -49,31 +49,31 @@ def true(closure: Closure, angle: float) -> list[float]:
     return [angle, *closure.position(angle).joints]
 
 
-def test_without_effects_they_read_the_joints(closure: Closure) -> None:
+def test_sensors_without_effects_read_the_joints(closure: Closure) -> None:
     # The last tick of a scene at 60 Hz is that of the frame.
     read = turned(sensors('{}', '60'), 30)
     assert list(read) == ['crank_joint', 'coupler_joint', 'rocker_joint']
     assert list(read.values()) == pytest.approx(true(closure, RATE * 0.5), abs=1e-9)
 
 
-def test_a_scene_without_a_rate_is_ticked_for_each_frame(closure: Closure) -> None:
+def test_scene_at_rate_0_ticks_once_per_frame(closure: Closure) -> None:
     read = turned(sensors('{}', '0'), 31)
     assert list(read.values()) == pytest.approx(true(closure, RATE * 31 / 60), abs=1e-9)
 
 
-def test_an_encoder_reads_whole_steps(closure: Closure) -> None:
+def test_encoder_sensor_reads_whole_steps(closure: Closure) -> None:
     step = tau / 64
     read = turned(sensors('{encoder: {joints: {rocker_joint: {counts: 64}}}}'), 30)
     assert abs(remainder(read['rocker_joint'], step)) < 1e-12
     assert abs(read['rocker_joint'] - true(closure, RATE * 0.5)[2]) <= step
 
 
-def test_a_delay_reads_what_was(closure: Closure) -> None:
+def test_delay_sensor_reads_an_earlier_angle(closure: Closure) -> None:
     read = turned(sensors('{delay: {seconds: 0.1}}'), 30)
     assert list(read.values()) == pytest.approx(true(closure, RATE * 0.4), abs=1e-6)
 
 
-def test_frames_are_where_the_readings_put_the_links(closure: Closure) -> None:
+def test_sensor_frames_follow_the_readings(closure: Closure) -> None:
     found = sensors('{}', '60').read(0.0, [1.0], [0.0])['frames']
     frames = frames_of_links(closure, closure.position(1.0))
     expected = [
@@ -85,7 +85,7 @@ def test_frames_are_where_the_readings_put_the_links(closure: Closure) -> None:
     assert found == pytest.approx(expected, abs=1e-9)
 
 
-def test_where_the_loops_do_not_close_nothing_is_read() -> None:
+def test_sensors_of_an_open_linkage_read_nothing() -> None:
     text = shipped_path('linkages/double_rocker.yaml').read_text('utf-8')
     low = lr.load('double_rocker').closing_ranges[0].lowest
     of = Sensors(
@@ -95,7 +95,7 @@ def test_where_the_loops_do_not_close_nothing_is_read() -> None:
     assert of.read(1 / 60, [low + 0.2], [0.0])['read']
 
 
-def test_a_step_back_in_time_or_a_long_pause_begins_again() -> None:
+def test_time_jump_or_long_pause_restarts_the_sensors() -> None:
     of = sensors('{delay: {seconds: 0.1}}')
     assert turned(of, 30)
     for t in (0.0, 10.0):
@@ -103,7 +103,7 @@ def test_a_step_back_in_time_or_a_long_pause_begins_again() -> None:
         assert of.read(t, [1.0], [0.0])['read'] == {}
 
 
-def test_the_linkage_as_the_page_has_edited_it_is_read() -> None:
+def test_sensors_read_the_edited_linkage() -> None:
     text = shipped_path('linkages/four_bar.yaml').read_text('utf-8')
     longer = text.replace('0.120', '0.125')
     assert longer != text
@@ -111,7 +111,7 @@ def test_the_linkage_as_the_page_has_edited_it_is_read() -> None:
 
 
 @pytest.mark.parametrize('name', scene_names())
-def test_every_shipped_scene_in_the_plane_is_read(name: str) -> None:
+def test_sensors_read_every_shipped_planar_scene(name: str) -> None:
     scene = load_scene(name)
     if isinstance(scene.linkages[0].closure, SpaceClosure):
         pytest.skip('the page shows planar linkages')
@@ -126,7 +126,7 @@ def test_every_shipped_scene_in_the_plane_is_read(name: str) -> None:
     assert tuple(read) == scene.linkages[0].joint_names
 
 
-def test_a_torque_drive_gives_its_crank_to_the_page(tmp_path: Path) -> None:
+def test_torque_drive_takes_its_crank_from_the_page(tmp_path: Path) -> None:
     """Loads and friction that act on the drive alone are left out with it."""
     scene = (
         'linkage: x\nrate: 1000\ndrive: {torque: {}}\neffects: {velocity: {}}\n'

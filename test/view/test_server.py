@@ -111,7 +111,7 @@ UPGRADE = (
 )
 
 
-def test_the_page_is_answered_at_its_address_by_either_name_of_this_machine(
+def test_page_is_served_by_ip_address_and_localhost(
     server: Served,
 ) -> None:
     for name in ('127.0.0.1', 'localhost'):
@@ -121,7 +121,7 @@ def test_the_page_is_answered_at_its_address_by_either_name_of_this_machine(
     assert not server.server.refused
 
 
-def test_a_page_may_load_and_reach_nothing_but_its_own_server(server: Served) -> None:
+def test_page_headers_allow_only_its_own_server(server: Served) -> None:
     _, answer = asked(server, f'GET /{server.token}/', HOST.format(p=server.port))
     head = answer.split('\r\n\r\n')[0]
     assert f'connect-src ws://127.0.0.1:{server.port} ws://localhost:{server.port};' in head
@@ -166,7 +166,7 @@ def refused() -> Iterator[tuple[str, Sequence[str], int, str | None]]:
 
 
 @pytest.mark.parametrize(('request_line', 'headers', 'status', 'what'), [*refused()])
-def test_what_does_not_come_from_the_page_is_refused_and_counted(
+def test_foreign_request_is_refused_and_counted(
     server: Served, request_line: str, headers: Sequence[str], status: int, what: str | None
 ) -> None:
     line, *lines = (
@@ -181,7 +181,7 @@ def test_what_does_not_come_from_the_page_is_refused_and_counted(
     assert what is None or server.server.refused == {what: 1}
 
 
-def test_what_is_refused_is_counted_each_time_and_said_once() -> None:
+def test_repeated_refusals_are_counted_and_logged_once() -> None:
     with served([]) as server:
         for _ in range(5):
             asked(server, 'GET /', HOST.format(p=server.port))
@@ -189,7 +189,7 @@ def test_what_is_refused_is_counted_each_time_and_said_once() -> None:
         assert server.lines == ['refused a request without the token']
 
 
-def test_it_listens_on_this_machine_only(server: Served) -> None:
+def test_server_listens_on_this_machine_only(server: Served) -> None:
     """Read what the kernel says: addresses in hexadecimal, and 0A for a listening socket."""
     listening = []
     for table in ('tcp', 'tcp6'):
@@ -226,7 +226,7 @@ def save(text: str, **more: Any) -> dict[str, Any]:
 EDIT = {'do': 'edit', 'text': FOUR_BAR, 'edit': LONGER}
 
 
-def test_a_page_gets_models_of_texts_that_it_edits(server: Served) -> None:
+def test_server_returns_models_of_edited_texts(server: Served) -> None:
     first, second = talk(server.address, {'do': 'model', 'text': FOUR_BAR}, EDIT)
     assert ok(first)['text'] == FOUR_BAR
     assert ok(second)['text'] == FOUR_BAR.replace('0.040', '0.041')
@@ -243,7 +243,7 @@ def bad_messages(count: int) -> Iterator[str | bytes]:
 
 
 @in_loop
-async def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server: Served) -> None:
+async def test_bad_messages_are_counted_and_the_server_continues(server: Served) -> None:
     count = sample_count(10_000, 1000)
     async with opened(server.address) as page:
         for message in bad_messages(count):
@@ -263,7 +263,7 @@ async def test_bad_messages_are_counted_and_the_next_good_one_is_answered(server
     [b'\x81\x81\x00\x00\x00\x00\xff', b'\xff' * 20, b'\xc1\x00', b'\x81\x7f' + b'\xff' * 8],
 )
 @in_loop
-async def test_bytes_that_are_no_messages_end_their_page_alone(
+async def test_malformed_websocket_frame_closes_only_its_page(
     server: Served, frame: bytes
 ) -> None:
     async with opened(server.address) as broken, opened(server.address) as page:
@@ -275,7 +275,7 @@ async def test_bytes_that_are_no_messages_end_their_page_alone(
 
 
 @in_loop
-async def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None:
+async def test_page_that_never_reads_blocks_no_other(server: Served) -> None:
     # An answer of a megabyte, of which more are asked for than all buffers hold.
     large = {'text': f'{FOUR_BAR}# {"x" * 700_000}\n', 'kind': 'yaml'}
     async with opened(server.address) as deaf, opened(server.address) as page:
@@ -290,7 +290,7 @@ async def test_a_page_that_never_reads_holds_up_no_other(server: Served) -> None
 
 
 @in_loop
-async def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None:
+async def test_newest_of_waiting_edits_is_answered(server: Served) -> None:
     count = 40
     async with opened(server.address) as page:
         numbers = [await page.send('edit', text=FOUR_BAR, edit=LONGER) for _ in range(count)]
@@ -304,7 +304,7 @@ async def test_of_edits_that_wait_the_newest_is_answered(server: Served) -> None
 
 
 @in_loop
-async def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_closes(
+async def test_fifth_page_is_refused_until_another_closes(
     server: Served,
 ) -> None:
     pages = [opened(server.address) for _ in range(MOST_PAGES)]
@@ -321,7 +321,7 @@ async def test_a_page_beyond_the_last_is_refused_with_a_word_until_another_close
 
 
 @in_loop
-async def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_work(
+async def test_page_closed_during_an_edit_leaves_the_server_running(
     server: Served,
 ) -> None:
     for _ in range(5):
@@ -340,9 +340,7 @@ async def test_a_page_that_closes_in_the_middle_of_an_edit_leaves_the_server_at_
     ],
 )
 @in_loop
-async def test_a_process_that_takes_too_long_or_dies_is_said_and_replaced(
-    longest: float, line: str
-) -> None:
+async def test_dead_or_slow_worker_process_is_replaced(longest: float, line: str) -> None:
     names = 1, 'names', '{"id": 1, "do": "names"}'
     worker = Worker('mine', None, longest)
     if longest > 1.0:
@@ -358,7 +356,7 @@ async def test_a_process_that_takes_too_long_or_dies_is_said_and_replaced(
 # Saving.
 
 
-def test_an_edit_is_saved_and_undone_to_the_same_bytes(server: Served, file: Path) -> None:
+def test_saved_edit_keeps_the_bytes_of_the_text(server: Served, file: Path) -> None:
     longer = FOUR_BAR.replace('0.040', '0.041')
     found = talk(server.address, save(longer))
     assert ok(found[0]) == {'file': 'mine.yaml'}
@@ -371,7 +369,7 @@ def test_an_edit_is_saved_and_undone_to_the_same_bytes(server: Served, file: Pat
 
 
 @in_loop
-async def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
+async def test_file_changed_by_another_program_is_not_overwritten(
     server: Served, file: Path
 ) -> None:
     async with opened(server.address) as page:
@@ -386,9 +384,7 @@ async def test_a_file_that_was_changed_by_another_program_is_not_overwritten(
 
 
 @in_loop
-async def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
-    server: Served, file: Path
-) -> None:
+async def test_second_page_does_not_overwrite_a_saved_file(server: Served, file: Path) -> None:
     async with opened(server.address) as one, opened(server.address) as other:
         ok(await other.ask('names'))
         ok(await one.ask('save', text=f'{FOUR_BAR}# one\n'))
@@ -397,14 +393,14 @@ async def test_of_two_pages_the_second_does_not_overwrite_what_the_first_saved(
     assert file.read_text() == f'{FOUR_BAR}# one again\n'
 
 
-def test_a_text_that_is_no_linkage_is_not_saved(server: Served, file: Path) -> None:
+def test_text_that_is_no_linkage_is_not_saved(server: Served, file: Path) -> None:
     texts = ('', 'links: 1', FOUR_BAR.replace('0.100', '1.100'), '\ud800')
     bad = [*map(save, texts), save(FOUR_BAR, name='jansen_leg')]
     assert all('error' in answer for answer in talk(server.address, *bad))
     assert file.read_text() == FOUR_BAR
 
 
-def test_a_shipped_linkage_is_not_saved_and_the_error_says_what_to_do() -> None:
+def test_save_without_an_own_file_suggests_the_download() -> None:
     with served([Conversation('four_bar', None, None).add_routes]) as found:
         (answer,) = talk(found.address, save(FOUR_BAR))
     assert answer['error']['text'] == 'save: no file of yours is open; download the linkage'
@@ -446,7 +442,7 @@ def started(
 
 
 @in_loop
-async def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: Path) -> None:
+async def test_ctrl_c_notifies_open_pages_and_ends_the_server(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
     with started(tmp_path, 'mine.yaml', end=0) as (process, address, said):
         async with opened(address) as page, opened(address) as other:
@@ -459,7 +455,7 @@ async def test_ctrl_c_tells_the_open_pages_and_ends_the_command_well(tmp_path: P
 
 
 @in_loop
-async def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> None:
+async def test_scene_page_receives_sensor_readings(tmp_path: Path) -> None:
     """The scene has an effect of the user's own, from the folder of the command."""
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(
@@ -478,7 +474,7 @@ async def test_of_a_scene_a_page_gets_what_its_sensors_read(tmp_path: Path) -> N
     assert said[1] == ''
 
 
-def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path) -> None:
+def test_reloaded_page_shows_the_current_file(tmp_path: Path) -> None:
     file = tmp_path / 'mine.yaml'
     file.write_text(FOUR_BAR)
     with started(tmp_path, 'mine.yaml', end=signal.SIGTERM) as (_, address, said):
@@ -494,7 +490,7 @@ def test_a_page_that_is_loaded_again_shows_the_file_as_it_is_now(tmp_path: Path)
     assert line.endswith('; the page shows it as it was')
 
 
-def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path: Path) -> None:
+def test_too_many_connections_are_reported_in_one_line(tmp_path: Path) -> None:
     with started(tmp_path, 'four_bar', files=64) as (process, address, said):
         place = urlsplit(address).hostname, urlsplit(address).port
         with ExitStack() as connections:
@@ -508,7 +504,7 @@ def test_more_connections_than_files_are_said_in_one_line_and_survived(tmp_path:
     assert said[1] == ''
 
 
-def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
+def test_view_writes_a_page_to_a_file(tmp_path: Path) -> None:
     (tmp_path / 'mine.yaml').write_text(FOUR_BAR)
     answer = linkage(tmp_path, 'view', 'mine.yaml', '-o', 'page.html')
     assert (answer.returncode, answer.stderr) == (0, '')
@@ -518,7 +514,7 @@ def test_a_page_is_written_to_a_file(tmp_path: Path) -> None:
     assert 'http-equiv="Content-Security-Policy"' in page
 
 
-def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
+def test_view_of_a_bag_is_its_report(tmp_path: Path) -> None:
     scene = scene_file(tmp_path, 'rate: 100\n')
     Recorded(tmp_path / 'bag', scene, lambda tick: {'crank_joint': (0.01 * tick, 1.0)}).run(50)
     expected = bag_page(tmp_path / 'bag', Window(), Event()).encode()
@@ -546,7 +542,7 @@ def test_of_a_bag_the_page_is_its_report(tmp_path: Path) -> None:
         (['four_bar', '-o', 'no/x.html'], 'no/x.html: there is no folder no; '),
     ],
 )
-def test_what_cannot_be_shown_is_told_in_one_line(
+def test_view_refuses_wrong_files_and_arguments_in_one_line(
     server: Served, tmp_path: Path, arguments: list[str], line: str
 ) -> None:
     (tmp_path / 'bad.yaml').write_text('links: 1\n')

@@ -85,9 +85,7 @@ def said(page: Any, count: int) -> dict[str, Any]:
     return found
 
 
-def test_its_own_page_runs_programs_and_asks_and_another_reaches_nothing(
-    server: Served, elsewhere: str
-) -> None:
+def test_server_admits_its_own_page_and_no_other_origin(server: Served, elsewhere: str) -> None:
     with chromium.browser() as browser:
         page = browser.new_page()
         for address in (server.address, server.address.replace('127.0.0.1', 'localhost')):

@@ -148,7 +148,7 @@ RUNS = {
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(('linkage', 'text', 'how', 'topics'), RUNS.values(), ids=RUNS.keys())
-def test_a_run(tmp_path, linkage, text, how, topics):
+def test_recorded_runs_agree_with_a_foreign_reader(tmp_path, linkage, text, how, topics):
     rate = 100 if 'split' in how else 1000
     record = f'rate: {rate}\nrecord: {{directory: {tmp_path}, name: bag, {how}}}'
     bag = assert_agreement(run(tmp_path, f'{dedent(text)}\n{record}', linkage))
@@ -196,7 +196,7 @@ def anything(kind: str, random: Random) -> Any:
     }[kind]()
 
 
-def test_messages_of_all_types_with_anything_in_them(tmp_path):
+def test_messages_of_all_types_agree_with_a_foreign_reader(tmp_path):
     random = Random(7)
     topics = [
         describe_topic(f'/topic_{index}', message_type(kind, 'test'), QosProfile(depth=index + 1))
@@ -217,14 +217,14 @@ def test_messages_of_all_types_with_anything_in_them(tmp_path):
 
 
 @pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])
-def test_a_bag_without_a_message(tmp_path, topics, compression):
+def test_bag_without_messages_agrees_with_a_foreign_reader(tmp_path, topics, compression):
     BagWriter(tmp_path / 'bag', topics, storage=Storage(compression=compression)).close()
     assert list(assert_agreement(tmp_path / 'bag').messages()) == []
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])
-def test_a_killed_bag_before_and_after_its_recovery(
+def test_killed_and_recovered_bags_agree_with_a_foreign_reader(
     tmp_path, topics, messages, compression, capsys
 ):
     messages = messages[:4000]
@@ -252,7 +252,7 @@ def test_a_killed_bag_before_and_after_its_recovery(
     capsys.readouterr()
 
 
-def test_what_is_damaged_is_damaged_there_too(tmp_path, topics, messages):
+def test_foreign_reader_reports_the_damaged_checksum(tmp_path, topics, messages):
     writer = BagWriter(tmp_path / 'run', topics)
     for message in messages[:100]:
         writer.write(*message)

@@ -85,7 +85,7 @@ def grouped(given: Sequence[State], inputs: int) -> Any:
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('name', ALL)
-def test_numpy_has_the_numbers_of_the_steps(name):
+def test_numpy_module_returns_the_values_of_the_steps(name):
     closure = closure_of(name)
     given = given_to(closure)
     arrays = grouped(given, len(closure.input_names))
@@ -103,7 +103,7 @@ def test_numpy_has_the_numbers_of_the_steps(name):
     assert np.abs(products[..., 0] - joint_rates)[known].max() < 1e-14 * 9.0 * size
 
 
-def test_numpy_tells_of_limits():
+def test_numpy_module_returns_the_status_of_joint_limits():
     closure = limited(rocker_joint=(1.5, 1.9), crank_joint=(-2.0, 5.0))
     given = states(closure, 300, 'limited')
     told = told_by(module_of(subject(closure))['motion'](*grouped(given, 1)))
@@ -114,7 +114,7 @@ def test_numpy_tells_of_limits():
 @pytest.mark.parametrize(
     ('name', 'joint'), [('four_bar', 'rocker_joint'), ('slider_crank', 'piston_slide')]
 )
-def test_a_dependent_joint_may_be_the_input(name, joint):
+def test_numpy_module_solves_for_a_driven_dependent_joint(name, joint):
     closure = closure_of(name).driven_by(joint, branch=1)
     branch = closure_of(name).branches(joint)[0]
     beyond = 0.1 * (branch.high - branch.low)
@@ -132,7 +132,7 @@ def test_a_dependent_joint_may_be_the_input(name, joint):
     assert set(status.tolist()) == {NUMBERS.index('CLOSED'), NUMBERS.index('OPEN')}
 
 
-def test_states_lie_along_any_axes():
+def test_array_module_accepts_states_along_any_axes():
     closure = closure_of('ankle')
     module = module_of(subject(closure))
     given = grouped(states(closure, 24, 'axes'), 2)
@@ -147,7 +147,7 @@ def test_states_lie_along_any_axes():
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'gripper', 'class_3', 'ankle', 'ankle_motors'])
-def test_single_precision_stays_single(name):
+def test_array_module_keeps_single_precision(name):
     closure = closure_of(name)
     module = module_of(subject(closure))
     count = len(closure.input_names)
@@ -163,7 +163,7 @@ def test_single_precision_stays_single(name):
 
 
 @pytest.mark.parametrize('derivatives', [0, 1, 2])
-def test_a_module_has_what_is_asked_for(derivatives):
+def test_array_module_holds_only_requested_derivatives_and_joints(derivatives):
     closure = closure_of('four_bar')
     what = subject(closure, derivatives, ['rocker_joint'])
     module = module_of(what)
@@ -181,7 +181,7 @@ def test_a_module_has_what_is_asked_for(derivatives):
 
 
 @pytest.mark.parametrize('limits', [(-0.1, 0.9), (-0.9, 0.1)])
-def test_where_one_width_has_no_cell_narrower_ones_count_or_none(limits):
+def test_array_module_solves_in_narrow_cells_near_a_limit(limits):
     """Next to the end of an ankle's motion only narrow cells are proven, and then none."""
     text = named_file('ankle_motors', 'linkages').read_text('utf-8')
     text = text.replace('[-0.6, 0.6]', f'[{limits[0]}, {limits[1]}]')
@@ -207,7 +207,7 @@ def test_where_one_width_has_no_cell_narrower_ones_count_or_none(limits):
         assert not values or found == pytest.approx(values[0], rel=1e-14)
 
 
-def test_a_module_needs_nothing_but_array_api_compat():
+def test_array_module_imports_only_math_and_array_api_compat():
     lines = write_arrays(subject(closure_of('ankle_motors'))).splitlines()
     assert [line for line in lines if 'import ' in line] == [
         'from math import inf, nan',
@@ -216,7 +216,7 @@ def test_a_module_needs_nothing_but_array_api_compat():
     assert max(map(len, lines)) <= 99
 
 
-def test_what_has_too_many_cells_is_not_written():
+def test_array_writer_refuses_a_hexapod_with_too_many_cells():
     with pytest.raises(lr.DefinitionError, match=r'6 inputs .* too many cells; give the inputs'):
         write_arrays(subject(closure_of('hexapod')))
 
@@ -288,7 +288,7 @@ def beside_toggles(closure: Closure) -> list[State]:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', ALL)
 @pytest.mark.parametrize('library', LIBRARIES)
-def test_a_library_has_the_numbers_of_the_steps_and_their_gradients(library, name, tmp_path):
+def test_array_libraries_return_the_values_and_gradients_of_steps(library, name, tmp_path):
     closure = closure_of(name)
     what, count = subject(closure), len(closure.input_names)
     given = [*given_to(closure, 250), *beside_toggles(closure)]
@@ -353,7 +353,7 @@ np.save('gradients.npy', np.concatenate(gradients, axis=1))
     ],
     ids=['kite', 'ankle'],
 )
-def test_what_fails_beside_the_path_of_a_state_leaves_its_gradient(library, make, given, tmp_path):
+def test_failing_states_do_not_spoil_gradients_of_others(library, make, given, tmp_path):
     closure = make()
     assert [closure.position(*state).status.has_pose for state in given].count(False) == 2
     (tmp_path / 'linkage.py').write_text(write_arrays(subject(closure, 1)))
@@ -395,7 +395,7 @@ assert functions.statuses[int(functions.position(given)[0][0])] == 'CLOSED'
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('library', LIBRARIES)
-def test_the_functions_of_a_closure_can_be_compiled(library):
+def test_array_libraries_compile_the_functions_of_a_closure(library):
     command = [sys.executable, '-c', COMPILED, library]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -416,14 +416,14 @@ assert joints.dtype == np.float32
 
 
 @pytest.mark.timeout(300)
-def test_arrays_of_numpy_have_the_precision_in_which_jax_computes():
+def test_jax_computes_numpy_arrays_in_its_own_precision():
     """Double ones are single there, unless it is told otherwise."""
     command = [sys.executable, '-c', SINGLE]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 
 
-def test_a_library_that_is_absent_is_named(monkeypatch):
+def test_missing_array_library_raises_the_install_command(monkeypatch):
     monkeypatch.setattr('linkage_ros.errors.find_spec', lambda _: None)
     with pytest.raises(
         lr.LinkageError, match=r"not installed; pip install 'linkage_ros\[arrays\]'"

@@ -55,7 +55,7 @@ def passes(function: BlockFunction) -> int:
     return function.source.count('out=')
 
 
-def test_a_condition_that_bounds_settle_is_not_asked():
+def test_compiler_omits_conditions_that_value_bounds_decide():
     tape = Tape()
     sine = sin(tape.add_input('q0', 0.3))
     assert written(sine.operation, (sine * sine + 0.5 > 0.4).operation).masks == 0
@@ -65,7 +65,7 @@ def test_a_condition_that_bounds_settle_is_not_asked():
         assert written(sine.operation, (part * part > 1.1).operation).masks > 0
 
 
-def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0():
+def test_compiler_merges_constants_and_skips_products_with_zero():
     tape = Tape()
     x, rate = tape.add_input('q0', 0.3), tape.add_input('w0', 1.25)
     function = written((2.0 * (3.0 * x) / 4.0).operation)
@@ -76,13 +76,13 @@ def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0():
 
 
 @pytest.mark.parametrize('constant', [0.5, np.float64(0.5), -0.0, inf, -inf, nan, 3])
-def test_every_constant_is_written_as_it_is(constant):
+def test_compiler_writes_every_constant_bit_for_bit(constant):
     found = values_of(written(constant), np.zeros(4))
     np.testing.assert_array_equal(found, np.full(4, constant))
     assert np.signbit(found).all() == np.signbit(constant)
 
 
-def test_a_row_is_used_again_when_nobody_needs_what_is_in_it():
+def test_compiled_block_reuses_rows_of_values_no_longer_needed():
     tape = Tape()
     total = x = tape.add_input('q0', 0.3)
     for k in range(30):
@@ -127,7 +127,7 @@ def answered(call: Any, *numbers: float) -> str:
 
 @pytest.mark.sample(6)
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES])
-def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
+def test_compiled_gallery_linkages_equal_the_steps_bit_for_bit(name):
     closure = closure_of(name)
     compiled = Compiled(closure, 2)
     closed = left = 0
@@ -143,7 +143,7 @@ def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name):
 
 @pytest.mark.sample(16)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_random_linkages_of_every_topology_have_them(family):
+def test_compiled_random_linkages_equal_the_steps_bit_for_bit(family):
     seen = set()
     for index in range(3):
         rng = random.Random(f'{family}/{index}')
@@ -167,7 +167,7 @@ SPECIAL = (0.0, -0.0, pi, -pi, 2 * pi, 0.5 * pi, -0.5 * pi, nextafter(pi, 4.0), 
 
 
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES if path.stem not in ITERATED])
-def test_toggles_change_points_and_huge_angles_have_them(name):
+def test_compiled_linkages_equal_the_steps_at_singular_inputs(name):
     closure = closure_of(name)
     driven = len(closure.linkage.inputs)
     compiled = Compiled(closure, 2)
@@ -181,7 +181,7 @@ def test_toggles_change_points_and_huge_angles_have_them(name):
 
 @pytest.mark.parametrize('wrong', [nan, inf, -inf])
 @pytest.mark.parametrize('place', range(3))
-def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong, place):
+def test_plain_steps_answer_inputs_that_are_not_finite(wrong, place):
     compiled = Compiled(closure_of('four_bar'), 2)
     numbers = [1.0, 2.0, 3.0]
     numbers[place] = wrong
@@ -189,7 +189,7 @@ def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong, place):
     assert answered(compiled, *numbers) == answered(compiled.run_interpreted, *numbers)
 
 
-def test_beyond_a_limit_the_plain_steps_say_so():
+def test_compiled_linkage_returns_limited_beyond_a_joint_limit():
     closure = closure_of('four_bar')
     joint = next(iter(closure.linkage.joints))
     at = closure.position(1.0).joints[0]
@@ -212,7 +212,7 @@ def operations(text: str) -> int:
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'andrews_squeezer', 'slider_crank'])
-def test_what_is_not_asked_for_is_not_in_the_line(name):
+def test_compiled_line_omits_joints_and_derivatives_not_requested(name):
     closure = closure_of(name)
 
     def last(motion: TracedMotion) -> list[list[float]]:
@@ -226,7 +226,7 @@ def test_what_is_not_asked_for_is_not_in_the_line(name):
     assert 'a0' not in source(closure, 1)
 
 
-def test_the_direction_of_one_joint_is_one_arc_tangent_more_than_none():
+def test_compiled_joint_angle_costs_one_arc_tangent_more():
     closure = closure_of('four_bar')
     counts = [
         source(closure, 0, lambda motion, n=n: [motion.position.joints[:n]]).count('atan2(')
@@ -254,7 +254,7 @@ def test_simplified_operations_keep_their_bits():
             assert repr(line(x, y)) == repr((tuple(expected),))
 
 
-def test_a_sum_takes_in_the_negation_of_a_product():
+def test_compiler_folds_negated_products_into_sums():
     tape = Tape()
     x, y = tape.add_input('x', 0.3), tape.add_input('y', 0.7)
     for one, other in (
@@ -266,7 +266,7 @@ def test_a_sum_takes_in_the_negation_of_a_product():
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1', 'excavator_bucket'])
-def test_the_equation_of_motion_is_that_of_the_plain_steps(name):
+def test_compiled_equation_of_motion_equals_the_plain_steps(name):
     closure = closure_of(name)
     mechanics = Mechanics(closure, Loads(gravity=(0.5, -9.81), drive_inertia=1e-4))
     for value, *_ in states(closure, 500):
@@ -275,6 +275,6 @@ def test_the_equation_of_motion_is_that_of_the_plain_steps(name):
         )
 
 
-def test_a_line_of_code_has_no_result_where_the_function_decides_otherwise():
+def test_compiled_line_returns_none_for_another_path():
     line = compile_line(lambda x: [x if x > 0.0 else -x], (1.0,))
     assert [line(2.0), line(-2.0)] == [((2.0,),), None]

@@ -55,7 +55,7 @@ def told_of(
 @pytest.mark.sample(6)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
-def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
+def test_gallery_linkages_in_c_equal_the_steps(name, tmp_path):
     told = told_of(closure_of(name), tmp_path, COUNT, name)
     # Spatial linkages close in a smaller part of what their inputs are drawn from.
     assert sum(one.status == 'CLOSED' for one in told) > COUNT / (3 if name in KINDS else 6)
@@ -63,13 +63,13 @@ def test_a_linkage_of_the_gallery_says_what_the_steps_say(name, tmp_path):
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('family', COMPILED)
-def test_any_topology_says_what_the_steps_say(family, tmp_path):
+def test_random_linkages_in_c_equal_the_steps(family, tmp_path):
     topology = FAMILIES[family].make(random.Random(family))
     told = told_of(Closure(topology.linkage), tmp_path, 150, family, topology.start)
     assert sum(one.status == 'CLOSED' for one in told) > 15
 
 
-def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path):
+def test_c_code_returns_the_passing_motion_at_change_points(tmp_path):
     for name in ('parallelogram', 'peaucellier'):
         closure = closure_of(name)
         given = [(i * pi, 1.5, 0.5) for i in range(-4, 5)]
@@ -78,7 +78,7 @@ def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path):
         assert name != 'parallelogram' or {one.status for one in told} == {'CHANGE_POINT'}
 
 
-def test_behind_a_toggle_nobody_looks(tmp_path):
+def test_c_code_reports_toggle_before_a_later_open_dyad(tmp_path):
     rocker = closure_of('double_rocker')
     links = {name: dict(points) for name, points in rocker.linkage.links.items()}
     links['ground']['O6'] = (0.15, -0.3)
@@ -116,13 +116,13 @@ def limited(**limits: tuple[float, float]) -> Closure:
         {'rocker_joint': (1.5 + 4.0 * pi, 1.9 + 4.0 * pi), 'crank_joint': (-9.0, 2.5)},
     ],
 )
-def test_beyond_limits_there_are_values_and_the_status_says_so(limits, tmp_path):
+def test_c_code_returns_values_and_limited_beyond_limits(limits, tmp_path):
     told = told_of(limited(**limits), tmp_path, 400, 'limited')
     assert {'CLOSED', 'LIMITED'} <= {one.status for one in told}
     assert all(len(one.values) == 6 for one in told if one.status == 'LIMITED')
 
 
-def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path):
+def test_c_code_checks_limits_of_joints_not_requested(tmp_path):
     closure = limited(rocker_joint=(1.5, 1.9))
     given = states(closure, 300, 'limited')
     told = run_c(subject(closure, 0, ['coupler_joint']), given, tmp_path)
@@ -130,7 +130,7 @@ def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path):
 
 
 @pytest.mark.parametrize('derivatives', [0, 1, 2])
-def test_what_is_not_asked_for_is_not_in_the_code(derivatives, tmp_path):
+def test_c_code_omits_joints_and_derivatives_not_requested(derivatives, tmp_path):
     closure = closure_of('jansen_leg')
     joint = list(closure.linkage.joints)[1]
     asked, whole = subject(closure, derivatives, [joint]), subject(closure)
@@ -146,7 +146,7 @@ def test_what_is_not_asked_for_is_not_in_the_code(derivatives, tmp_path):
 
 @pytest.mark.parametrize('odd', [nan, inf, -inf])
 @pytest.mark.parametrize('place', [0, 1, 2])
-def test_what_is_not_finite_is_indeterminate(odd, place, tmp_path):
+def test_c_code_returns_indeterminate_for_values_not_finite(odd, place, tmp_path):
     state = [1.0, 1.0, 1.0]
     state[place] = odd
     assert run_c(subject(closure_of('four_bar')), [tuple(state)], tmp_path) == [
@@ -158,7 +158,7 @@ def test_what_is_not_finite_is_indeterminate(odd, place, tmp_path):
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
 @pytest.mark.parametrize('header', [False, True])
 @pytest.mark.parametrize('name', GALLERY)
-def test_it_compiles_without_a_warning(name, header, kind, tmp_path):
+def test_c_code_of_gallery_linkages_compiles_without_a_warning(name, header, kind, tmp_path):
     text = write_source(subject(closure_of(name)), C('linkage', header=header))
     file = tmp_path / 'linkage.c'
     # A header may be included twice.
@@ -168,7 +168,7 @@ def test_it_compiles_without_a_warning(name, header, kind, tmp_path):
 
 
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
-def test_headers_of_one_linkage_go_together(kind, tmp_path):
+def test_headers_of_one_linkage_compile_in_one_file(kind, tmp_path):
     closure = closure_of('four_bar')
     texts = [write_source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
     (tmp_path / 'all.c').write_text('\n'.join(texts))
@@ -177,7 +177,7 @@ def test_headers_of_one_linkage_go_together(kind, tmp_path):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['class III', 'class III sliders', 'class III chain'])
-def test_iterated_links_say_what_the_steps_say_in_many_linkages(name, tmp_path):
+def test_iterated_groups_in_c_equal_the_steps(name, tmp_path):
     closed = 0
     for seed in range(4):
         topology = FAMILIES[name].make(random.Random(f'compiled {seed}'))

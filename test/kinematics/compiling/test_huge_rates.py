@@ -51,7 +51,7 @@ def right(name: str, given: Sequence[State]) -> list[Told]:
 @pytest.mark.sample(5)
 @needs['C99']
 @pytest.mark.parametrize('name', GALLERY)
-def test_c_says_what_the_steps_say(name, tmp_path):
+def test_c_code_equals_the_steps_at_huge_rates(name, tmp_path):
     given = huge_states(name)
     told = run_c(subject(closure_of(name)), given, tmp_path)
     assert told == right(name, given)
@@ -60,7 +60,7 @@ def test_c_says_what_the_steps_say(name, tmp_path):
 
 @pytest.mark.sample(5)
 @pytest.mark.parametrize('name', GALLERY)
-def test_python_says_what_the_steps_say(name):
+def test_python_module_equals_the_steps_at_huge_rates(name):
     given = huge_states(name)
     solve = python_of(subject(closure_of(name)))['motion']
     assert [told_by(solve, state) for state in given] == right(name, given)
@@ -70,7 +70,7 @@ def test_python_says_what_the_steps_say(name):
 @needs['JavaScript']
 # Not Bennett's linkage: joints that close by redundant equations are differences of large numbers.
 @pytest.mark.parametrize('name', [name for name in GALLERY if name != 'bennett'])
-def test_javascript_says_what_the_steps_say(name, tmp_path):
+def test_javascript_module_equals_the_steps_at_huge_rates(name, tmp_path):
     given = huge_states(name)
     told = run_javascript(subject(closure_of(name)), given, tmp_path)
     for state, one, steps in zip(given, told, right(name, given), strict=True):
@@ -80,7 +80,7 @@ def test_javascript_says_what_the_steps_say(name, tmp_path):
 
 
 @needs['C99']
-def test_velocities_alone_and_limits_too(tmp_path):
+def test_velocity_code_equals_steps_at_huge_rates_and_limits(tmp_path):
     closure = limited(rocker_joint=(1.5, 1.9))
     given = [(0.1 * i, rate, 0.0) for i in range(60) for rate in (1.0, 1e121, -1.7e308)]
     steps = [plain(closure, state) for state in given]

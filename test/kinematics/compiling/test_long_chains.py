@@ -48,12 +48,12 @@ def operations(count, monkeypatch):
     return written[0]
 
 
-def test_compiling_is_linear(monkeypatch):
+def test_compile_time_grows_linearly_with_the_dyads(monkeypatch):
     few, more, many = (operations(count, monkeypatch) for count in (8, 16, 32))
     assert many - more == pytest.approx(2 * (more - few), rel=0.05)
 
 
-def test_a_long_chain_has_the_states_of_its_steps():
+def test_batch_of_a_long_chain_equals_single_states():
     closure = chain(12)
     inputs = np.linspace(0.0, 6.0, 40)
     many = closure.solve(inputs)

@@ -64,7 +64,7 @@ def told_by(solve: Solve, state: State) -> Told:
 @pytest.mark.sample(6)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
-def test_python_has_the_bits_of_the_steps(name):
+def test_python_module_equals_the_steps_bit_for_bit(name):
     closure = closure_of(name)
     solve = python_of(subject(closure))['motion']
     for state in states(closure, COUNT, name):
@@ -82,20 +82,20 @@ def planar_group_of_two_inputs():
 
 
 @pytest.mark.parametrize('language', [JavaScript(), C('hexapod', header=False), PythonModule(2)])
-def test_what_has_too_many_cells_is_not_written(language):
+def test_source_writers_refuse_a_hexapod_with_too_many_cells(language):
     told = '6 inputs .* too many cells; give the inputs of the file limits'
     with pytest.raises(lr.DefinitionError, match=told):
         write_source(subject(closure_of('hexapod')), language)
 
 
-def test_python_needs_nothing_but_math():
+def test_python_module_imports_only_math():
     text = write_source(subject(closure_of('jansen_leg')), PythonModule(2))
     imports = [line for line in text.splitlines() if 'import ' in line]
     assert imports == ['from math import atan2, copysign, cos, inf, isfinite, sin, sqrt']
 
 
 @pytest.mark.parametrize('derivatives', [0, 1, 2])
-def test_python_takes_and_gives_what_is_asked_for(derivatives):
+def test_python_module_returns_only_requested_derivatives_and_joints(derivatives):
     closure = closure_of('four_bar')
     solve = python_of(subject(closure, derivatives, ['rocker_joint']))[FUNCTIONS[derivatives]]
     given = ((0.3,), (2.0,), (0.5,))
@@ -104,7 +104,7 @@ def test_python_takes_and_gives_what_is_asked_for(derivatives):
     assert (NUMBERS[status], *groups) == ('CLOSED', *((v,) for v in steps[: 1 + derivatives]))
 
 
-def test_python_tells_of_limits():
+def test_python_module_returns_the_status_of_joint_limits():
     closure = limited(rocker_joint=(1.5, 1.9))
     solve = python_of(subject(closure))['motion']
     told = [told_by(solve, state) for state in states(closure, 300, 'limited')]
@@ -222,14 +222,14 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
 @pytest.mark.timeout(600)
 # Not the ankle: states next to its toggles magnify the last bits of sine and cosine.
 @pytest.mark.parametrize('name', [name for name in GALLERY if name != 'ankle'])
-def test_javascript_is_as_near_as_its_functions(name, tmp_path):
+def test_javascript_module_equals_the_steps_within_rounding(name, tmp_path):
     what = subject(closure_of(name))
     given = states(what.closure, max(COUNT // 5, 100), name)
     assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS
 
 
 @needs['JavaScript']
-def test_javascript_tells_of_limits(tmp_path):
+def test_javascript_module_returns_the_status_of_joint_limits(tmp_path):
     what = subject(limited(rocker_joint=(1.5 + 4.0 * math.pi, 1.9 + 4.0 * math.pi)))
     given = states(what.closure, 300, 'limited')
     told = run_javascript(what, given, tmp_path)
@@ -242,7 +242,7 @@ def test_javascript_tells_of_limits(tmp_path):
     [(partial(closure_of, 'ankle_motors'), 0.6), (planar_group_of_two_inputs, 0.2)],
 )
 @pytest.mark.parametrize('run', RUN_IN.values(), ids=RUN_IN)
-def test_a_source_has_the_cells_of_several_inputs(run, make, reach, tmp_path):
+def test_source_code_holds_the_cells_of_two_input_linkages(run, make, reach, tmp_path):
     closure, random = make(), Random(1)
     pose = closure.linkage.pose.inputs
     given = []
@@ -280,7 +280,7 @@ DRIVEN = {
 @pytest.mark.parametrize(
     ('name', 'joint'), [(name, joint) for name, joints in DRIVEN.items() for joint in joints]
 )
-def test_a_source_of_a_linkage_that_a_dependent_joint_drives(run, name, joint, tmp_path):
+def test_source_code_solves_linkages_driven_by_a_dependent_joint(run, name, joint, tmp_path):
     """The crank of each state is found by the branch itself, a route without compiled code."""
     crank_driven = closure_of(name)
     for branch in crank_driven._joint_inverse(joint).branches[:2]:
@@ -333,9 +333,7 @@ EXCHANGED = {
 @pytest.mark.parametrize(
     ('name', 'joints'), [(name, joints) for name, sets in EXCHANGED.items() for joints in sets]
 )
-def test_source_of_what_is_driven_by_joints_coordinates_distances_and_angles(
-    run, name, joints, tmp_path
-):
+def test_source_code_inverts_joints_coordinates_distances_and_angles(run, name, joints, tmp_path):
     """There and back: the linkage itself has the joints that were asked for, and their rates."""
     random, closure = Random(name), closure_of(name)
     pose = closure.linkage.pose.inputs if closure.linkage.pose else (1.1, 1.2)
@@ -371,7 +369,7 @@ def test_source_of_what_is_driven_by_joints_coordinates_distances_and_angles(
             assert off == pytest.approx(0.0, abs=1e-11 if place < len(pose) else 1e-8)
 
 
-def test_a_spatial_linkage_is_driven_by_any_of_its_joints():
+def test_any_joints_drive_a_spatial_ankle():
     """There and back: the joints of the motors of joints."""
     motors, random = closure_of('ankle_motors'), Random(3)
     joints = motors.driven_by('pitch', 'roll')

@@ -25,7 +25,7 @@ CASES = {
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_python_has_the_bits_of_the_steps(name: str) -> None:
+def test_python_with_ratios_equals_the_steps_bit_for_bit(name: str) -> None:
     closure = Closure(CASES[name]())
     solve = python_of(subject(closure))['motion']
     for state in states(closure, 100, name):
@@ -34,7 +34,7 @@ def test_python_has_the_bits_of_the_steps(name: str) -> None:
 
 @needs['C99']
 @pytest.mark.parametrize('name', CASES)
-def test_c_has_the_bits_of_the_steps(name: str, tmp_path: Path) -> None:
+def test_c_with_ratios_equals_the_steps_bit_for_bit(name: str, tmp_path: Path) -> None:
     closure = Closure(CASES[name]())
     given = states(closure, 100, name)
     for state, told in zip(given, run_c(subject(closure), given, tmp_path), strict=True):
@@ -43,7 +43,9 @@ def test_c_has_the_bits_of_the_steps(name: str, tmp_path: Path) -> None:
 
 @needs['JavaScript']
 @pytest.mark.parametrize('name', CASES)
-def test_javascript_is_as_near_as_its_functions(name: str, tmp_path: Path) -> None:
+def test_javascript_with_ratios_equals_the_steps_within_rounding(
+    name: str, tmp_path: Path
+) -> None:
     what = subject(Closure(CASES[name]()))
     given = states(what.closure, max(COUNT // 5, 100), name)
     assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS

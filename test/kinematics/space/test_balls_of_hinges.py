@@ -52,7 +52,7 @@ def written_as_hinges(linkage, rod, point, rng):
 @pytest.mark.parametrize('name', WITH_RODS)
 @pytest.mark.parametrize('both', [False, True], ids=['one end', 'both ends'])
 @pytest.mark.parametrize('seed', range(2))
-def test_states_are_those_of_the_linkage_with_balls(name, both, seed):
+def test_three_hinge_balls_give_the_states_of_balls(name, both, seed):
     rng = np.random.default_rng(seed)
     balls = load(name)
     linkage = balls.linkage
@@ -73,7 +73,7 @@ def test_states_are_those_of_the_linkage_with_balls(name, both, seed):
         assert all(values[each] == 0.0 for each in closure.held)
 
 
-def test_a_robot_with_such_rods_closes_where_its_tree_says():
+def test_robot_with_hinge_balls_closes_its_urdf_tree():
     """The values of pitch and roll are of own Newton; the tree is walked by yourdfpy."""
     closure = load(ROBOT, {'input': ['m1', 'm2']})
     at = closure.position(*np.radians((5.0, -3.0)))
@@ -89,7 +89,7 @@ def test_a_robot_with_such_rods_closes_where_its_tree_says():
 
 
 @pytest.mark.parametrize('named', [{}, {'top1_a': 'neck_x', 'top1_b': 'neck_rz'}])
-def test_a_head_on_six_rods_is_where_its_tree_says(tmp_path, named):
+def test_six_rod_head_closes_its_urdf_tree(tmp_path, named):
     """
     Nothing but rods carries the head: no joint leads to it, and it has no closed form.
 
@@ -108,7 +108,7 @@ def test_a_head_on_six_rods_is_where_its_tree_says(tmp_path, named):
         assert walked.gap() < 1e-12
 
 
-def test_a_spin_that_is_an_input_stays_one():
+def test_driven_rod_spin_stays_an_input():
     closure = load(ROBOT, {'input': ['m1', 'm2', 'r1z', 'r2z']})
     assert closure.held == ()
     assert closure.position(0.05, -0.03, 0.4, -0.2).joints[:2] == pytest.approx(
@@ -116,7 +116,7 @@ def test_a_spin_that_is_an_input_stays_one():
     )
 
 
-def test_a_ball_that_is_no_ball_leaves_its_rod_free():
+def test_three_hinges_that_miss_a_point_are_refused():
     """The third axis misses the point of the first two by 1 mm."""
     balls = load('rssr')
     linkage = written_as_hinges(balls.linkage, 'rod', 'A', np.random.default_rng(3))
@@ -127,7 +127,7 @@ def test_a_ball_that_is_no_ball_leaves_its_rod_free():
         SpaceClosure(replace(linkage, hinges={**linkage.hinges, 'A_hinge2': off}))
 
 
-def test_a_plate_that_two_balls_hold_is_told_without_the_joints_of_its_plan():
+def test_free_plate_between_two_balls_is_refused_by_name():
     points = {'A': (0.04, 0.0, 0.0), 'B': (0.1, 0.02, 0.12), 'P': (0.05, 0.1, 0.05)}
     linkage = load('rssr').linkage
     plate = replace(linkage, points=points, links={**linkage.links, 'rod': ('A', 'B', 'P')})
@@ -135,7 +135,7 @@ def test_a_plate_that_two_balls_hold_is_told_without_the_joints_of_its_plan():
         SpaceClosure(plate)
 
 
-def test_beside_a_parallelogram_that_is_drawn_flat_they_are_the_same():
+def test_hinge_balls_equal_balls_beside_a_flat_parallelogram():
     """At a change point freedom is judged beside the pose."""
     balls = load('rssr').linkage
     linkage = written_as_hinges(balls, 'rod', 'A', np.random.default_rng(8))

@@ -45,7 +45,7 @@ def random_inputs(closure, count, reach):
 
 
 @pytest.mark.parametrize('name', BOTH_WAYS)
-def test_there_and_back_is_the_identity(name):
+def test_inverse_linkage_returns_the_inputs(name):
     there, back = closure_of(name), closure_of(BOTH_WAYS[name])
     met, count = 0, sample_count(200, 20)
     for inputs in random_inputs(there, count, 0.3):
@@ -61,7 +61,7 @@ def test_there_and_back_is_the_identity(name):
     assert met > 0.5 * count
 
 
-def test_the_order_of_visits_does_not_matter():
+def test_iterated_states_do_not_depend_on_their_order():
     states = random_inputs(closure_of('ankle_motors'), sample_count(1_000_000, 10_000), 0.7)
     one, other = (Compiled(closure_of('ankle_motors'), 0, within_limits=False) for _ in range(2))
     forward = [one.fast(*inputs) for inputs in states]
@@ -69,7 +69,7 @@ def test_the_order_of_visits_does_not_matter():
     assert sum(map(bool, forward)) > 0.9 * len(states)
 
 
-def test_a_state_has_the_same_bits_after_a_motion_to_it():
+def test_earlier_motion_does_not_change_state_bits():
     """Some cells on the way are narrow, next to a place where the loop nearly ends."""
     state = -0.7383024407166474
     file = Path(__file__).parent.parent / 'three_cylinders.yaml'
@@ -79,7 +79,7 @@ def test_a_state_has_the_same_bits_after_a_motion_to_it():
     assert moved.position(state).joints == load(file).position(state).joints
 
 
-def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypatch):
+def test_dropped_cells_are_computed_again_bit_for_bit(monkeypatch):
     states = random_inputs(closure_of('ankle_motors'), 60, 0.6)
     whole = closure_of('ankle_motors')
     expected = [whole.position(*inputs).joints for inputs in states]
@@ -89,7 +89,7 @@ def test_cells_that_are_no_longer_kept_are_made_again_to_the_same_bits(monkeypat
 
 
 @pytest.mark.parametrize('turns', [-7, 1, 3, 1000])
-def test_a_crank_that_turns_on_and_on_meets_the_same_links(turns):
+def test_whole_turns_of_the_crank_repeat_the_pose(turns):
     closure = closure_of('ankle_of_one_motor')
     gear, *others = range(len(closure.joint_names))
     for (x,) in random_inputs(closure, 20, 3.0):
@@ -104,7 +104,7 @@ def test_a_crank_that_turns_on_and_on_meets_the_same_links(turns):
     assert Compiled(closure, 1)(wound, 1.0).values == (position.joints, rates)
 
 
-def test_the_cells_within_limits_are_those_that_states_meet():
+def test_cells_within_limits_cover_all_solved_states():
     one, other = closure_of('ankle_motors'), closure_of('ankle_motors')
     (grid,), (met,) = one.grids, other.grids
     cells = grid.fill()
@@ -115,7 +115,7 @@ def test_the_cells_within_limits_are_those_that_states_meet():
 
 
 @pytest.mark.parametrize('ahead', [True, False])
-def test_a_motion_finds_cells_of_many_inputs_made_ahead_of_it(monkeypatch, ahead):
+def test_cells_made_ahead_serve_a_hexapod_in_motion(monkeypatch, ahead):
     closure, made, counts = closure_of('hexapod'), [], []
     make = Grid._make_cell
     monkeypatch.setattr(Grid, '_make_cell', lambda *given: made.append(given) or make(*given))
@@ -132,7 +132,7 @@ def test_a_motion_finds_cells_of_many_inputs_made_ahead_of_it(monkeypatch, ahead
     assert (sum(counts) == 0) == ahead
 
 
-def test_the_range_about_a_state_is_found_without_the_states_far_beyond_it(monkeypatch):
+def test_range_search_samples_only_near_the_range_ends(monkeypatch):
     closure, asked = closure_of('hexapod'), []
     begin = closure.linkage.pose.inputs
     sweep = InputSweep(closure, begin)
@@ -151,13 +151,13 @@ def test_the_range_about_a_state_is_found_without_the_states_far_beyond_it(monke
         assert position_at(end + way, *begin[1:]).status is Status.OPEN
 
 
-def test_only_what_has_many_inputs_makes_cells_in_motion():
+def test_only_linkages_with_many_inputs_make_cells_in_motion():
     assert closure_of('hexapod').makes_cells_in_motion
     for name in ('ankle_motors', 'hexapod_inverse', 'four_bar'):
         assert not closure_of(name).makes_cells_in_motion
 
 
-def test_a_state_is_where_a_walk_from_the_pose_ends():
+def test_solved_joints_equal_a_walk_from_the_pose():
     """The motors are closed forms of the joints; the walk inverts these by Newton's method."""
     motors = Compiled(closure_of('ankle'), 1, within_limits=False)
     joints = closure_of('ankle_motors')
@@ -185,7 +185,7 @@ def last_with(attribute, closure, inputs):
     return low
 
 
-def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
+def test_passing_a_singularity_and_returning_keeps_the_assembly():
     closure = closure_of('ankle_motors')
     far = [3.0, 3.0]
     end = last_with('has_pose', closure, far)
@@ -198,7 +198,7 @@ def test_a_walk_past_a_singularity_and_back_has_the_same_assembly():
     assert {Status.CLOSED, Status.OPEN} <= statuses
 
 
-def test_a_toggle_from_both_sides():
+def test_toggle_separates_closed_and_open_states():
     closure = closure_of('ankle_motors')
     far = np.array([3.0, 3.0])
     begin, end = (last_with(what, closure, far) for what in ('has_rates', 'has_pose'))
@@ -219,7 +219,7 @@ def test_a_toggle_from_both_sides():
     assert gaps == pytest.approx([gaps[-1]] * len(gaps), rel=0.2)
 
 
-def test_a_knot_is_named_and_its_equations_counted():
+def test_group_names_its_links_and_counts_its_equations():
     groups = [group for group in closure_of('ankle_motors').groups if group.kind == 'knot']
     assert [(group.links, group.assembly) for group in groups] == [
         (('cross', 'foot'), 'as in the pose')
@@ -227,7 +227,7 @@ def test_a_knot_is_named_and_its_equations_counted():
     assert '2 equations for pitch, roll' in groups[0].method
 
 
-def test_the_other_assemblies_of_an_ankle_are_all_that_its_rods_allow():
+def test_ankle_lists_all_assemblies_its_rods_allow():
     """A library's method from a grid of starts, with turned points, finds no more."""
     closure = closure_of('ankle_motors')
     points = {name: np.array(place) for name, place in closure.linkage.points.items()}
@@ -253,7 +253,7 @@ def test_the_other_assemblies_of_an_ankle_are_all_that_its_rods_allow():
     assert all(max(map(abs, misses([*joints.values()]))) < 1e-11 for joints in found)
 
 
-def test_a_knot_follows_closed_steps_and_others_follow_it():
+def test_two_ankles_are_solved_by_their_own_motors():
     """Two legs: each knot depends on its own motors."""
     closure = closure_of('two_ankles')
     kinds = [group.kind for group in closure.groups]
@@ -271,7 +271,7 @@ def test_a_knot_follows_closed_steps_and_others_follow_it():
 @pytest.mark.parametrize(
     ('name', 'unknown'), [('three_arms', ('b1', 'c1')), ('three_elbows', ('a1', 'a2', 'a3'))]
 )
-def test_a_knot_closed_by_hinges_with_known_joints_within(name, unknown):
+def test_hinge_closed_group_solves_and_inverts(name, unknown):
     closure = closure_of(name)
     (knot,) = (group for group in closure.groups if group.kind == 'knot')
     # A coupler or a platform is a rod between its hinges, though these hold it.

@@ -40,7 +40,7 @@ def closure_of(name):
     return load_in_space(own if own.is_file() else name)
 
 
-def test_a_linkage_of_numpys_numbers_has_the_same_bits():
+def test_numpy_numbers_give_the_same_bits():
     for name in spatial_linkage_names():
         linkage = closure_of(name).linkage
         joints = [
@@ -86,7 +86,7 @@ def joints_at(closure, inputs):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_the_pose_of_the_file_is_solved_at_its_inputs(name):
+def test_drawn_pose_is_solved_at_its_inputs(name):
     closure = closure_of(name)
     linkage = closure.linkage
     position = closure.position(*linkage.pose.inputs)
@@ -100,7 +100,7 @@ def test_the_pose_of_the_file_is_solved_at_its_inputs(name):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_rates_and_accelerations_are_the_derivatives_of_joints_and_points(name):
+def test_rates_and_accelerations_equal_numerical_derivatives(name):
     closure, step = closure_of(name), 1e-4
     for inputs, rates, changes in states_of(closure, 10, 0.2):
         start, first, second = np.array(inputs), np.array(rates), np.array(changes)
@@ -130,7 +130,7 @@ def _differences(values, step):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_links_keep_their_lengths_and_joints_their_axes(name):
+def test_spatial_links_keep_their_lengths_and_axes(name):
     closure = closure_of(name)
     linkage = closure.linkage
     for inputs, _, _ in states_of(closure, 20):
@@ -155,7 +155,7 @@ def _rotate(quaternion, vector):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
+def test_compiled_spatial_linkages_equal_the_steps(name):
     closure = closure_of(name)
     compiled = closure.compile_linkage(2)
     states = list(states_of(closure, 30, 0.1))
@@ -179,7 +179,7 @@ def test_the_compiled_linkage_and_arrays_give_the_bits_of_the_steps(name):
         assert pytest.approx(np.array([each[order] for each in one]), abs=1e-9) == values.T
 
 
-def test_a_delta_there_and_back_is_where_it_was():
+def test_delta_inverse_and_delta_return_the_inputs():
     arms, platform = closure_of('delta_inverse'), closure_of('delta')
     for inputs, _, _ in states_of(arms, 200):
         there = arms.position(*inputs)
@@ -190,7 +190,7 @@ def test_a_delta_there_and_back_is_where_it_was():
 
 
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
-def test_a_universal_joint_turns_as_in_the_books(angle):
+def test_universal_joint_follows_the_textbook_formula(angle):
     """tan(out) = tan(in)·cos β if the fork of the input lies in the plane of the shafts."""
     closure = closure_of('hooke_joint')
     position = closure.position(angle)
@@ -203,7 +203,7 @@ def test_a_universal_joint_turns_as_in_the_books(angle):
 
 
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
-def test_a_bennett_linkage_turns_as_in_the_books(angle):
+def test_bennett_linkage_follows_the_textbook_formula(angle):
     """tan(θ1/2)·tan(θ2/2) is constant: sin((β + α)/2)/sin((β − α)/2) (Bennett, 1914)."""
     closure = closure_of('bennett')
     position = closure.position(angle)
@@ -215,7 +215,7 @@ def test_a_bennett_linkage_turns_as_in_the_books(angle):
     assert abs(remainder(position['h3'] + angle, tau)) < 1e-12
 
 
-def test_a_planar_four_bar_in_space_is_the_planar_one(tmp_path):
+def test_planar_four_bar_in_space_equals_the_planar_one(tmp_path):
     planar = tmp_path / 'planar.yaml'
     b, c = dist((0.0, 0.04), (0.11, 0.08)), dist((0.1, 0.0), (0.11, 0.08))
     lengths = f'{{a: 0.04, b: {b!r}, c: {c!r}, d: 0.1, assembly: left}}'
@@ -229,14 +229,14 @@ def test_a_planar_four_bar_in_space_is_the_planar_one(tmp_path):
             assert abs(remainder(other[name] - moved_by, tau)) < 1e-14
 
 
-def test_states_in_any_order_have_the_same_bits():
+def test_wishbone_states_do_not_depend_on_their_order():
     closure = closure_of('wishbone')
     states = [inputs for inputs, _, _ in states_of(closure, 100)]
     forward = [closure.position(*inputs).joints for inputs in states]
     assert [closure.position(*inputs).joints for inputs in reversed(states)] == forward[::-1]
 
 
-def test_a_jacobian_in_the_plane_too():
+def test_planar_jacobian_holds_the_joint_rates():
     closure = lr.load('five_bar')
     position = closure.position(1.9, 1.2)
     columns = [closure.velocity(position, *rates).joints for rates in ((1.0, 0.0), (0.0, 1.0))]
@@ -246,7 +246,7 @@ def test_a_jacobian_in_the_plane_too():
 
 
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 13).tolist())
-def test_a_spatial_slider_crank_stands_where_its_rod_ends(angle):
+def test_spatial_slider_crank_follows_the_textbook_formula(angle):
     """The crank pin is at (0, 0.1 + r·sin, 0.12 + r·cos); the rod is 0.3 m long (Haug, 1989)."""
     closure = closure_of('spatial_slider_crank')
     position = closure.position(angle)
@@ -255,7 +255,7 @@ def test_a_spatial_slider_crank_stands_where_its_rod_ends(angle):
 
 
 @pytest.mark.parametrize('angle', np.linspace(-1.2, 1.5, 13).tolist())
-def test_a_spherical_four_bar_keeps_the_angles_between_its_axes(angle):
+def test_spherical_four_bar_keeps_angles_between_its_axes(angle):
     """The rocker of a·cos q + b·sin q + c = 0, which says that coupler and last keep their arc."""
     closure = closure_of('spherical_four_bar')
     position = closure.position(angle)
@@ -273,7 +273,7 @@ def test_a_spherical_four_bar_keeps_the_angles_between_its_axes(angle):
     assert min(off) < 1e-13
 
 
-def test_a_delta_stands_where_three_spheres_meet():
+def test_delta_platform_equals_the_intersection_of_three_spheres():
     """About the elbows, moved by the platform's points: two planes, and the lower of two roots."""
     closure = closure_of('delta')
     points = {name: np.array(place) for name, place in closure.linkage.points.items()}
@@ -298,7 +298,7 @@ def test_a_delta_stands_where_three_spheres_meet():
         assert closure.position(*inputs).joints == pytest.approx(expected, abs=1e-14)
 
 
-def test_a_wishbone_is_where_its_six_distances_are_met():
+def test_wishbone_points_equal_a_40_digit_solution():
     """Upper ball and steering ball are found from their distances, to 40 digits (mpmath)."""
     closure = closure_of('wishbone')
     drawn = {name: [mpf(part) for part in place] for name, place in closure.linkage.points.items()}
@@ -331,7 +331,7 @@ def test_a_wishbone_is_where_its_six_distances_are_met():
                 assert [*map(float, places)] == pytest.approx(found[point], abs=1e-14)
 
 
-def test_rods_that_may_spin_are_named_and_turn_the_shortest_way():
+def test_idle_rod_is_named_and_does_not_spin():
     closure = closure_of('rssr')
     assert closure.idle == ('rod',)
     position = closure.position(0.5)
@@ -343,7 +343,7 @@ def test_rods_that_may_spin_are_named_and_turn_the_shortest_way():
     assert np.dot(quaternion[:3], way) == pytest.approx(0.0, abs=1e-16)
 
 
-def test_a_ratio_that_holds_in_the_pose_alone_is_refused(tmp_path):
+def test_ratio_that_holds_only_in_the_pose_is_refused(tmp_path):
     """To first order it is redundant; over the range it is missed."""
     closure = closure_of('rssr')
     slope = closure.jacobian(closure.position(0.0))[0, 0].item()
@@ -357,7 +357,7 @@ def test_a_ratio_that_holds_in_the_pose_alone_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize('length', [0.15027, 0.1503, 0.16])
-def test_bennett_equations_are_met_within_the_rounding_of_cad_or_refused(tmp_path, length):
+def test_bennett_lengths_beyond_cad_rounding_are_refused(tmp_path, length):
     file = tmp_path / 'bennett.yaml'
     text = named_file('bennett', 'linkages').read_text('utf-8')
     file.write_text(text.replace('-0.15027138229377354', f'-{length}'))
@@ -391,7 +391,7 @@ def turned(q, x, z, pivot):
 
 
 @pytest.mark.parametrize('power', range(-12, 9))
-def test_struts_and_slides_drive_linkages_of_any_size(power):
+def test_strut_and_slide_inputs_work_at_any_size(power):
     size, half = 10.0**power, 0.5 * 10.0**power
     lifted = read_any_closure(parse_yaml(LIFTED.format(size, half).encode(), 'x.yaml'))
     q = lifted.position(1.2 * size)['q']
@@ -418,9 +418,7 @@ input: [s]
 @pytest.mark.parametrize('beside', [0.0, 0.5])
 @pytest.mark.parametrize('turned_round', [False, True])
 @pytest.mark.parametrize('value', [0.25, 0.4, 0.5, 0.75])
-def test_a_slide_between_two_moving_links_is_as_long_as_its_value_says(
-    beside, turned_round, value
-):
+def test_cylinder_length_equals_its_slide_value(beside, turned_round, value):
     """The axis leads from the point of the parent to that of the child, or past it."""
     way = np.array([-1.0, 0.0, 2.0 + beside])
     links = {'carrying_a': 'barrel', 'carrying_b': 'piston'}
@@ -449,7 +447,7 @@ traced: [x]
 """
 
 
-def test_a_point_at_three_distances_is_as_far_from_a_toggle_as_its_planes_are_apart():
+def test_tripod_toggle_distance_equals_its_closed_form():
     """It turns about the line of the ends of two rods; the third ends in the ground's plane."""
     closure = read_any_closure(parse_yaml(TRIPOD.encode(), 'x.yaml'))
     assert closure.groups[0].kind == 'three distances'
@@ -476,7 +474,7 @@ def test_a_point_at_three_distances_is_as_far_from_a_toggle_as_its_planes_are_ap
 
 
 @pytest.mark.parametrize('drawn', [1.2, -1.2])
-def test_the_side_of_a_point_at_three_distances_is_that_of_the_plane_of_their_ends(drawn):
+def test_tripod_point_keeps_its_drawn_side(drawn):
     """The sign of ((P1 − P0) × (P2 − P0))·(X − P0), in the assembly that the file draws."""
     text = TRIPOD.replace('1.2', str(drawn)).replace('--', '')
     closure = read_any_closure(parse_yaml(text.encode(), 'x.yaml'))
@@ -500,7 +498,7 @@ def sharing_links(links, points):
 
 @pytest.mark.parametrize('points', [3, 4, 12, 40])
 @pytest.mark.parametrize('links', [2, 3, 8])
-def test_links_that_share_points_are_as_free_as_three_points_leave_them(links, points):
+def test_links_sharing_three_points_count_as_one_body(links, points):
     """Two bodies with three balls between them are one: whatever is beyond 6 is redundant."""
     linkage = sharing_links(links, points)
     freedom = find_freedom(linkage, CarriedPoints(linkage, 1.0))
@@ -508,7 +506,7 @@ def test_links_that_share_points_are_as_free_as_three_points_leave_them(links, p
 
 
 @pytest.mark.parametrize(('links', 'points'), [(120, 3), (60, 200)])
-def test_a_linkage_of_too_many_parts_is_refused_in_one_line(links, points):
+def test_linkage_with_too_many_parts_is_refused(links, points):
     with pytest.raises(lr.DefinitionError) as caught:
         SpaceClosure(sharing_links(links, points))
     told = f'links: {links + 1} with {links * points} points; keep 120 links, and 10000 points'

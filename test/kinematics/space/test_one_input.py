@@ -128,7 +128,7 @@ class GearedAnkle:
 
 
 @pytest.mark.parametrize('seed', SEEDS)
-def test_a_geared_ankle_stays_on_the_branch_of_its_pose(seed):
+def test_geared_ankle_stays_on_the_branch_of_its_pose(seed):
     ankle = GearedAnkle(seed)
     closure, walked = ankle.closure(), 0
     for sign in (-1.0, 1.0):
@@ -142,7 +142,7 @@ def test_a_geared_ankle_stays_on_the_branch_of_its_pose(seed):
 
 
 @pytest.mark.parametrize('seed', SEEDS)
-def test_its_range_ends_at_toggles_to_the_last_digits(seed):
+def test_geared_ankle_range_ends_at_exact_toggles(seed):
     ankle = GearedAnkle(seed)
     closure = ankle.closure()
     (interval,) = closure.closing_ranges
@@ -172,7 +172,7 @@ def rates(ankle, position):
 
 
 @pytest.mark.parametrize('seed', SEEDS)
-def test_its_states_depend_on_no_order_and_need_no_cells(seed):
+def test_geared_ankle_states_do_not_depend_on_their_order(seed):
     ankle = GearedAnkle(seed)
     inputs = np.linspace(-7.0, 7.0, 57).tolist()
     one, other = ankle.closure(), ankle.closure()
@@ -184,7 +184,7 @@ def test_its_states_depend_on_no_order_and_need_no_cells(seed):
     assert one.grids == []
 
 
-def test_two_motors_that_each_move_a_foot_have_two_branches():
+def test_two_geared_ankles_follow_their_own_inputs():
     """Of several inputs, links that depend on one of them follow it alone."""
     ankle = GearedAnkle(0)
     twice = two_of(ankle.closure().linkage)

@@ -190,7 +190,7 @@ def mirrored(kind: str, linkage: Linkage, at: dict[str, complex]) -> dict[str, c
 
 @pytest.mark.parametrize('hips', [0, 1, 2])
 @pytest.mark.parametrize('kind', FLAT)
-def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
+def test_planar_loop_passes_change_points_without_a_jump(kind, hips):
     rng = random.Random(f'{kind} {hips}')
     made: Flat = FLAT[kind](rng)
     plane = Closure(made.linkage)
@@ -225,7 +225,7 @@ def test_loop_passes_its_change_points_where_the_last_steps_lead(kind, hips):
         if kind != 'RPR' or digits > 15
     ],
 )
-def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
+def test_planar_loop_with_rounded_coordinates_equals_the_planar_linkage(kind, digits):
     rng = random.Random(f'{kind} {digits}')
     for hips in range(3):
         made: Flat = FLAT[kind](rng)
@@ -249,7 +249,7 @@ def test_loop_of_rounded_coordinates_is_the_planar_linkage(kind, digits):
 
 @pytest.mark.parametrize('hips', [0, 2])
 @pytest.mark.parametrize('kind', FLAT)
-def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
+def test_planar_loop_near_change_points_equals_the_planar_linkage(kind, hips):
     rng = random.Random(f'{kind} {hips}')
     made: Flat = FLAT[kind](rng)
     plane = Closure(made.linkage)
@@ -265,7 +265,7 @@ def test_loop_beside_its_change_points_is_the_planar_linkage(kind, hips):
 
 @pytest.mark.parametrize('with_rod', [False, True])
 @pytest.mark.parametrize('crank', [0.0, pi])
-def test_parallelogram_drawn_flat_is_a_parallelogram(crank, with_rod):
+def test_parallelogram_drawn_flat_moves_as_a_parallelogram(crank, with_rod):
     rng = random.Random(48)
     for _ in range(5):
         axes, origin = random_axes(rng), np.array([rng.uniform(-1, 1) for _ in range(3)])
@@ -303,7 +303,7 @@ def tilted(angle: float) -> SpaceClosure:
 
 
 @pytest.mark.parametrize('angle', [0.0, 1e-18, 1e-12, 1e-9, 0.9e-6])
-def test_axes_that_are_nearly_parallel_are_parallel_and_told(angle):
+def test_nearly_parallel_axes_are_corrected_and_reported(angle):
     closure = tilted(angle)
     assert closure.groups[0].kind == 'planar loop'
     assert closure.linkage.corrections.tilted_by == pytest.approx(angle, rel=1e-6, abs=1e-15)
@@ -312,7 +312,7 @@ def test_axes_that_are_nearly_parallel_are_parallel_and_told(angle):
         assert abs(np.remainder(driven - driver + pi, tau) - pi) < 1e-14 + angle
 
 
-def test_axes_further_apart_make_a_spatial_loop():
+def test_clearly_tilted_axes_make_a_spatial_loop():
     assert {group.kind for group in tilted(1e-5).groups}.isdisjoint({'planar loop'})
 
 
@@ -322,7 +322,7 @@ GALLERY = [name for name in KINDS if name not in ('class_3', 'gripper')]
 
 @pytest.mark.parametrize('hips', [0, 1])
 @pytest.mark.parametrize('name', GALLERY)
-def test_linkage_of_the_gallery_in_space_is_the_planar_one(name, hips):
+def test_gallery_linkage_in_space_equals_the_planar_one(name, hips):
     rng = random.Random(f'{name} {hips}')
     plane = planar_closure(name)
     start, *others = [

@@ -59,7 +59,7 @@ def by_frames(closure, points, position):
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_velocities_and_accelerations_are_differences_of_places(name):
+def test_point_velocities_and_accelerations_equal_numerical_derivatives(name):
     closure = closure_of(name)
     points = list(points_of(closure))
     links = [link for link, _ in points if link not in closure.idle]
@@ -100,7 +100,7 @@ def test_velocities_and_accelerations_are_differences_of_places(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'delta'])
-def test_the_turn_of_a_rod_is_the_velocity_of_one_end_from_the_other(name):
+def test_rod_turn_rate_equals_its_relative_end_velocity(name):
     closure = closure_of(name)
     places = closure.linkage.points
     rods = {link: closure.linkage.links[link][:2] for link in closure.idle}
@@ -123,7 +123,7 @@ def test_the_turn_of_a_rod_is_the_velocity_of_one_end_from_the_other(name):
 
 
 @pytest.mark.parametrize('name', ['rssr', 'delta', 'ankle', 'ankle_motors', 'wishbone'])
-def test_traced_as_interpreted_to_the_last_bit(name):
+def test_compiled_point_motion_equals_the_interpreted_one(name):
     closure = closure_of(name)
     points = list(points_of(closure))
     tracker = closure.point_tracker(points, [link for link, _ in points])

@@ -65,7 +65,7 @@ def delta(folder, **parts):
 
 
 @pytest.mark.parametrize(('angles', 'platform'), FORWARD)
-def test_the_platform_of_a_delta_is_where_it_was_published(tmp_path, angles, platform):
+def test_delta_platform_equals_published_poses(tmp_path, angles, platform):
     closure = delta(tmp_path, input=['a1', 'a2', 'a3'], joints=['x', 'y', 'z'])
     found = closure.position(*map(radians, angles)).joints
     # The dimensions of the source are rounded to a millimetre, each by itself.
@@ -73,7 +73,7 @@ def test_the_platform_of_a_delta_is_where_it_was_published(tmp_path, angles, pla
 
 
 @pytest.mark.parametrize(('platform', 'angles'), INVERSE)
-def test_the_arms_of_a_delta_are_where_they_were_published(tmp_path, platform, angles):
+def test_delta_arm_angles_equal_published_values(tmp_path, platform, angles):
     closure = delta(tmp_path, input=['x', 'y', 'z'], joints=['a1', 'a2', 'a3'])
     found = closure.position(*platform).joints
     assert [*map(degrees, found)] == pytest.approx(angles, abs=0.05)
@@ -118,7 +118,7 @@ def hexapod(folder, place, turn):
 
 @pytest.mark.sample(8)
 @pytest.mark.parametrize('number', range(1, len(POSTURES) + 1))
-def test_all_forty_postures_of_a_hexapod_are_met(tmp_path, number):
+def test_hexapod_reaches_all_forty_published_postures(tmp_path, number):
     """Each is reached from a pose that is drawn beside it: two digits of it, or four."""
     posture = POSTURES[number - 1]
     place, first, second = (

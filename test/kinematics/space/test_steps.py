@@ -43,7 +43,7 @@ and three points near a line.
 
 
 @pytest.mark.parametrize('family', FAMILIES)
-def test_what_is_closed_is_as_exact_as_its_numbers(family):
+def test_spatial_steps_stay_within_the_rounding_bound(family):
     random, draw = Random(family), FAMILIES[family]
     slower = SLOWER.get(family, 1)
     for _ in range(sample_count(3000 // slower, 100 // slower)):
@@ -53,12 +53,12 @@ def test_what_is_closed_is_as_exact_as_its_numbers(family):
 
 
 @pytest.mark.parametrize('family', ONCE_BEYOND)
-def test_what_once_was_beyond_the_limit_is_within(family):
+def test_former_failing_cases_stay_within_the_bound(family):
     for number in ONCE_BEYOND[family]:
         assert max(draw_case(1, family, number).errors) <= LIMIT, number
 
 
-def test_an_error_would_be_seen():
+def test_error_measure_detects_an_error_of_1e_14():
     """An error of 1e-14 is above the limit, in each order."""
     numbers = [0.7, 0.3, 0.2]
     value = Tape().number(*numbers)
@@ -67,7 +67,7 @@ def test_an_error_would_be_seen():
 
 
 @pytest.mark.parametrize('apart', [sign * 10.0**-k for k in range(3, 16) for sign in (-1, 1)])
-def test_status_and_gap_are_right_on_both_sides_of_a_toggle(apart):
+def test_spatial_steps_report_status_and_gap_around_a_toggle(apart):
     random = Random(f'toggle {apart}')
     for _ in range(20):
         place, to = ([random.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(2))
