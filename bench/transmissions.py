@@ -23,7 +23,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.description import load
 from linkage_ros.processes import MeasurementError
 
-_STAND_IN = ROOT / 'test' / 'robot_models' / 'ros2_control_stand_in'
+_STAND_IN = ROOT / 'test' / 'tools' / 'models' / 'ros2_control_stand_in'
 _TRANSMISSIONS: dict[str, tuple[list[str], str]] = {
     'four_bar': (['--driven-by', 'rocker_joint', '--branch', '1'], '≤ 1'),
     'gripper': (['--driven-by', 'left_finger_joint'], ''),

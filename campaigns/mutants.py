@@ -58,9 +58,11 @@ COPIED = (
 )
 LONGEST_TEST = 180.0
 """Time for one test, in [s]: a mutant that loops fails it."""
-KINEMATICS = 'kinematics', 'test_pipeline.py', 'drives/test_limits.py'
-DYNAMICS = 'dynamics', 'drives', 'effects/test_effort.py', 'effects/test_pin_forces.py'
-TICK = 'pipeline', 'test_pipeline.py', 'test_many_linkages.py', 'test_compiled_tick.py'
+KINEMATICS = 'kinematics', 'tick/test_pipeline.py', 'stages/drives/test_limits.py'
+EFFORTS = 'stages/effects/test_effort.py', 'stages/effects/test_pin_forces.py'
+DYNAMICS = ('dynamics', 'stages/drives', *EFFORTS)
+TICK = 'tick', 'tick/test_pipeline.py', 'tick/test_many_linkages.py', 'tick/test_compiled_tick.py'
+EFFECTS = 'stages/effects', 'stages/test_contracts.py'
 BAG = ('bag',)
 TESTS: dict[str, Sequence[str]] = {
     'kinematics/closure': KINEMATICS,
@@ -68,23 +70,23 @@ TESTS: dict[str, Sequence[str]] = {
     'kinematics/plane/topology': KINEMATICS,
     'kinematics/plane/diagonals': KINEMATICS,
     'kinematics/plane/rail': KINEMATICS,
-    'kinematics/analysis/ranges': ('kinematics/test_ranges.py', *KINEMATICS),
-    'kinematics/iterated/iterated_step': ('kinematics/test_iteration.py', *KINEMATICS),
-    'kinematics/iterated/branch': ('kinematics/test_branches.py', *KINEMATICS),
+    'kinematics/analysis/ranges': ('kinematics/analysis/test_ranges.py', *KINEMATICS),
+    'kinematics/iterated/iterated_step': ('kinematics/iterated/test_iteration.py', *KINEMATICS),
+    'kinematics/iterated/branch': ('kinematics/iterated/test_branches.py', *KINEMATICS),
     'kinematics/space/plan': ('kinematics/space',),
     'kinematics/space/steps': ('kinematics/space',),
     'dynamics/motion': ('dynamics/test_motion.py', *DYNAMICS),
     'dynamics/mechanics': DYNAMICS,
     'dynamics/reactions': ('dynamics/test_reactions.py', *DYNAMICS),
-    'stages/drives/topic': ('drives', 'test_pipeline.py'),
-    'stages/drives/torque': ('drives', 'dynamics'),
-    'stages/effects/delay': ('effects/test_delay.py', 'effects', 'test_contracts.py'),
-    'tick/linkage_pipeline': (*TICK, 'test_contracts.py', 'effects'),
+    'stages/drives/topic': ('stages/drives', 'tick/test_pipeline.py'),
+    'stages/drives/torque': ('stages/drives', 'dynamics'),
+    'stages/effects/delay': ('stages/effects/test_delay.py', *EFFECTS),
+    'tick/linkage_pipeline': (*TICK, *EFFECTS),
     'tick/tick_loop': (*TICK, 'node'),
     'bag/writer': BAG,
     'bag/recorder': ('bag/test_recorder.py', *BAG),
     'bag/salvage': ('bag/test_salvage.py', *BAG),
-    'node/diagnostics': ('node', 'report'),
+    'node/diagnostics': ('node', 'tools/view/report'),
 }
 """
 Modules, and the tests beside them, the closest first.

@@ -9,7 +9,7 @@
 """
 Condition numbers of the campaign's reference are those by differences of balls.
 
-`test/study/test_enclosure.py` compares its solutions with the constraints.
+`test/tools/study/test_enclosure.py` compares its solutions with the constraints.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from linkage_ros.tools.study import accuracy_command as command, Budget, PARTS
 import pytest
 
 from .recorded import Recorded, scene_file
-from ..study.shown_budget import BUDGET
+from ..tools.study.shown_budget import BUDGET
 
 
 def run(*arguments: str, stop: Event | None = None) -> int:

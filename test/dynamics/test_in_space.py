@@ -313,7 +313,7 @@ def test_scene_publishes_the_motor_efforts_of_an_ankle():
         assert state.effort == pytest.approx([*expected, 0.0, 0.0], rel=1e-9, abs=1e-12)
 
 
-ROBOT = Path(__file__).parents[1] / 'robot_models' / 'robots' / 'ankle.urdf'
+ROBOT = Path(__file__).parents[1] / 'tools' / 'models' / 'robots' / 'ankle.urdf'
 OF_ROBOT = """
 linkage: {urdf: ankle.urdf, input: [pitch, roll]}
 drive: {sine: {amplitude: 0.1, frequency: 0.5}}

@@ -10,7 +10,7 @@
 The truth that the kinematics are measured against, to as many digits as a test asks for.
 
 It is the campaign's: a dyad in power series of balls (`campaigns.accuracy.reference`), which
-`test/study/test_enclosure.py` compares with the constraints in all families.
+`test/tools/study/test_enclosure.py` compares with the constraints in all families.
 
 An error is stated in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over the lengths and
 the crank's direction within (-π, π]: what rounding inputs and result once may cause by itself.

@@ -28,10 +28,10 @@ from linkage_ros.kinematics import (
 )
 import pytest
 
+from .analysis.test_ranges import FILES
 from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage
 from .reference import four_bar, inverted_slider_crank
 from .test_gallery import closure_of, FOLDER
-from .test_ranges import FILES
 
 # Published joints are child minus parent, and slides in metres, whatever the links' frames.
 

@@ -38,7 +38,7 @@ from .conftest import LINKAGES
 from .graph import PATIENCE, stamp_of, wait_for
 from .turning import turning
 from ..browser import chromium
-from ..view.served import served
+from ..tools.view.served import served
 
 SCENE = """
 rate: 200

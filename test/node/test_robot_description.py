@@ -24,7 +24,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .graph import wait_for
-from ..robot_models.walked import Walked
+from ..tools.models.walked import Walked
 
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 TOPIC = '/robot_description'

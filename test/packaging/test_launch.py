@@ -23,9 +23,9 @@ from linkage_ros.resources import linkage_names, spatial_linkage_names
 from linkage_ros.tick import Pipeline
 import pytest
 
-from ..robot_models.walked import BEGIN, heard, MS, Walked
 from ..support.messages import joint_state, read_joint_state
 from ..support.scenes import FOUR_BAR, pipeline_of
+from ..tools.models.walked import BEGIN, heard, MS, Walked
 
 
 @dataclass

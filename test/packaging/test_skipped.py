@@ -38,7 +38,8 @@ def collect(root, hidden, *places):
     return done.returncode, done.stdout + done.stderr
 
 
-FOLDERS = ['test'] if TAKES_ALL else [f'test/{name}' for name in ('fmu', 'synthesis', 'view')]
+TOOLS = ('models/fmu', 'design', 'view')
+FOLDERS = ['test'] if TAKES_ALL else [f'test/tools/{name}' for name in TOOLS]
 
 
 def test_tests_without_optional_packages_are_collected(root):

@@ -18,10 +18,10 @@ from linkage_ros.kinematics import SpaceClosure, SpatialJoint
 import numpy as np
 import pytest
 
-from ...robot_models.heads import head
-from ...robot_models.walked import Walked
+from ...tools.models.heads import head
+from ...tools.models.walked import Walked
 
-ROBOT = Path(__file__).parents[2] / 'robot_models' / 'robots' / 'rods_on_three_hinges.urdf'
+ROBOT = Path(__file__).parents[2] / 'tools' / 'models' / 'robots' / 'rods_on_three_hinges.urdf'
 WITH_RODS = ('rssr', 'delta', 'ankle', 'ankle_motors')
 RNG = np.random.default_rng(29)
 
