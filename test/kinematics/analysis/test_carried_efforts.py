@@ -15,7 +15,7 @@ from linkage_ros import DefinitionError, load
 import numpy as np
 import pytest
 
-from ..support.scenes import closure_of
+from ...support.scenes import closure_of
 
 
 def turned(axis, angle, vector):

@@ -16,7 +16,7 @@ from linkage_ros.kinematics import find_reached_values
 import numpy as np
 import pytest
 
-from ..support.scenes import FOUR_BAR, LINKAGES
+from ...support.scenes import FOUR_BAR, LINKAGES
 
 ANKLE = (LINKAGES / 'space' / 'ankle_motors.yaml').read_text()
 RODS = {
