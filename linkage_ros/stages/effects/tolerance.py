@@ -47,7 +47,7 @@ from typing import Any
 
 from linkage_ros.description import Components, each_part, number, part_names
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import Closure, Linkage, put_together, SpaceLinkage
+from linkage_ros.kinematics import Closure, Linkage, SpaceLinkage
 from linkage_ros.stages.effects.effect import LinkageEffect
 
 TRUNCATED = 3.0
@@ -88,6 +88,8 @@ class ToleranceEffect(LinkageEffect):
         """Return the linkage as manufactured; raise `DefinitionError` if it does not close."""
         altered: Linkage | SpaceLinkage
         if isinstance(linkage, SpaceLinkage):
+            from linkage_ros.kinematics import put_together  # local import: loads numpy
+
             holes = linkage.holes
             found: Any = {hole: self._deviation_of(hole, 3, random) for hole in holes}
             if not any(map(any, found.values())):
