@@ -450,10 +450,11 @@ def _common_gravity(parts: Sequence[ModelPart]) -> tuple[float, ...]:
     ]
     for count, gravity in enumerate(gravities):
         if gravity != gravities[0]:
+            axes = len(parts[count].closure.linkage.axes)
             raise PartError(
                 count,
                 'loads.gravity',
-                f'[{format_numbers(*gravity)}] differs from the first linkage',
+                f'[{format_numbers(*gravity[:axes])}] differs from the first linkage',
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )
