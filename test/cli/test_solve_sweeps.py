@@ -42,7 +42,7 @@ def test_the_arms_of_a_delta_are_swept_in_turn(tmp_path: Path) -> None:
     assert places(second) == pytest.approx(turned, abs=1e-9)
 
 
-def test_the_others_are_held_where_at_says(tmp_path: Path) -> None:
+def test_sweep_holds_the_other_inputs_at_their_values(tmp_path: Path) -> None:
     found = rows(
         tmp_path, 'five_bar', '--at', '60', '100', '--over', 'right_crank_joint', '--from', '90',
         '--to', '110', '--steps', '2',
@@ -66,7 +66,7 @@ def test_the_others_are_held_where_at_says(tmp_path: Path) -> None:
         (['delta', '--over', 'b'], '--over b: is not an input; name a1, a2, a3'),
     ],
 )
-def test_an_input_that_is_not_named_is_refused(
+def test_sweep_refuses_unknown_inputs(
     capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
 ) -> None:
     assert main(['solve', *arguments]) == 2

@@ -137,7 +137,7 @@ def test_relay_accepts_rest_where_the_joint_turns_back(relay):
     assert list(found.velocities) == [0.0]
 
 
-def test_an_effort_has_no_lever_on_the_crank_where_the_joint_turns_back(relay):
+def test_turning_back_joint_puts_no_effort_on_the_crank(relay):
     found = relay.turn_state(JointState(name=['rocker_joint'], position=[END], effort=[2.0]))
     assert list(found.effort) == pytest.approx([0.0], abs=1e-6)
     message = JointState(name=['rocker_joint'], position=[1.2], effort=[nan])

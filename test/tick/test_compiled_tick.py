@@ -160,7 +160,7 @@ def test_compiled_tick_carries_an_estimated_acceleration(name):
         ('space/ankle_motors', 'effort: {measured: true, joints: [pitch, roll]}', ''),
     ],
 )
-def test_both_carry_the_same_measured_efforts(name, effects, loads):
+def test_compiled_tick_carries_the_same_measured_efforts(name, effects, loads):
     linkage = (ROOT / 'config' / 'linkages' / f'{name}.yaml').read_bytes()
     linkage = re.sub(rb', limits: [^}]*', b'', linkage)
     check(linkage, f'{DRIVES["carried"]}\n{loads}effects: {{{effects}}}', looked=20)

@@ -44,7 +44,7 @@ def in_space(*plane):
 
 
 @pytest.mark.parametrize('crank', [0.3, 1.1, 2.4, 4.0, 5.6])
-def test_a_crank_presses_on_its_rocker_along_the_coupler(crank):
+def test_carried_effort_equals_statics_along_the_coupler(crank):
     a, b, c, d = 0.04, 0.12, 0.08, 0.1
     tip = np.array([a * cos(crank), a * sin(crank)])
     across = np.array([d, 0.0]) - tip
@@ -129,7 +129,7 @@ STEP = 1e-5
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_power_is_the_same_on_both_sides_by_differences_of_poses(name):
+def test_carried_efforts_keep_the_power(name):
     plain = load(name)
     names = [each for each in NAMES[name] if each in plain.joint_names or '.' in each]
     closure = plain.measuring(*[each for each in names if each not in plain.input_names])
@@ -163,7 +163,7 @@ def test_power_is_the_same_on_both_sides_by_differences_of_poses(name):
         assert back == pytest.approx(efforts, rel=1e-9)
 
 
-def test_no_effort_is_told_where_none_is_determined():
+def test_undetermined_efforts_are_left_out():
     closure = load('four_bar')
     ends = [closure.branches('rocker_joint')[0].least, closure.branches('rocker_joint')[0].most]
     for end in ends:
@@ -224,7 +224,7 @@ def test_a_five_bar_with_a_stretched_arm_bears_any_force_along_it():
         ),
     ],
 )
-def test_names_that_do_not_fit_are_refused(efforts, to, message):
+def test_carry_efforts_refuses_wrong_joint_names(efforts, to, message):
     closure = load('four_bar')
     with pytest.raises(DefinitionError) as error:
         closure.carry_efforts(closure.position(1.0), efforts, to)

@@ -112,6 +112,6 @@ def test_motors_of_an_ankle_within_the_limits_of_pitch_and_roll():
     check(found, [[motor_of(name, *joints) for joints in box] for name in RODS])
 
 
-def test_nothing_is_told_of_a_single_input_nor_without_limits():
+def test_reached_values_need_several_limited_inputs():
     assert reached(f'{FOUR_BAR[:-1]}, input: {{limits: [0.5, 2]}}}}') == []
     assert reached(ANKLE.replace(', limits: [-0.6, 0.6]', '')) == []

@@ -207,7 +207,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_what_cannot_be_moved_is_refused(name):
+def test_torque_drive_refuses_unmovable_inputs(name):
     parameters, line = REFUSED[name]
     with pytest.raises(DefinitionError) as caught:
         five_bar(**parameters)
@@ -245,7 +245,7 @@ def test_brakes_hold_inputs_without_a_command():
     assert state.effort[0] == 0.8
 
 
-def test_the_run_ends_where_motors_meet_their_inputs_too_often_and_the_scene_says_so():
+def test_too_many_impacts_in_the_play_are_reported():
     def pushed(on_chatter):
         play = PlayParameters(1e-6, 1e-3, 1.0, on_chatter)
         crank = five_bar(play=play)

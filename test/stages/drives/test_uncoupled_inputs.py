@@ -119,7 +119,7 @@ def run(name, numbers, milliseconds=250):
 
 
 @pytest.mark.parametrize('name', SCENES)
-def test_each_of_two_uncoupled_inputs_moves_as_it_does_alone(name):
+def test_uncoupled_inputs_move_as_each_alone(name):
     both = run(name, (1, 2))
     for n in (1, 2):
         alone = run(name, (n,))[n]
@@ -140,7 +140,7 @@ LIMITS = {
 
 
 @pytest.mark.parametrize('rates', [(0.0, 0.0), (0.0, 1.5)])
-def test_friction_holds_each_of_two_uncoupled_inputs_as_it_holds_it_alone(rates):
+def test_friction_holds_uncoupled_inputs_as_each_alone(rates):
     def pipeline_for(first, *others):
         inputs = [f'crank{n}_joint: {{rate: {rates[n - 1]}, start: 0.{n}}}' for n in others]
         joints = [LIMITS[n] for n in (first, *others)]

@@ -81,7 +81,7 @@ def test_each_motor_has_a_publisher_of_its_own():
 
 
 @pytest.mark.parametrize('efforts', [[], [nan]])
-def test_without_a_measured_effort_none_is_published(efforts):
+def test_sample_without_effort_publishes_none(efforts):
     scene = f'{BEGIN}effects: {{effort: {{measured: true, joints: [rocker_joint]}}}}'
     pipeline = pipeline_of(scene, FOUR_BAR)
     at, found = published(pipeline, (['crank_joint'], [1.0], efforts))
@@ -91,7 +91,7 @@ def test_without_a_measured_effort_none_is_published(efforts):
     assert not published(pipeline, (['crank_joint'], [1.2], efforts), at=NOW + 2)[1]
 
 
-def test_where_the_rocker_turns_back_no_effort_is_published():
+def test_no_effort_is_published_where_the_rocker_turns_back():
     scene = f'{BEGIN}effects: {{effort: {{measured: true, joints: [rocker_joint]}}}}'
     pipeline = pipeline_of(scene, FOUR_BAR)
     end = load('four_bar').branches('rocker_joint')[0].most
@@ -117,7 +117,7 @@ def test_where_the_rocker_turns_back_no_effort_is_published():
         ),
     ],
 )
-def test_what_does_not_fit_is_told(scene, reason):
+def test_wrong_measured_effort_is_refused_in_one_line(scene, reason):
     with pytest.raises((DefinitionError, FileError)) as error:
         pipeline_of(scene, FOUR_BAR)
     assert reason in str(error.value)

@@ -116,7 +116,7 @@ def test_all_faces_of_a_body_are_covered():
     assert 0.5 * np.linalg.norm(sides, axis=1).sum() == pytest.approx(hull.area, rel=1e-9)
 
 
-def test_a_curve_is_the_way_of_a_traced_point_and_a_trail_its_last_part():
+def test_spatial_markers_draw_curves_and_trails_of_traced_points():
     linkage = RSSR + b'traced: [B]\n'
     whole = pipeline_of(TURN.format('').encode(), linkage)
     (curve,) = named(markers_at(whole), 'traces')
@@ -165,7 +165,7 @@ def test_arrows_show_the_forces_and_the_effort_that_are_published():
         assert angles[-1] - angles[0] == pytest.approx(0.02 * effort / radius[0] ** 2, rel=1e-9)
 
 
-def test_links_are_red_near_a_toggle_and_an_open_loop_says_by_how_much():
+def test_spatial_markers_show_toggles_and_open_loops():
     name = 'spherical_four_bar'
     near = markers_of(name, 91.1370 * np.pi / 180)
     away = markers_of(name, 0.0)

@@ -118,13 +118,13 @@ def test_masses_stay_on_their_parts():
     assert found == pytest.approx(expected[np.triu_indices(3)], abs=1e-15)
 
 
-def test_what_has_more_equations_than_it_needs_is_refused_with_the_reason():
+def test_tolerance_of_an_overconstrained_linkage_is_refused():
     bennett = load('bennett').linkage
     with pytest.raises(DefinitionError, match=r'the parts do not fit: they miss each other by'):
         made(ToleranceEffect(1e-4), bennett)
 
 
-def test_a_scene_takes_it_and_names_three_numbers():
+def test_spatial_scene_takes_tolerances_of_three_numbers():
     at_work = pipeline('tolerance: {standard_deviation: 1.0e-4}, pin_forces: {}')
     (line,) = at_work.linkages
     assert line.closure.linkage.points['B'] != pytest.approx(RSSR.points['B'], abs=1e-6)

@@ -47,7 +47,7 @@ def off(model, state, closure):
 
 @pytest.mark.sample(4)
 @pytest.mark.parametrize('name', spatial_linkage_names())
-def test_it_starts_closed_and_moves_as_the_closure_says(name):
+def test_spatial_mjcf_starts_closed_and_moves_as_the_closure(name):
     closure = load(name)
     model, state = started(mujoco_model(name, [ModelPart(closure)]))
     assert model.neq >= 1

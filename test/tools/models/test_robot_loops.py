@@ -654,7 +654,7 @@ def open_leg(number, rod, turns):
     )
 
 
-def test_a_robot_may_have_more_loops_than_move_together(tmp_path):
+def test_loop_bound_counts_loops_that_move_together(tmp_path):
     # Every other leg is stretched out at 0, and found from joints that are nudged.
     legs = {n: (0.22 + 0.004 * n, ((0.3, 0.2, 1.1), (0.0, 0.0, 0.0))[n % 2]) for n in range(21)}
     text = ''.join(open_leg(number, *leg) for number, leg in legs.items())

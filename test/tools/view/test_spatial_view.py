@@ -88,7 +88,7 @@ def drag(page: Any, start: np.ndarray, end: np.ndarray) -> None:
 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize('name', COMPILED)
-def test_every_place_is_where_the_closure_says(
+def test_page_places_points_as_the_closure(
     browser: Any, stills: Callable[[str], Path], name: str
 ) -> None:
     closure = load(name)
@@ -107,7 +107,7 @@ def test_every_place_is_where_the_closure_says(
                 assert page.evaluate('View.state().joints') == pytest.approx(position.joints)
 
 
-def test_a_point_follows_the_hand_and_beside_it_a_drag_turns_the_camera(
+def test_drag_moves_a_point_or_turns_the_camera(
     browser: Any, stills: Callable[[str], Path]
 ) -> None:
     with shown(browser, stills('rssr')) as page:
@@ -173,7 +173,7 @@ def test_curves_and_toggles_are_those_of_the_linkage(
         assert toggles == pytest.approx([each.value for each in closure.singular_inputs])
 
 
-def test_what_has_no_program_is_asked_of_the_server(
+def test_page_without_a_program_asks_the_server(
     browser: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr('linkage_ros.tools.view.model.program_of', lambda _: None)
