@@ -81,6 +81,7 @@ def planar_group_of_two_inputs():
     return Closure(replace(linkage, inputs=tuple(inputs)))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('language', [JavaScript(), C('hexapod', header=False), PythonModule(2)])
 def test_source_writers_refuse_a_hexapod_with_too_many_cells(language):
     told = '6 inputs .* too many cells; give the inputs of the file limits'

@@ -8,6 +8,7 @@
 """Spatial linkages from file to joints: exact, consistent, and those of the books."""
 
 from dataclasses import replace
+from functools import cache
 from math import acos, atan2, cos, dist, hypot, pi, radians, remainder, sin, sqrt, tan, tau
 from pathlib import Path
 from random import Random
@@ -38,6 +39,10 @@ NAMES = [*spatial_linkage_names(), *sorted(path.stem for path in FOLDER.glob('*.
 def closure_of(name):
     own = FOLDER / f'{name}.yaml'
     return load_in_space(own if own.is_file() else name)
+
+
+shared_closure = cache(closure_of)
+"""The same for tests that only ask it: it is planned once."""
 
 
 def test_numpy_numbers_give_the_same_bits():
@@ -87,7 +92,7 @@ def joints_at(closure, inputs):
 
 @pytest.mark.parametrize('name', NAMES)
 def test_drawn_pose_is_solved_at_its_inputs(name):
-    closure = closure_of(name)
+    closure = shared_closure(name)
     linkage = closure.linkage
     position = closure.position(*linkage.pose.inputs)
     assert position.status is Status.CLOSED
@@ -101,7 +106,7 @@ def test_drawn_pose_is_solved_at_its_inputs(name):
 
 @pytest.mark.parametrize('name', NAMES)
 def test_rates_and_accelerations_equal_numerical_derivatives(name):
-    closure, step = closure_of(name), 1e-4
+    closure, step = shared_closure(name), 1e-4
     for inputs, rates, changes in states_of(closure, 10, 0.2):
         start, first, second = np.array(inputs), np.array(rates), np.array(changes)
         before, now, after = (
@@ -131,7 +136,7 @@ def _differences(values, step):
 
 @pytest.mark.parametrize('name', NAMES)
 def test_spatial_links_keep_their_lengths_and_axes(name):
-    closure = closure_of(name)
+    closure = shared_closure(name)
     linkage = closure.linkage
     for inputs, _, _ in states_of(closure, 20):
         position = closure.position(*inputs)
@@ -156,7 +161,7 @@ def _rotate(quaternion, vector):
 
 @pytest.mark.parametrize('name', NAMES)
 def test_compiled_spatial_linkages_equal_the_steps(name):
-    closure = closure_of(name)
+    closure = shared_closure(name)
     compiled = closure.compile_linkage(2)
     states = list(states_of(closure, 30, 0.1))
     fast = 0
@@ -180,7 +185,7 @@ def test_compiled_spatial_linkages_equal_the_steps(name):
 
 
 def test_delta_inverse_and_delta_return_the_inputs():
-    arms, platform = closure_of('delta_inverse'), closure_of('delta')
+    arms, platform = shared_closure('delta_inverse'), shared_closure('delta')
     for inputs, _, _ in states_of(arms, 200):
         there = arms.position(*inputs)
         back = platform.position(*there.joints)
@@ -192,7 +197,7 @@ def test_delta_inverse_and_delta_return_the_inputs():
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
 def test_universal_joint_follows_the_textbook_formula(angle):
     """tan(out) = tan(in)·cos β if the fork of the input lies in the plane of the shafts."""
-    closure = closure_of('hooke_joint')
+    closure = shared_closure('hooke_joint')
     position = closure.position(angle)
     # In the pose the pin of the input is across that plane: in = 90° of the formula.
     expected = atan2(cos(radians(30)) * sin(angle), cos(angle))
@@ -205,7 +210,7 @@ def test_universal_joint_follows_the_textbook_formula(angle):
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 25).tolist())
 def test_bennett_linkage_follows_the_textbook_formula(angle):
     """tan(θ1/2)·tan(θ2/2) is constant: sin((β + α)/2)/sin((β − α)/2) (Bennett, 1914)."""
-    closure = closure_of('bennett')
+    closure = shared_closure('bennett')
     position = closure.position(angle)
     alpha, beta, start = radians(40), radians(75), radians(70)
     constant = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
@@ -220,7 +225,7 @@ def test_planar_four_bar_in_space_equals_the_planar_one(tmp_path):
     b, c = dist((0.0, 0.04), (0.11, 0.08)), dist((0.1, 0.0), (0.11, 0.08))
     lengths = f'{{a: 0.04, b: {b!r}, c: {c!r}, d: 0.1, assembly: left}}'
     planar.write_text(f'four_bar: {lengths}\n')
-    flat, space = lr.load(planar), closure_of('four_bar')
+    flat, space = lr.load(planar), shared_closure('four_bar')
     start = flat.position(pi / 2.0)
     for angle in np.linspace(0.0, 6.0, 50).tolist():
         one, other = flat.position(angle), space.position(angle)
@@ -230,7 +235,7 @@ def test_planar_four_bar_in_space_equals_the_planar_one(tmp_path):
 
 
 def test_wishbone_states_do_not_depend_on_their_order():
-    closure = closure_of('wishbone')
+    closure = shared_closure('wishbone')
     states = [inputs for inputs, _, _ in states_of(closure, 100)]
     forward = [closure.position(*inputs).joints for inputs in states]
     assert [closure.position(*inputs).joints for inputs in reversed(states)] == forward[::-1]
@@ -248,7 +253,7 @@ def test_planar_jacobian_holds_the_joint_rates():
 @pytest.mark.parametrize('angle', np.linspace(-3.0, 3.0, 13).tolist())
 def test_spatial_slider_crank_follows_the_textbook_formula(angle):
     """The crank pin is at (0, 0.1 + r·sin, 0.12 + r·cos); the rod is 0.3 m long (Haug, 1989)."""
-    closure = closure_of('spatial_slider_crank')
+    closure = shared_closure('spatial_slider_crank')
     position = closure.position(angle)
     y, z = 0.1 - 0.08 * sin(angle), 0.12 + 0.08 * cos(angle)
     assert position['slide'] == pytest.approx(sqrt(0.3**2 - y * y - z * z), abs=1e-15)
@@ -257,7 +262,7 @@ def test_spatial_slider_crank_follows_the_textbook_formula(angle):
 @pytest.mark.parametrize('angle', np.linspace(-1.2, 1.5, 13).tolist())
 def test_spherical_four_bar_keeps_angles_between_its_axes(angle):
     """The rocker of a·cos q + b·sin q + c = 0, which says that coupler and last keep their arc."""
-    closure = closure_of('spherical_four_bar')
+    closure = shared_closure('spherical_four_bar')
     position = closure.position(angle)
     axes = {name: np.array(hinge.axis) for name, hinge in closure.linkage.hinges.items()}
     units = {name: axis / np.linalg.norm(axis) for name, axis in axes.items()}
@@ -275,7 +280,7 @@ def test_spherical_four_bar_keeps_angles_between_its_axes(angle):
 
 def test_delta_platform_equals_the_intersection_of_three_spheres():
     """About the elbows, moved by the platform's points: two planes, and the lower of two roots."""
-    closure = closure_of('delta')
+    closure = shared_closure('delta')
     points = {name: np.array(place) for name, place in closure.linkage.points.items()}
     platform = np.array([0.0, 0.0, -0.5])
     for inputs, _, _ in states_of(closure, 20):
@@ -300,7 +305,7 @@ def test_delta_platform_equals_the_intersection_of_three_spheres():
 
 def test_wishbone_points_equal_a_40_digit_solution():
     """Upper ball and steering ball are found from their distances, to 40 digits (mpmath)."""
-    closure = closure_of('wishbone')
+    closure = shared_closure('wishbone')
     drawn = {name: [mpf(part) for part in place] for name, place in closure.linkage.points.items()}
     ends = [
         *(('upper', one) for one in ('u1', 'u2', 'lower')),
@@ -332,7 +337,7 @@ def test_wishbone_points_equal_a_40_digit_solution():
 
 
 def test_idle_rod_is_named_and_does_not_spin():
-    closure = closure_of('rssr')
+    closure = shared_closure('rssr')
     assert closure.idle == ('rod',)
     position = closure.position(0.5)
     places = closure.points(position)
@@ -345,7 +350,7 @@ def test_idle_rod_is_named_and_does_not_spin():
 
 def test_ratio_that_holds_only_in_the_pose_is_refused(tmp_path):
     """To first order it is redundant; over the range it is missed."""
-    closure = closure_of('rssr')
+    closure = shared_closure('rssr')
     slope = closure.jacobian(closure.position(0.0))[0, 0].item()
     file = tmp_path / 'rssr.yaml'
     text = named_file('rssr', 'linkages').read_text('utf-8')
