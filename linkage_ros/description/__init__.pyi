@@ -23,7 +23,10 @@ from linkage_ros.description.file_kinds import (
     BINARY as BINARY,
     kind_of_bytes as kind_of_bytes,
 )
-from linkage_ros.description.grammar import name_or_names as name_or_names
+from linkage_ros.description.grammar import (
+    name_or_names as name_or_names,
+    NameOrNames as NameOrNames,
+)
 from linkage_ros.description.linkage_file import (
     checked_closure as checked_closure,
     find_assemblies as find_assemblies,

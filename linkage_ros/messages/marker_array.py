@@ -135,9 +135,10 @@ class MarkerArrayWriter:
         x, y, z = (last - first for first, last in zip(start, end, strict=True))
         length = hypot(x, y, z)
         middle = [0.5 * (first + last) for first, last in zip(start, end, strict=True)]
-        # Half of the turn about the bisector of the z axis and the rod.
-        double = hypot(x, y, length + z)
-        turn = (-y, x, 0.0, length + z) if double > 1e-6 * length else (1.0, 0.0, 0.0, 0.0)
+        # Half of the turn about the bisector of the z axis and the rod, which may point down.
+        across = hypot(x, y)
+        above = length + z if z > 0.0 else across * across / ((length - z) or 1.0)
+        turn = (-y, x, 0.0, above) if across or z > 0.0 else (1.0, 0.0, 0.0, 0.0)
         turned = hypot(*turn)
         _POSE.pack_into(self._buffer, where['pose'], *middle, *(one / turned for one in turn))
         _XYZ.pack_into(self._buffer, where['scale'], *self._widths[number], length)

@@ -32,6 +32,7 @@ from linkage_ros.description import (
     linkage_schema,
     load_scene,
     Name,
+    NameOrNames,
     NamesOf,
     Number,
     number,
@@ -281,6 +282,8 @@ def values_of(kind: Any) -> st.SearchStrategy[Any]:
             good = pair
         case Name():
             good = part
+        case NameOrNames():
+            good = part | st.lists(part, max_size=3)
         case NamesOf():
             good = st.lists(part | st.just(''), max_size=2)
         case ParameterGroup():

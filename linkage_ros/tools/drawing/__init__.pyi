@@ -6,8 +6,8 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-# Read first: svg, draw_linkage, paint_linkage, paint_picture, SpaceDrawing, Camera, animate,
-# links_dxf, plot_joints.
+# Read first: svg, draw_linkage, paint_linkage, paint_picture, Camera, animate, links_dxf,
+# plot_joints.
 
 from linkage_ros.tools.drawing.animation import (
     animate as animate,
