@@ -139,14 +139,12 @@ class NameOrNames(ListOf):
     """A name, or a list of names."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
-        if not isinstance(content.mapping.get(key), list):
-            return (content.text(key),)
-        if not (names := content.texts(key)):
-            raise content.error(key, 'is empty', 'name one, or leave it out')
-        return tuple(names)
+        if isinstance(content.mapping.get(key), list):
+            return tuple(content.texts(key))
+        return (content.text(key),)
 
     def json_schema(self) -> Schema:
-        several = {**ListOf.json_schema(self), 'minItems': 1}
+        several = ListOf.json_schema(self)
         return {'description': self.meaning, 'anyOf': [self.of.json_schema(), several]}
 
     def values_text(self) -> str:
