@@ -55,7 +55,7 @@ MASKS = (
 """What differs from machine to machine, and what is written in its place."""
 
 
-PROGRESS = re.compile(r': (\d+ of \d+|ended after [\d.]+ s)$')
+PROGRESS = re.compile(r': \d+( of \d+)?$|: ended after [\d.]+ s$')
 """A line that a command prints only if it takes long."""
 
 

@@ -37,7 +37,7 @@ def refused(linkage: Run, *typed: str) -> str:
     assert (answer.returncode, answer.stdout) == (2, '')
     # Before it, what takes long tells how far it is.
     lines = answer.stderr.splitlines()
-    (line,) = (line for line in lines if ' made: ' not in line)
+    (line,) = (line for line in lines if ' made: ' not in line and ' planned: ' not in line)
     return line.removeprefix('linkage compile: ')
 
 
