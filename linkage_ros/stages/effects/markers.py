@@ -30,7 +30,6 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from itertools import repeat
 from math import pi, radians, sin, sqrt
 from typing import Any
 
@@ -138,14 +137,14 @@ class Markers:
             # A line has its full number of points from the start.
             write.move_points(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
         # Other effects may need forces that no marker shows.
-        forces = (motion.reactions or repeat((0.0,))) if pile.forces else ()
+        forces = (motion.reactions or [(0.0,)] * len(pile.forces)) if pile.forces else ()
         axes = len(self._closure.linkage.axes)
-        for marker, start, wrench in zip(pile.forces, placed.joints, forces, strict=False):
+        for marker, start, wrench in zip(pile.forces, placed.joints, forces, strict=True):
             # Behind the force of a wrench there is its moment.
             fx, fy, fz, *_ = (*wrench[:axes], 0.0, 0.0, 0.0)
             _show_arrow(write, marker, self._arrows.force_arrow(start, (fx, fy, fz)))
-        efforts = (motion.efforts or repeat(0.0)) if pile.efforts else ()
-        for marker, arm, effort in zip(pile.efforts, placed.drives, efforts, strict=False):
+        efforts = (motion.efforts or [0.0] * len(pile.efforts)) if pile.efforts else ()
+        for marker, arm, effort in zip(pile.efforts, placed.drives, efforts, strict=True):
             _show_arrow(write, marker, self._arrows.effort_arrow(arm, effort))
         write.show_marker(pile.status, False)
         return write.message_at(now)
