@@ -50,7 +50,7 @@ OTHER_TEXT = '#a86b00'
 
 NAME_INK = '#35608a'
 GHOST = '#cfcfcf'
-LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
+LAYERS: dict[str, int] = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
 
