@@ -182,7 +182,7 @@ COMMANDS = {
     'fmu': [_FILE, '-o', 'x.fmu'],
     'scene': [_FILE],
     'simulate': [_FILE, '--seconds', '0.05', '-o', 'x.csv'],
-    'accuracy': [_FILE, '--quick', '--only', 'effects', '--page', 'x.html'],
+    'accuracy': [_FILE, '--quick', '--only', 'effects', '-o', 'x.html'],
     'replay': ['bag', '--scene', _FILE],
     'run': [_FILE, '--plain', '--seconds', '0.1', '--runs', 'runs'],
     'relay': [_FILE, '--joint', 'rocker_joint', '--seconds', '0.1'],

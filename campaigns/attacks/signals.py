@@ -45,7 +45,7 @@ _COMMANDS = {
     'mjcf': ['jansen_leg.yaml', '-o', 'x.xml'],
     'fmu': ['jansen_leg.yaml', '-o', 'x.fmu'],
     'scene': ['jansen_leg.yaml'],
-    'accuracy': ['jansen_leg.yaml', '--only', 'errors', '--page', 'x.html'],
+    'accuracy': ['jansen_leg.yaml', '--only', 'errors', '-o', 'x.html'],
     'synthesize': ['--function', 'log10(x)', '--range', '1', '2', '--crank-range', '0', '60',
                    '--rocker-range', '0', '90', '--free-zeros', '--candidates', '100000000'],
 }  # fmt: skip

@@ -39,7 +39,7 @@ LINKAGES = ('.yaml', '.yml')
 
 SCENE_HELP = 'scene file or linkage file, or a name of linkage gallery'
 
-_WRITTEN = ('output', 'picture', 'draw', 'page')
+_WRITTEN = ('output', 'draw')
 """Arguments that name a file to write."""
 
 _ALL_DIGITS = 1e15

@@ -10,7 +10,7 @@
 Run a scene as fast as possible, without ROS: once, to a bag or a table, or often, as a study.
 
 A study runs the scene with other seeds and other values of its keys. It writes a table with a row
-for each run, and a picture of the spread over time. Tables have the units of the scene's file. A
+for each run, or a picture of the spread over time. Tables have the units of the scene's file. A
 stopped study continues when it is called again with the same scene and options: OUTPUT.part holds
 its finished runs until then.
 """
@@ -110,9 +110,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'keys give all combinations',
     )
     study.add_argument(
-        '--picture', type=Path, metavar='OUTPUT', help='the picture, beside a table'
-    )
-    study.add_argument(
         '--workers',
         type=bounded_number(1, 1024, int),
         metavar='N',
@@ -135,7 +132,6 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if arguments.seeds > 1 or sweeps:
         return _run_study(arguments, sweeps, stop)
     for given, option in (
-        (arguments.picture, '--picture'),
         (arguments.workers, '--workers'),
         (arguments.dask, '--dask'),
     ):
@@ -213,16 +209,11 @@ def _run_study(
     """Run a study; return 1 if a signal stopped it, or no run succeeded."""
     output: Path = arguments.output
     check_output_name(output, (*TABLE_KINDS, *PICTURES))  # not a folder
-    pictures = [
-        file for file in (output, arguments.picture) if file and file.suffix not in TABLE_KINDS
-    ]
-    if pictures:
-        check_output_name(pictures[-1], PICTURES)
-        find_tool(
-            'spread'
-        ).picture_settings()  # without matplotlib, say so before the study is run
     if output.suffix in TABLE_KINDS:
         check_kind(output)
+    else:
+        # Without matplotlib, say so before the study is run.
+        find_tool('spread').picture_settings()
     scene = _load_scene(arguments)
     ticks = check_simulated(scene, arguments.seconds)
     runs = runs_of(sweeps, arguments.seeds, scene.seed)
@@ -245,7 +236,7 @@ def _run_study(
             kept = f'{len(found)} of {len(runs)} runs are kept in {finished.file}'
             _print_note(f'stopped; {kept}; the same command continues' if found else 'stopped')
             return 1
-        return _write_results(arguments, scene, runs, finished, pictures)
+        return _write_results(arguments, scene, runs, finished)
 
 
 def _write_results(
@@ -253,7 +244,6 @@ def _write_results(
     scene: Scene,
     runs: Sequence[Settings],
     finished: FinishedRuns,
-    pictures: Sequence[Path],
 ) -> int:
     """Write the results of a study; return 1 if no run succeeded."""
     output, found = arguments.output, finished.outcomes
@@ -274,9 +264,9 @@ def _write_results(
         with table_file(output, heads, _WHOLE) as write:
             write(rows)
         print(f'{output}: {len(rows)} runs, {len(heads)} columns')
-    for picture in pictures:
-        _draw_runs(scene, arguments.seconds, found, picture)
-        print(picture)
+    else:
+        _draw_runs(scene, arguments.seconds, found, output)
+        print(output)
     finished.remove_file()
     return 0
 

@@ -99,7 +99,8 @@ def test_tuned_scene_holds_the_settings_of_the_answer(
 
 def test_accuracy_writes_a_page_and_a_picture(by_hand: Any, tmp_path: Path) -> None:
     page, picture = tmp_path / 'x.html', tmp_path / 'x.svg'
-    assert run('demo', '--page', str(page), '--picture', str(picture)) == 0
+    for file in (page, picture):
+        assert run('demo', '-o', str(file)) == 0
     assert page.read_text('utf-8').startswith('<!doctype html>')
     assert picture.read_text('utf-8').startswith('<svg')
 
@@ -110,7 +111,7 @@ def test_stopped_accuracy_command_writes_no_file(
     monkeypatch.chdir(tmp_path)
     stop = Event()
     stop.set()
-    assert run('slider_crank', '--quick', '--page', 'x.html', stop=stop) == 1
+    assert run('slider_crank', '--quick', '-o', 'x.html', stop=stop) == 1
     assert not list(tmp_path.iterdir())
 
 

@@ -44,7 +44,7 @@ READS = {
     'fmu': (['four.yaml', '-o', 'x.fmu'], PARSE),
     'scene': (['four.yaml'], PARSE),
     'simulate': (['four.yaml', '-o', 'x.csv'], PARSE),
-    'accuracy': (['four.yaml', '--page', 'page.html'], PARSE),
+    'accuracy': (['four.yaml', '-o', 'page.html'], PARSE),
     'demo': ([], PARSE),
     'import': (
         ['robot.urdf', '-o', 'x.yaml'],

@@ -158,13 +158,13 @@ def test_runs_failing_for_one_reason_name_it_once(noisy, capsys):
 
 def test_study_draws_the_spread_of_joints(noisy):
     assert main(['simulate', 'noisy.yaml', '--seconds', '0.1', '--seeds', '3', '--workers', '1',
-                 '-o', 'x.parquet', '--picture', 'x.svg']) == 0  # fmt: skip
+                 '-o', 'x.svg']) == 0  # fmt: skip
     drawn = Path('x.svg').read_text()
     for text in ('noisy: 3 runs of 0.1 s', 'rocker_joint [rad]', 'less the median [rad]'):
         assert f'<!-- {text} -->' in drawn
 
 
 def test_study_options_without_a_study_are_refused(noisy, capsys):
-    for option in (['--picture', 'x.png'], ['--workers', '2'], ['--dask', 'tcp://x:1']):
+    for option in (['--workers', '2'], ['--dask', 'tcp://x:1']):
         assert main(['simulate', 'noisy.yaml', '-o', 'x.csv', *option]) == 2
         assert f'{option[0]}: is for a study; add --seeds or --sweep' in capsys.readouterr().err

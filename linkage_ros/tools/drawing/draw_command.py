@@ -48,7 +48,6 @@ from linkage_ros.description import (
 )
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
-    PlanarClosure,
     prepare_view,
     read_drawn_pose,
     SpaceClosure,
@@ -81,13 +80,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
     add_camera(parser)
-    parts = parser.add_argument_group('parts, in a DXF')
-    parts.add_argument(
-        '--width', type=bounded_number(1e-6, 1e6), metavar='MM', help='width of a bar, in mm'
-    )
-    parts.add_argument(
-        '--hole', type=bounded_number(1e-6, 1e6), metavar='MM', help='diameter of a hole, in mm'
-    )
 
 
 def add_camera(parser: argparse.ArgumentParser) -> None:
@@ -137,10 +129,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             content = parse_yaml(linkage_text(closure.linkage).encode(), content.file)
         return _draw_assemblies(arguments, content)
     if is_dxf:
-        return _write_parts(closure, arguments)
-    for option in ('width', 'hole'):
-        if getattr(arguments, option) is not None:
-            raise LinkageError(f'--{option}', 'is of the parts in a DXF', 'add -o FILE.dxf')
+        atomic_write(arguments.output, links_dxf(closure))
+        print(arguments.output)
+        return 0
     units = arguments.angles = DEGREES.of_file(content.units)
     typed = [read_inputs(closure.linkage, at, '--at', units) for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
@@ -149,16 +140,6 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     shown = prepare_view(closure, pose, ghosts)._replace(length=units.length)
     paint_picture(shown, name, file, names=arguments.names, camera=camera)
     print(file)
-    return 0
-
-
-def _write_parts(closure: PlanarClosure, arguments: argparse.Namespace) -> int:
-    """Write the links as parts."""
-    width, hole = (
-        None if typed is None else typed / 1e3 for typed in (arguments.width, arguments.hole)
-    )
-    atomic_write(arguments.output, links_dxf(closure, width=width, hole=hole))
-    print(arguments.output)
     return 0
 
 

@@ -23,7 +23,7 @@ from itertools import islice
 from math import tan, tau
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import check_installed, LinkageError
+from linkage_ros.errors import check_installed
 from linkage_ros.kinematics import (
     bounding_corners,
     convex_hull,
@@ -39,7 +39,7 @@ from linkage_ros.names import dxf_text
 
 _MM = 1e3
 _HOLE = 0.4
-"""Diameter of a hole relative to the width of a bar."""
+"""Diameter of a hole, and width of a slot, relative to the width of a bar."""
 
 _ROW = 6
 """Parts in a row."""
@@ -56,25 +56,18 @@ class _FlatPart(NamedTuple):
     slots: Sequence[tuple[complex, complex]]
 
 
-def links_dxf(
-    closure: PlanarClosure, *, width: float | None = None, hole: float | None = None
-) -> bytes:
+def links_dxf(closure: PlanarClosure) -> bytes:
     """
-    Return the links as a DXF file.
+    Return the links as a DXF file, bars as wide as in a drawing.
 
-    ``width`` is the width of a bar, in [m]; by default the drawing's. ``hole`` is the diameter of
-    a hole and the width of a slot, in [m]; by default 0.4 of the width. A LinkageError is raised
-    if ezdxf is not installed, or a hole does not fit into a bar.
+    A LinkageError is raised if ezdxf is not installed.
     """
     check_installed('ezdxf', "pip install 'linkage_ros[view]'")
     from ezdxf import filemanagement, units  # local import: an extra, and slow to load
 
     shown = prepare_view(closure, usual_inputs(closure))
-    wide = _MM * (2.0 * symbol_size(shown) if width is None else width)
-    bore = _HOLE * wide if hole is None else _MM * hole
-    if not 0.0 < bore < wide:
-        reason = f'a hole of {bore:.4g} mm does not fit into a bar of {wide:.4g} mm'
-        raise LinkageError(closure.name or 'links', reason, 'write --hole below --width')
+    wide = _MM * 2.0 * symbol_size(shown)
+    bore = _HOLE * wide
     document = filemanagement.new(units=units.MM)
     for name, colour in (('CUT', 7), ('HOLE', 1), ('NAME', 3), ('ASSEMBLY', 8)):
         document.layers.add(name, color=colour)

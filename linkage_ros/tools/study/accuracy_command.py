@@ -29,7 +29,6 @@ from linkage_ros.cli import (
     bounded_number,
     LINKAGES,
     open_bag,
-    output_path,
     Result,
     RESULTS,
     scene_of,
@@ -54,6 +53,8 @@ from linkage_ros.tools.study.tuned_scene import tune_scene
 
 EXAMPLE = 'linkage accuracy slider_crank --need 1e-3 --quick'
 
+_SHOWN = ('.html', '.svg')
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -72,8 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_output(
         parser,
-        (*LINKAGES, *RESULTS),
-        'the result is printed; a .yaml file is the scene that meets --need',
+        (*LINKAGES, *_SHOWN, *RESULTS),
+        'the result is printed; .yaml is the scene that meets --need, .html a page for the '
+        'browser, .svg a picture of error against cost',
     )
     parser.add_argument(
         '--horizon',
@@ -98,18 +100,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--quick', action='store_true', help='take 20 s at most, and print what is left out'
     )
     add_result(parser, output=False)
-    parser.add_argument(
-        '--page',
-        type=output_path(('.html', '.htm')),
-        metavar='OUTPUT',
-        help='write a page for the browser, OUTPUT.html',
-    )
-    parser.add_argument(
-        '--picture',
-        type=output_path(('.svg',)),
-        metavar='OUTPUT',
-        help='draw error against cost, OUTPUT.svg',
-    )
 
 
 class _StudyStoppedError(Exception):
@@ -151,7 +141,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     except _StudyStoppedError:
         return 1
     answer = None if arguments.need is None else answer_need(budget, arguments.need)
-    _write_files(arguments, scene, budget, answer)
+    _write_file(arguments, scene, budget, answer)
     account = budget_json(budget)
     if answer is not None:
         account['need'] = {
@@ -212,18 +202,20 @@ def _load_source(arguments: argparse.Namespace, stop: Event) -> _StudySource:
     return _StudySource(scene, arguments.scene if is_bag else arguments.like, is_bag=is_bag)
 
 
-def _write_files(
+def _write_file(
     arguments: argparse.Namespace, scene: Scene, budget: Budget, answer: NeedAnswer | None
 ) -> None:
-    """Write the files that were asked for."""
-    if _names_scene(arguments.output) and answer is not None and answer.is_met:
-        folder = arguments.output.resolve().parent
-        text = tune_scene(scene, arguments.scene, answer.changes, folder)
-        atomic_write(arguments.output, text)
-    if arguments.page:
-        atomic_write(arguments.page, budget_html(budget, answers_of(budget)).encode())
-    if arguments.picture:
+    """Write a scene, a page or a picture, by the suffix of the file that was asked for."""
+    file: Path | None = arguments.output
+    if file is None:
+        return
+    if _names_scene(file) and answer is not None and answer.is_met:
+        text = tune_scene(scene, arguments.scene, answer.changes, file.resolve().parent)
+        atomic_write(file, text)
+    elif file.suffix.lower() == '.html':
+        atomic_write(file, budget_html(budget, answers_of(budget)).encode())
+    elif file.suffix.lower() == '.svg':
         svg = budget_svg(budget)
         if not svg:
-            raise LinkageError('--picture', 'shows errors, and none were measured', 'leave it out')
-        atomic_write(arguments.picture, svg.encode())
+            raise LinkageError(file, 'shows errors, and none were measured', 'leave -o out')
+        atomic_write(file, svg.encode())
