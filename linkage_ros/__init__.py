@@ -65,6 +65,6 @@ Design a four-bar whose rocker follows a function of the crank:
 
 from linkage_ros.faces import lazy_names
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'
 
 __getattr__, __dir__ = lazy_names(__name__)

@@ -165,7 +165,7 @@ def test_command_reference_lists_every_command(pages):
         ('reference/ros_parameters.html', 'warn.transmission_angle'),
         ('reference/python.html', 'A planar linkage, as a linkage file says it.'),
         ('how_to/see_it.html', 'joint_state_topic_hardware_interface'),
-        ('changelog.html', 'Forthcoming'),
+        ('changelog.html', f'{lr.__version__} ('),
         ('tutorial.html', 'crank 50°: rocker misses by'),
     ],
 )

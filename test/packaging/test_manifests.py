@@ -24,11 +24,28 @@ def package_xml(root):
     return ET.parse(root / 'package.xml').getroot()
 
 
-def test_package_xml_and_module_have_one_version(root, package_xml):
+def test_module_manifest_and_changelog_have_one_version(root, package_xml):
+    """setup.py reads the module's; bloom takes the manifest's, and the changes of that version."""
     text = (root / 'linkage_ros' / '__init__.py').read_text('utf-8')
-    assert re.findall(r"^__version__ = '(.+)'$", text, re.MULTILINE) == [
-        package_xml.findtext('version')
-    ]
+    (version,) = re.findall(r"^__version__ = '(.+)'$", text, re.MULTILINE)
+    assert package_xml.findtext('version') == version
+    changelog = (root / 'CHANGELOG.rst').read_text('utf-8')
+    dated = re.findall(r'^(\d+\.\d+\.\d+) \(\d{4}-\d\d-\d\d\)\n-', changelog, re.MULTILINE)
+    assert dated[0] == version
+
+
+@pytest.mark.filterwarnings('ignore::DeprecationWarning')  # catkin_pkg's use of docutils
+def test_bloom_reads_each_change_of_this_version(root, package_xml):
+    catkin = pytest.importorskip('catkin_pkg.changelog')
+    version = package_xml.findtext('version')
+    changes = catkin.get_changelog_from_path(str(root)).get_content_of_version(version)
+    text = (root / 'CHANGELOG.rst').read_text('utf-8')
+    section = re.split(r'^[\d.]+ \(.*\)\n-+$', text, flags=re.MULTILINE)[1]
+    read, written = (
+        len(re.findall(r'^\* ', part, re.MULTILINE))
+        for part in ('\n'.join(map(str, changes)), section)
+    )
+    assert read == written > 0
 
 
 def test_package_xml_is_valid(root):
@@ -68,14 +85,12 @@ OF_UBUNTU = {
 """Keys that are packages of Ubuntu 24.04. (rosdistro, rosdep/python.yaml)"""
 
 
-def test_readme_rosdep_command_skips_exactly_the_unknown_keys(root, package_xml):
-    """What is no package of ROS or of Ubuntu goes to pip, which refuses on Ubuntu 24.04."""
+def test_every_dependency_comes_from_apt(root, package_xml):
+    """bloom would make a key of pip a Debian package that does not exist."""
     keys = {each.text for each in package_xml if each.tag.endswith('depend')}
+    assert keys == ROS_PACKAGES | OF_UBUNTU
+    # What has no key of apt is installed by hand, under the name that it has on PyPI.
     readme = (root / 'README.md').read_text('utf-8')
-    (skipped,) = re.findall(r'^rosdep install .*--skip-keys "(.+)"$', readme, re.MULTILINE)
-    assert keys == ROS_PACKAGES | OF_UBUNTU | {*skipped.split()}
-    # The first is installed by hand, under the name that it has on PyPI; the other is for tests.
-    assert skipped == 'mcap-ros2-support python3-rosbags-pip'
     assert re.search(r'\npython3 -m pip install .*--break-system-packages mcap\n', readme)
 
 

@@ -6,10 +6,11 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A wheel holds all that the core needs, and all that ROS looks for under share/."""
+"""The source distribution is whole: its wheel holds what the core needs, and ROS under share/."""
 
 import sys
 import sysconfig
+import tarfile
 import venv
 
 import pytest
@@ -23,14 +24,23 @@ REPORT = ('matplotlib', 'rich')
 
 
 @pytest.fixture(scope='module')
-def prefix(tmp_path_factory, copy_checkout, run):
-    """Return a fresh environment that has linkage_ros from its wheel, and no extras."""
+def sdist(tmp_path_factory, copy_checkout, run):
+    """Return the source distribution."""
+    folder = tmp_path_factory.mktemp('sdist')
+    build = "from setuptools import build_meta; build_meta.build_sdist('..')"
+    run(sys.executable, '-c', build, cwd=copy_checkout(folder / 'source'))
+    (file,) = folder.glob('*.tar.gz')
+    return file
+
+
+@pytest.fixture(scope='module')
+def prefix(tmp_path_factory, sdist, run):
+    """Return a fresh environment that has linkage_ros from the sdist's wheel, and no extras."""
     folder = tmp_path_factory.mktemp('wheel')
-    source = copy_checkout(folder / 'source')
     prefix = folder / 'environment'
     venv.create(prefix, with_pip=False, symlinks=True)
     pip = [sys.executable, '-m', 'pip', '--disable-pip-version-check']
-    build = ['wheel', '--no-deps', '--no-build-isolation', '--no-index', '-w', folder, source]
+    build = ['wheel', '--no-deps', '--no-build-isolation', '--no-index', '-w', folder, sdist]
     run(*pip, *build, cwd=folder)
     (wheel,) = folder.glob('*.whl')
     install = ['--python', prefix, 'install', '--no-deps', '--no-index', wheel]
@@ -39,6 +49,17 @@ def prefix(tmp_path_factory, copy_checkout, run):
     (site,) = prefix.glob('lib/python*/site-packages')
     (site / 'borrowed.pth').write_text(sysconfig.get_path('purelib'), encoding='utf-8')
     return prefix
+
+
+def test_sdist_holds_the_package_and_no_tests(sdist, root):
+    with tarfile.open(sdist) as archive:
+        files = {name.partition('/')[2] for name in archive.getnames()}
+    assert not [file for file in files if file.split('/')[0] in {'test', 'bench', 'campaigns'}]
+    code = (file for file in (root / 'linkage_ros').rglob('*') if file.is_file())
+    assert files >= {
+        *('LICENSE', 'README.md', 'CHANGELOG.rst', 'policy.xml', 'package.xml', 'setup.cfg'),
+        *(str(file.relative_to(root)) for file in code if file.suffix != '.pyc'),
+    }
 
 
 def test_core_imports_without_extras(prefix, import_core):
