@@ -86,7 +86,7 @@ OF_UBUNTU = {
 
 
 def test_every_dependency_comes_from_apt(root, package_xml):
-    """bloom would make a key of pip a Debian package that does not exist."""
+    """Bloom would make a key of pip a Debian package that does not exist."""
     keys = {each.text for each in package_xml if each.tag.endswith('depend')}
     assert keys == ROS_PACKAGES | OF_UBUNTU
     # What has no key of apt is installed by hand, under the name that it has on PyPI.

@@ -8,6 +8,7 @@
 
 """The source distribution is whole: its wheel holds what the core needs, and ROS under share/."""
 
+from pathlib import Path
 import sys
 import sysconfig
 import tarfile
@@ -89,6 +90,14 @@ def test_wheel_share_equals_the_checkout(prefix, root):
     assert (share / 'package.xml').read_bytes() == (root / 'package.xml').read_bytes()
     index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'linkage_ros'
     assert index.is_file()
+
+
+def test_files_are_found_from_another_python(prefix, run):
+    """As with `pip install --user`, where Python has another prefix than the package."""
+    (site,) = prefix.glob('lib/python*/site-packages')
+    say = "from linkage_ros.resources import shipped_path; print(shipped_path('linkages'))"
+    printed = run(sys.executable, '-c', say, cwd=prefix, PYTHONPATH=str(site))
+    assert Path(printed.strip()) == prefix / 'share' / 'linkage_ros' / 'config' / 'linkages'
 
 
 @pytest.mark.parametrize('room', ['study', 'view', 'view/pages', 'view/report'])
