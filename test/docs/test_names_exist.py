@@ -10,12 +10,9 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterator
 from functools import cache
-import io
 import re
-import tokenize
 
 from linkage_ros.cli import COMMANDS, find_command, parser_of
 from linkage_ros.cli.main import top_parser
@@ -25,6 +22,7 @@ from .blocks import blocks, PAGES, ROOT
 
 WORKSHOP = sorted(file for name in ('campaigns', 'bench') for file in (ROOT / name).rglob('*.py'))
 SOURCES = sorted((ROOT / 'linkage_ros').rglob('*.py'))
+MODULES = {file.stem for file in SOURCES}
 
 NOT_OURS = {
     'shells, Linux, Docker': 'grep LD_PRELOAD VmRSS awk compinit isolcpus sched_rt_runtime_us '
@@ -48,17 +46,14 @@ NOT_OURS = {
 PLACEHOLDER = re.compile('[A-Z]{2,}')
 """Stands for a name in what a user writes: INPUT, NAME_0, SLIDER_on_LINK."""
 
+TOKEN = re.compile(
+    r"""(?:\"{3}.*?\"{3}|'{3}.*?'{3}|\#[^\n]*)"""  # Docstrings, templates of text and comments
+    r"""|'((?:\\.|[^'\\\n])*)'|"((?:\\.|[^"\\\n])*)"|\b([^\W\d]\w*)""",
+    re.DOTALL,
+)
+"""A text that names nothing, or one in single quotes, one in double quotes, an identifier."""
+
 FENCED = re.compile(r'^( *)(```|:::).*?^\1\2', re.MULTILINE | re.DOTALL)
-
-
-def docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Yield the docstrings of a module, also those that follow a constant, each with its line."""
-    for node in ast.walk(tree):
-        body = getattr(node, 'body', ())
-        for one in body if isinstance(body, list) else ():
-            text = getattr(getattr(one, 'value', None), 'value', None)
-            if isinstance(one, ast.Expr) and isinstance(text, str):
-                yield one.lineno, text
 
 
 @cache
@@ -68,12 +63,11 @@ def names_of_the_code() -> frozenset[str]:
     for file in [*SOURCES, *(ROOT / 'linkage_ros').rglob('*.pyi')]:
         text = file.read_text('utf-8')
         names |= {file.stem, file.parent.name}
-        told = {line for line, _ in docstrings(ast.parse(text))}
-        for token in tokenize.generate_tokens(io.StringIO(text).readline):
-            if token.type == tokenize.NAME:
-                names.add(token.string)
-            elif token.type == tokenize.STRING and token.start[0] not in told:
-                names.update(re.findall(r'\w+', token.string) if ' ' not in token.string else ())
+        for single, double, name in {*TOKEN.findall(text)}:
+            if name:
+                names.add(name)
+            elif ' ' not in single + double:
+                names.update(re.findall(r'\w+', single + double))
     return frozenset(names | {*re.findall(r'[\w.]+', ' '.join(NOT_OURS.values()))})
 
 
@@ -133,13 +127,12 @@ def in_backticks() -> Iterator[tuple[str, str]]:
 def misses_a_module(text: str) -> str:
     """Return a dotted name whose last part is a module, but not in what stands before; or ''."""
     before, _, last = text.rpartition('.')
-    homes = [file for file in SOURCES if file.stem == last]
-    if not before or before[0].isupper() or not homes:
+    if not before or before[0].isupper() or last not in MODULES:
         return ''
     inside = re.compile(rf'^\s*(def|class) {last}\b', re.MULTILINE)
     found = any(
         f'.{file.relative_to(ROOT).with_suffix("")}'.replace('/', '.').endswith(f'.{text}')
-        for file in homes
+        for file in SOURCES
     ) or any(inside.search(file.read_text('utf-8')) for file in SOURCES if file.stem == before)
     return '' if found else text
 
