@@ -9,10 +9,7 @@
 # Read first: read_bag, Bag, BagMessage, Topic, QosProfile, BagWriter, Storage, Recorder,
 # RecordingSummary, SnapshotMemory, recover_bag, Salvage, recorded_events, RunMetadata.
 
-from linkage_ros.bag.bag_file import (
-    compression_type as compression_type,
-    COMPRESSIONS as COMPRESSIONS,
-)
+from linkage_ros.bag.bag_file import compression_type as compression_type
 from linkage_ros.bag.contents import (
     Contents as Contents,
     contents_of as contents_of,
@@ -24,6 +21,7 @@ from linkage_ros.bag.contents import (
 )
 from linkage_ros.bag.disk import Reserve as Reserve
 from linkage_ros.bag.mcap_records import Message as Message, RecordSource as RecordSource
+from linkage_ros.bag.message_sink import MessageSink as MessageSink
 from linkage_ros.bag.metadata import (
     BagSummary as BagSummary,
     counts_in as counts_in,
@@ -52,14 +50,12 @@ from linkage_ros.bag.reader import (
     is_in_use as is_in_use,
     MOST_ATTACHED as MOST_ATTACHED,
     read_bag as read_bag,
-    RUN_FILE as RUN_FILE,
     serialized_metadata as serialized_metadata,
     topic_of as topic_of,
 )
 from linkage_ros.bag.recorder import (
     DirectRecorder as DirectRecorder,
     FLUSH_AFTER as FLUSH_AFTER,
-    MessageSink as MessageSink,
     PLACE as PLACE,
     Recorder as Recorder,
     RecordingSummary as RecordingSummary,
@@ -73,11 +69,19 @@ from linkage_ros.bag.recover import (
     recovered_name as recovered_name,
     Recovery as Recovery,
 )
-from linkage_ros.bag.run_events import (
+from linkage_ros.bag.run_account import (
     BEGUN as BEGUN,
+    MID_RUN as MID_RUN,
+    RUN_FILE as RUN_FILE,
+    SEED as SEED,
+    USER_EFFECTS as USER_EFFECTS,
+    VERSIONS as VERSIONS,
+    WITH_THE_RUN as WITH_THE_RUN,
+    WRENCH_TOPICS as WRENCH_TOPICS,
+)
+from linkage_ros.bag.run_events import (
     Event as Event,
     FaultEvent as FaultEvent,
-    MID_RUN as MID_RUN,
     missing_start_reason as missing_start_reason,
     read_raw_metadata as read_raw_metadata,
     read_run_metadata as read_run_metadata,
@@ -86,12 +90,7 @@ from linkage_ros.bag.run_events import (
     RunFiles as RunFiles,
     RunMetadata as RunMetadata,
     SampleEvent as SampleEvent,
-    SEED as SEED,
     TickEvent as TickEvent,
-    USER_EFFECTS as USER_EFFECTS,
-    VERSIONS as VERSIONS,
-    WITH_THE_RUN as WITH_THE_RUN,
-    WRENCH_TOPICS as WRENCH_TOPICS,
     WrenchEvent as WrenchEvent,
 )
 from linkage_ros.bag.salvage import find_next_whole as find_next_whole, Salvage as Salvage
@@ -100,10 +99,11 @@ from linkage_ros.bag.snapshot import (
     SnapshotMemory as SnapshotMemory,
     SnapshotWriting as SnapshotWriting,
 )
+from linkage_ros.bag.storage import COMPRESSIONS as COMPRESSIONS, Storage as Storage
 from linkage_ros.bag.topic import (
     CHANNELS_FILE as CHANNELS_FILE,
     INFINITE as INFINITE,
     QosProfile as QosProfile,
     Topic as Topic,
 )
-from linkage_ros.bag.writer import BagWriter as BagWriter, Storage as Storage
+from linkage_ros.bag.writer import BagWriter as BagWriter

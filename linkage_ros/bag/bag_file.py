@@ -25,20 +25,18 @@ from typing import cast, IO
 from linkage_ros import __version__
 from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from linkage_ros.bag.metadata import BagSummary, NO_START, qos_text
+from linkage_ros.bag.storage import NONE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import RecordingError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Statistics
 from mcap.writer import CompressionType, IndexType, Writer
 
-NONE = 'none'
-
 COMPRESSION_TYPES: Mapping[str, CompressionType] = {
     NONE: CompressionType.NONE,
     'lz4': CompressionType.LZ4,
     'zstd': CompressionType.ZSTD,
 }
-COMPRESSIONS: tuple[str, ...] = tuple(COMPRESSION_TYPES)
 _LIBRARIES = {'lz4': 'lz4', 'zstd': 'zstandard'}
 
 

@@ -54,9 +54,6 @@ _WITHOUT = 'move metadata.yaml away to read the folder without it'
 _RECOGNISED = 512
 """Length of the start by which a text file is recognised [bytes]."""
 
-RUN_FILE = 'run.json'
-"""Name of the attachment with the run's scene, topics and versions."""
-
 _RECOVER = 'linkage recover makes a complete bag from it'
 
 MOST_ATTACHED = 64 * 2**20

@@ -18,14 +18,13 @@ space. However it ends, the bag states the outcome of all messages offered until
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 import json
 from pathlib import Path
 import threading
 import time
-from typing import Protocol
 
 from linkage_ros.bag.metadata import BagSummary, count_topics, TopicCounts
 from linkage_ros.bag.writer import BagWriter
@@ -63,14 +62,6 @@ _FLUSHED_EVERY = 50_000
 
 OfferedMessage = tuple[int, int, int, bytes]
 """A message in the queue: topic, log time, publish time [ns] and its CDR bytes."""
-
-
-class MessageSink(Protocol):
-    """Takes the messages of a run: a recorder, or a memory of its last seconds."""
-
-    @property
-    def offer(self) -> Callable[[int, int, int, bytes], None]:
-        """Return what takes a message: topic, log time and publish time in [ns], CDR bytes."""
 
 
 class DirectRecorder:

@@ -16,25 +16,20 @@ import re
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.bag.metadata import counts_in
-from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.run_account import (
+    BEGUN,
+    MID_RUN,
+    RUN_FILE,
+    SEED,
+    USER_EFFECTS,
+    VERSIONS,
+    WRENCH_TOPICS,
+)
 from linkage_ros.errors import BagError
-
-BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
-"""Key for the beginning of the bag, and its values."""
-
-USER_EFFECTS = 'effects'
-"""Key for the modules of user-defined effects."""
-
-SEED = 'seed'
-"""Key for the seed of all random numbers."""
-
-WRENCH_TOPICS = 'wrench_topics'
-"""Key for the topics with wrenches, if the scene has any."""
 
 _LONGEST_ACCOUNT = 4 * 2**20
 """Greatest size [bytes]; usually a kilobyte, more if the bag was made from another one."""
-
-VERSIONS = ('linkage_ros', 'python', 'machine')
 
 _TEXTS = (
     'scene',

@@ -19,14 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from itertools import count
 import os
 from pathlib import Path
 import time
 from typing import NoReturn
 
-from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type, NONE
+from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
 from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
 from linkage_ros.bag.metadata import (
     BagSummary,
@@ -39,6 +38,7 @@ from linkage_ros.bag.metadata import (
     UNFINISHED_DATA,
     write_metadata,
 )
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.errors import RecordingError
 
@@ -54,29 +54,6 @@ _ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # avoids many small files on a full disk [by
 # Data written between two checks of free space: a chunk and the data of a flush [bytes]. It is
 # kept free in addition, so that the required space is never missing.
 _ON_ITS_WAY = 256 * 1024
-
-
-@dataclass(frozen=True, slots=True)
-class Storage:
-    """
-    Storage settings of a bag; by default written continuously, in uncompressed files of 1 GiB.
-
-    Until a file ends, mcap keeps in memory the positions of its chunks and messages, so the size
-    of a file must be limited.
-    """
-
-    # Time whose messages a power cut may lose [s]: the flush period, and a tenth more.
-    flush_period: float = 1.0
-    split_bytes: int = 2**30  # Size after which the next file begins [bytes]; 0 for never
-    # Duration after which the next file begins [s], by log times; 0 for never.
-    split_seconds: float = 0.0
-    keep_files: int = 0  # Number of files to keep; 0 for all
-    min_free_bytes: int = 0  # Space to leave free on the disk [bytes]
-    compression: str = NONE  # 'none', 'lz4' or 'zstd'
-    # Duration of the run to keep in memory until a snapshot is requested [s], by log times; 0 to
-    # write the bag continuously.
-    snapshot_seconds: float = 0.0
-    snapshot_bytes: int = 256_000_000  # Most memory for it [bytes]
 
 
 class BagWriter:

@@ -16,25 +16,24 @@ from datetime import datetime
 from functools import partial
 from os.path import lexists
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from linkage_ros.bag import (
-    BagWriter,
-    compression_type,
-    MID_RUN,
-    Recorder,
-    RecordingSummary,
-    SnapshotMemory,
-    SnapshotWriting,
-    Storage,
-    Topic,
-    TopicCounts,
-    WITH_THE_RUN,
-)
+from linkage_ros.bag import MID_RUN, Storage, Topic, WITH_THE_RUN
 from linkage_ros.description import RecordParameters, Scene
 from linkage_ros.errors import RecordingError
 from linkage_ros.replay import scene_files, to_attachments
 from linkage_ros.tick import DESCRIPTION, TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
+
+if TYPE_CHECKING:
+    from linkage_ros.bag import (
+        BagWriter,
+        Recorder,
+        RecordingSummary,
+        SnapshotMemory,
+        SnapshotWriting,
+        TopicCounts,
+    )
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 """Recording settings for a service call if the scene has none."""
@@ -77,6 +76,12 @@ class RunRecording:
         handles, each with its key in the run's account; topics with the same key form a list.
         ``description``: message on topic `DESCRIPTION` that begins each file; empty for none.
         """
+        from linkage_ros.bag import (  # local import: many nodes record nothing
+            BagWriter,
+            compression_type,
+            Recorder,
+        )
+
         record = scene.record or _DEFAULT
         storage = record.storage
         # The bag lacks what a running tick remembers: a replay has to know that.
@@ -200,6 +205,8 @@ class RunRecording:
         topics: Sequence[Topic],
         new_bag: Callable[[bool], BagWriter],
     ) -> str:
+        from linkage_ros.bag import SnapshotMemory  # local import: few scenes keep one
+
         memory = SnapshotMemory(topics, storage.snapshot_seconds, storage.snapshot_bytes)
         self.snapshots = RunSnapshots(memory, new_bag)
         loop.recorder = memory
@@ -312,6 +319,8 @@ class RunSnapshots:
             return str(error)
         if not kept.blocks:
             return 'nothing is in memory yet; call again when there are messages'
+        from linkage_ros.bag import SnapshotWriting  # local import: as above
+
         self._answer = answer
         self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.is_complete), wake)
         return ''

@@ -24,23 +24,25 @@ from linkage_ros.replay.counterfactual import (
     ReplayEvent as ReplayEvent,
 )
 from linkage_ros.replay.finished_runs import FinishedRuns as FinishedRuns
-from linkage_ros.replay.replay import (
+from linkage_ros.replay.node_messages import (
     announced_text as announced_text,
     change_text as change_text,
     own_joint_states as own_joint_states,
     read_announced as read_announced,
     read_change as read_change,
+)
+from linkage_ros.replay.replay import (
     recorded_scene as recorded_scene,
     replay_all as replay_all,
     replay_ticks as replay_ticks,
     ReplayedTick as ReplayedTick,
     turn_fault as turn_fault,
-    user_effects_here as user_effects_here,
     versions_here as versions_here,
 )
 from linkage_ros.replay.run_files import (
     scene_files as scene_files,
     to_attachments as to_attachments,
+    user_effects_here as user_effects_here,
 )
 from linkage_ros.replay.simulate import (
     BEGIN as BEGIN,

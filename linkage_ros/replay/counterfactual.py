@@ -51,7 +51,8 @@ from linkage_ros.messages import (
     text_message,
     TIME_END,
 )
-from linkage_ros.replay.replay import change_text, read_change, Rerun
+from linkage_ros.replay.node_messages import change_text, read_change
+from linkage_ros.replay.replay import Rerun
 from linkage_ros.tick import list_run_topics, Pipeline, Tick
 
 if TYPE_CHECKING:

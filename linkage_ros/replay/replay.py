@@ -18,8 +18,7 @@ may have caused them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-import json
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 import platform
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -42,15 +41,12 @@ from linkage_ros.bag import (
 )
 from linkage_ros.description import LINKAGE_FILE, parse_scene, Scene, SCENE_FILE
 from linkage_ros.errors import BagError, list_names
-from linkage_ros.messages import OwnJointStates, text_of, TIME_END
+from linkage_ros.messages import TIME_END
+from linkage_ros.replay.node_messages import own_joint_states, read_change
 from linkage_ros.tick import Pipeline, Tick
 
 if TYPE_CHECKING:
-    from linkage_ros.stages.faults import FaultChange, Injection
-
-
-_LONGEST_ANNOUNCED = 16 * 2**20
-"""Greatest size of a message with the files of a scene [bytes]; usually some kilobytes."""
+    from linkage_ros.stages.faults import Injection
 
 
 class ReplayedTick(NamedTuple):
@@ -128,33 +124,6 @@ def _folder_of(path: Any) -> Path:
     return path if isinstance(path, Path) and path.is_dir() else Path(path).parent
 
 
-class AnnouncedScene(NamedTuple):
-    """The files of a running node's scene, as its message holds them."""
-
-    path: str  # Name of the topic, for error messages
-    attachments: dict[str, bytes]  # The files by name, as a bag of the run has them
-
-
-def announced_text(files: Mapping[str, bytes]) -> str:
-    """Return the files of a scene as the text that a node publishes."""
-    return json.dumps({name: data.decode() for name, data in files.items()})
-
-
-def read_announced(message: bytes, topic: str) -> AnnouncedScene:
-    """Read a node's message with the files of its scene; raise `ValueError` for other content."""
-    if len(message) > _LONGEST_ANNOUNCED:
-        raise ValueError('too long')
-    try:
-        content = json.loads(text_of(message))
-    except RecursionError:
-        raise ValueError('too deep') from None
-    if not isinstance(content, dict) or not all(isinstance(of, str) for of in content.values()):
-        raise ValueError('not the files of a scene')
-    return AnnouncedScene(
-        topic, {name: text.encode('utf-8', 'replace') for name, text in content.items()}
-    )
-
-
 def replay_ticks(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
     """Run a scene on a bag's samples; yield every tick with a message in the bag."""
     for tick in replay_all(bag, scene, bag.messages()):
@@ -220,30 +189,6 @@ class Rerun:
         return self.pipeline.tick(time)
 
 
-def own_joint_states(scene: Scene) -> OwnJointStates:
-    """Return a predicate for the joint states of a scene among others on their topic."""
-    return OwnJointStates(scene_linkage.joint_names for scene_linkage in scene.linkages)
-
-
-def change_text(change: FaultChange, kind: str) -> str:
-    """Return the begin or end of a fault as the text that is published and recorded."""
-    return json.dumps({'fault': change.name, 'kind': kind, 'injected': change.on})
-
-
-def read_change(message: bytes) -> tuple[str, bool]:
-    """Return the fault that a message names and whether it begins, or raise `ValueError`."""
-    try:
-        content = json.loads(text_of(message))
-    except RecursionError:
-        raise ValueError('too deep') from None
-    name, on = (
-        (content.get('fault'), content.get('injected')) if isinstance(content, dict) else (0, 0)
-    )
-    if not isinstance(name, str) or not isinstance(on, bool):
-        raise ValueError('not the begin or end of a fault')
-    return name, on
-
-
 def turn_fault(bag: Bag, injection: Injection, message: bytes) -> None:
     """Turn a fault on or off by a message of a bag; raise `BagError` if that is impossible."""
     try:
@@ -260,15 +205,3 @@ def versions_here() -> dict[str, str]:
     """Return the versions of the installed software, in the form of a run's account."""
     here = (__version__, platform.python_version(), platform.machine())
     return dict(zip(VERSIONS, here, strict=True))
-
-
-def user_effects_here(scene: Scene) -> dict[str, str]:
-    """Return the modules of the user-defined effects of a scene."""
-    names = {
-        name for scene_linkage in scene.linkages for name in scene_linkage.effects if '.' in name
-    }
-    if not names:
-        return {}
-    from linkage_ros.stages.effects import effect_version  # local import: few scenes name one
-
-    return {name: effect_version(name) for name in sorted(names)}

@@ -19,7 +19,6 @@ import platform
 from linkage_ros import __version__
 from linkage_ros.bag import BEGUN, RUN_FILE, SEED, USER_EFFECTS
 from linkage_ros.description import Scene
-from linkage_ros.replay.replay import user_effects_here
 from linkage_ros.tick import name_topics
 
 _MEDIA = {'.json': 'json', '.urdf': 'xml'}
@@ -66,3 +65,15 @@ def to_attachments(files: Mapping[str, bytes]) -> dict[str, tuple[str, bytes]]:
         name: (f'application/{_MEDIA.get(Path(name).suffix, "yaml")}', data)
         for name, data in files.items()
     }
+
+
+def user_effects_here(scene: Scene) -> dict[str, str]:
+    """Return the modules of the user-defined effects of a scene."""
+    names = {
+        name for scene_linkage in scene.linkages for name in scene_linkage.effects if '.' in name
+    }
+    if not names:
+        return {}
+    from linkage_ros.stages.effects import effect_version  # local import: few scenes name one
+
+    return {name: effect_version(name) for name in sorted(names)}

@@ -25,7 +25,7 @@ from linkage_ros.bag import BagWriter, DirectRecorder, WITH_THE_RUN
 from linkage_ros.description import Scene
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages import text_message
-from linkage_ros.replay.replay import change_text
+from linkage_ros.replay.node_messages import change_text
 from linkage_ros.replay.run_files import scene_files, to_attachments
 from linkage_ros.replay.topic_description import describe_topic, message_type
 from linkage_ros.signals import heed_signals

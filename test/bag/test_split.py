@@ -259,7 +259,7 @@ def test_packed_chunks_are_smaller_and_have_checksums(tmp_path, topics, messages
 # A process that is killed at its n-th system call that changes something on the disk.
 KILLED = """
 import os, pathlib, pickle, signal, sys
-from linkage_ros.bag.writer import BagWriter, Storage
+from linkage_ros.bag import BagWriter, Storage
 folder, pickled = sys.argv[1:]
 topics, messages, storage = pickle.load(open(pickled, 'rb'))
 

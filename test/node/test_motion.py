@@ -228,19 +228,27 @@ node = LinkageNode(parameter_overrides=[Parameter('scene', value=sys.argv[1])])
 node.trigger_configure()
 node.trigger_activate()
 node.end_run()
-print('trajectory_msgs' in sys.modules)
+print(sys.argv[2] in sys.modules)
 node.destroy_node()
 rclpy.shutdown()
 """
 
 
-@pytest.mark.parametrize(('effect', 'imported'), [('velocity', False), ('acceleration', True)])
-def test_trajectory_message_is_imported_only_where_published(
-    domain, write_scene, effect, imported
+@pytest.mark.parametrize(
+    ('name', 'text', 'package', 'imported'),
+    [
+        ('velocity', 'effects: {velocity: {}}', 'trajectory_msgs', False),
+        ('acceleration', 'effects: {acceleration: {}}', 'trajectory_msgs', True),
+        ('unrecorded', '', 'mcap', False),
+        ('recorded', 'record: {directory: FOLDER}', 'mcap', True),
+    ],
+)
+def test_node_imports_packages_only_where_called_for(
+    domain, write_scene, folder, name, text, package, imported
 ):
-    scene = write_scene(f'imports_{effect}', f'effects: {{{effect}: {{}}}}')
+    scene = write_scene(f'imports_{name}', text.replace('FOLDER', str(folder / 'runs')))
     done = subprocess.run(
-        [sys.executable, '-c', PROGRAM, str(scene)],
+        [sys.executable, '-c', PROGRAM, str(scene), package],
         cwd=ROOT,
         env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
         capture_output=True,

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 from math import atan2, dist, sqrt, tau
 from typing import TYPE_CHECKING
 
@@ -393,9 +393,16 @@ class SpaceClosure(Closure):
 
     @property
     def ball_count(self) -> int:
-        """Return the number of points that two links share."""
-        carried = [point for points in self.linkage.links.values() for point in points]
-        return sum(carried.count(point) > 1 for point in self.linkage.points)
+        """Return the number of points that join two links, which no other joint joins."""
+        linkage = self.linkage
+        joined = {(joint.parent, joint.child) for joint in linkage.pair_joints.values()}
+        count = 0
+        for point in linkage.points:
+            carriers = [link for link, points in linkage.links.items() if point in points]
+            # Links that a hinge joins share the points of its axis.
+            pairs = [pair for pair in permutations(carriers, 2) if pair in joined]
+            count += len(carriers) - len(pairs) > 1
+        return count
 
     @property
     def slide_bound(self) -> float:

@@ -516,3 +516,13 @@ def test_linkage_with_too_many_parts_is_refused(links, points):
         SpaceClosure(sharing_links(links, points))
     told = f'links: {links + 1} with {links * points} points; keep 120 links, and 10000 points'
     assert str(caught.value) == f'{told} of links, at most'
+
+
+@pytest.mark.parametrize(
+    ('name', 'count'),
+    # By hand: rods with two balls, and the carrier of a wishbone, whose arms share points of
+    # their hinges' axes with the ground.
+    [('rssr', 2), ('ankle', 4), ('delta', 6), ('wishbone', 4), ('bennett', 0), ('hexapod', 0)],
+)
+def test_balls_are_points_that_no_hinge_joins(name, count):
+    assert shared_closure(name).ball_count == count

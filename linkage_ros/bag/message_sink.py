@@ -1,0 +1,20 @@
+# Copyright 2026 The linkage_ros authors
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0 Unless required by applicable law or agreed to in
+# writing, software distributed under the License is distributed on an "AS IS" BASIS, WITHOUT
+# WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
+# language governing permissions and limitations under the License.
+
+"""What the messages of a run go to."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+
+class MessageSink(Protocol):
+    """Takes the messages of a run: a recorder, or a memory of its last seconds."""
+
+    @property
+    def offer(self) -> Callable[[int, int, int, bytes], None]:
+        """Return what takes a message: topic, log time and publish time in [ns], CDR bytes."""
