@@ -227,7 +227,7 @@ def check_shown(names: Sequence[str], file: Path) -> None:
 def test_pictures_draw_names_as_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(painting._SETTINGS, 'svg.fonttype', 'none')
     file = tmp_path / 'a.svg'
-    for closure in linkages(12):
+    for closure in linkages(24):
         joints = list(closure.linkage.joints)
         pose = usual_inputs(closure)
         paint_picture(prepare_view(closure, pose), closure.name, file, names=True)
@@ -326,7 +326,7 @@ FILES = ['a\nb', 'a\x1b[31mb', 'a\x7fb', 'a\u202eb', 'a\udcffb', '$x^$', '=1+1',
 """Names of files can hold what names in files cannot."""
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', FILES)
 def test_commands_accept_any_file_name(name: str, tmp_path: Path) -> None:
     given = f'{name}.yaml'

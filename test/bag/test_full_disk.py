@@ -382,7 +382,7 @@ def readable(folder, beside):
     return list(read_bag(beside).messages())
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('storage', STORAGES)
 @pytest.mark.parametrize('then', ['silence', 'more messages', 'the end'])
 @pytest.mark.parametrize('do', WHAT_IS_DONE)

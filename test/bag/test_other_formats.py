@@ -139,7 +139,7 @@ def others(folder: Path) -> dict[str, Path]:
     }
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('command', COMMANDS)
 @pytest.mark.parametrize('kind', ['folder', 'without metadata', 'file', 'packed', 'ROS 1'])
 def test_bags_of_other_formats_are_refused_in_one_line(tmp_path, command, kind) -> None:

@@ -64,7 +64,7 @@ def triples(topics, messages):
     return [(topics[m.topic].name, m.log_time, m.data) for m in messages]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('storage', SPLITS.values(), ids=SPLITS)
 def test_every_reader_finds_all_messages_of_split_bags(
     tmp_path, topics, messages, readers, storage

@@ -17,7 +17,7 @@ import pytest
 from ..support.scenes import ROOT
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('module', TESTS)
 def test_each_mutant_differs_in_one_expression_and_parses(module):
     source = file_of(module).read_bytes()

@@ -117,7 +117,7 @@ def test_damaged_run_json_is_reported_in_one_line(tmp_path, capsys, bag, name) -
     assert lines[0].startswith(f'{odd}: its run.json is damaged; ')
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('value', VALUES)
 @pytest.mark.parametrize('key', KEYS)
 def test_wrong_run_json_value_is_reported_in_one_line(tmp_path, capsys, bag, key, value) -> None:
@@ -147,7 +147,7 @@ def test_malformed_fault_change_raises_value_error(name: str) -> None:
         read_change(CHANGES[name])
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', CHANGES)
 def test_malformed_fault_change_is_reported_in_one_line(tmp_path, capsys, name) -> None:
     bag = recorded(tmp_path, 'faults: {quiet: {silence: {}}}\n', 60)
@@ -358,7 +358,7 @@ def test_hostile_bags_are_tested_with_every_bag_command() -> None:
 LINES = [[name, 'strange', *more] for name, lines in TYPED.items() for more in lines]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('words', [*LINES, *WITH_A_SCENE], ids=' '.join)
 def test_commands_import_no_module_named_in_a_bag(folder: Path, words: list[str]) -> None:
     ended = typed(folder, *words)

@@ -40,7 +40,7 @@ PLACES = {
 }
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('place', PLACES)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_commands_show_no_traceback_for_any_output(tmp_path, command, place) -> None:

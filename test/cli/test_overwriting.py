@@ -73,7 +73,7 @@ def test_overwriting_is_tested_for_every_command_that_writes() -> None:
     assert writing == {*WRITES, *FOLDERS}
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('command', [name for name in WRITES if name != 'import'])
 def test_only_force_overwrites_a_file_and_keeps_its_mode(folder, command) -> None:
     words, name, is_default = WRITES[command]

@@ -47,7 +47,7 @@ def refusal(setting: str) -> str:
     return ''
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('setting', MAPPINGS)
 def test_example_mapping_of_an_error_can_be_pasted(setting):
     text = refusal(setting)

@@ -98,7 +98,7 @@ def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[
     return code, json.loads(capsys.readouterr().out)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', SCENES)
 def test_recorded_run_replays_to_the_same_bytes(tmp_path, capsys, name):
     bag = recorded(tmp_path, SCENES[name], resets=RESETS.get(name, ()))
@@ -367,7 +367,7 @@ def long_bag(tmp_path_factory):
     return recorded(tmp_path_factory.mktemp('long'), SCENES['rates'], 6000)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('part', [0.09, 0.3, 0.66, 0.98])
 @pytest.mark.parametrize('more', [[], ['--set', 'angles=wrapped']])
 def test_replay_counts_messages_missing_against_the_metadata(

@@ -51,7 +51,7 @@ RINGS = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', RINGS)
 def test_replay_of_a_ring_names_the_removed_beginning(tmp_path, capsys, name) -> None:
     effects, code, verdict, lost = RINGS[name]
@@ -178,7 +178,7 @@ def test_info_counts_received_messages(tmp_path, capsys) -> None:
     assert 'discarded' not in text
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     'counts',
     ['3', '[]', '{"/joint_states": "many"}', '{"/joint_states": -1}', '{"/joint_states": true}',

@@ -174,7 +174,7 @@ RUNS = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', RUNS)
 def test_new_bag_replays_to_the_same_bytes(tmp_path, capsys, name):
     text, linkage, other_text, other_linkage, expected = RUNS[name]

@@ -168,7 +168,7 @@ def stuck_at(folder: Path, place: str, *arguments: str) -> subprocess.Popen[str]
     return start(folder, PROGRAM, place, separator, *arguments)
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', READS)
 def test_signal_ends_a_command_while_it_reads(folder, command, number) -> None:
@@ -187,7 +187,7 @@ def test_signal_ends_a_run_before_its_first_tick(folder, at, number) -> None:
     assert found == (1, 'linkage run: stopped\n')
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
 def test_signal_ends_a_command_while_it_computes(folder, command, number) -> None:

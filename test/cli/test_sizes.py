@@ -110,7 +110,7 @@ def check_answer(typed: list[str], capsys: pytest.CaptureFixture[str]) -> bool:
     return bool(faults)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('kind', KINDS)
 def test_lengths_of_any_size_are_computed_or_refused(

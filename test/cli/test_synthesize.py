@@ -232,7 +232,7 @@ def in_radians(typed: list[str]) -> list[str]:
     return [*words, '--radians']
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('kind', IN_DEGREES)
 def test_synthesis_in_radians_designs_the_same_linkage(linkage: Run, kind: str) -> None:
     typed = IN_DEGREES[kind]

@@ -151,7 +151,7 @@ def test_tables_have_the_units_of_their_file(folders: list[Path], command: str) 
     assert converted or command in {'scene', 'info'}  # their quantities are texts
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('command', sorted(TABLES.keys() - {'export', 'simulate'}))
 def test_json_of_commands_is_in_si_units(folders: list[Path], command: str) -> None:
     in_si, in_mm = (
@@ -205,7 +205,7 @@ traced: [A]
 """
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('unit', ['cm', 'mm', 'in'])
 @pytest.mark.parametrize(
     'typed',

@@ -62,7 +62,7 @@ READS = {
 KINDS = {'pipe': 'a pipe', 'socket': 'a socket', 'device': 'a device'}
 
 
-@pytest.mark.sample(15)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('read', READS)
 def test_commands_refuse_files_that_are_not_regular(
@@ -225,7 +225,7 @@ def test_check_mjcf_and_scene_answer_degenerate_linkages(
     assert 'inf times' not in answer.stderr
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(('content', 'typed', 'named'), REFUSED)
 def test_oversized_or_degenerate_files_are_refused_in_one_line(
     linkage: Run, tmp_path: Path, content: str, typed: str, named: str

@@ -279,7 +279,7 @@ LIMITED = {
 }
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda file: file.stem
 )

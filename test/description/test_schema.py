@@ -326,7 +326,7 @@ def reads(content: dict[str, Any], of: Any) -> bool:
     return True
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('what', TYPES)
 def test_schema_and_reader_accept_the_same_parameters(what):
     of = TYPES[what]

@@ -109,7 +109,7 @@ def run_block(block: Block, folder: Path, exports: dict[str, str]) -> None:
         assert not line, f'{where}: missing: {line}\n{output}'
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.timeout(300)

@@ -209,7 +209,7 @@ def test_slide_direction_may_have_any_length():
 # A step closed alone gives the same pose as in an array, to the last bit.
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', [file.stem for file in FILES])
 def test_single_step_equals_the_step_within_its_closure(name):
     closure = closure_of(name)

@@ -74,7 +74,7 @@ USED = ('four_bar', 'jansen_leg', 'class_3', 'limited')
 CASES = [*((name, False) for name in CLOSURES), *((name, True) for name in USED)]
 
 
-@pytest.mark.sample(22)
+@pytest.mark.sample(11)
 @pytest.mark.parametrize('way', COPIES)
 @pytest.mark.parametrize(('name', 'used'), CASES)
 def test_copied_closure_gives_the_same_bits(name, used, way):

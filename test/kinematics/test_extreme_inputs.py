@@ -38,7 +38,7 @@ def check_position(closure, *inputs):
     return position
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_extreme_inputs_and_rates_raise_no_error(name):
     closure = load(name)
@@ -55,7 +55,7 @@ def test_extreme_inputs_and_rates_raise_no_error(name):
         check_motion(closure, position)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize(
     'name', [name for name in linkage_names() if len(load(name).input_names) == 1]
 )

@@ -66,7 +66,7 @@ def closed_bags(runs):
     return totals
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('moment', range(2))
 @pytest.mark.parametrize('number', SIGNALS)
 def test_signal_at_a_random_moment_closes_the_bag(start, recorded, number, moment):

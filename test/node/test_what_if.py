@@ -105,7 +105,7 @@ CASES = [(name, linkage) for name in SCENES for linkage in ('four_bar', OPEN)
          if 'torque' not in name or linkage != OPEN]  # fmt: skip
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize(('name', 'linkage'), CASES)
 @pytest.mark.parametrize('seed', range(2))
 def test_set_to_the_recorded_value_replays_to_same_bytes(tmp_path, capsys, name, linkage, seed):

@@ -273,7 +273,7 @@ def test_two_streams_of_joint_states_agree_in_tf(start, root, name):
     assert least <= max(gaps) <= most
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_tf_of_every_gallery_linkage_closes_its_loops(start, name):
     """What its two processes publish places every link, and the loops meet."""

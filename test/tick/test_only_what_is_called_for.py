@@ -190,7 +190,7 @@ def test_empty_scene_imports_no_effect_fault_or_numpy(bare):
     assert 'numpy' not in bare.modules
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('effect', SCENES)
 def test_scene_with_one_effect_imports_no_other(tmp_path, bare, effect):
     expected = SCENES[effect]

@@ -40,7 +40,7 @@ def off_by(found, wanted, name):
     return remainder(found - wanted, tau) if name.endswith('angle') else found - wanted
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ('name', 'wanted'),
     [

@@ -121,7 +121,7 @@ def check_ranges(lengths: tuple[float, float, float, float]) -> tuple[bool, bool
     return folds, stretches
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', FOUR_BARS)
 def test_four_bar_closes_only_inside_its_ranges(name):
     lengths = FOUR_BARS[name]

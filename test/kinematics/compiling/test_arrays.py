@@ -83,7 +83,7 @@ def grouped(given: Sequence[State], inputs: int) -> Any:
     return np.array([parts(state, inputs) for state in given]).swapaxes(0, 1)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ALL)
 def test_numpy_module_returns_the_values_of_the_steps(name):
     closure = closure_of(name)
@@ -284,7 +284,7 @@ def beside_toggles(closure: Closure) -> list[State]:
     return [(value, 1.0, 0.0) for value in values if closure.position(value).status.has_rates]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', ALL)
 @pytest.mark.parametrize('library', LIBRARIES)

@@ -73,7 +73,7 @@ def half_angle(request, monkeypatch):
     monkeypatch.setattr(numpy_blocks, '_BY_TANGENT', by_tangent)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.slow
 @pytest.mark.usefixtures('half_angle')
 @pytest.mark.parametrize('family', FOUR_BARS)

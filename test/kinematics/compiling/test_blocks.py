@@ -125,7 +125,7 @@ def answered(call: Any, *numbers: float) -> str:
         return f'{type(error).__name__}: {error}'
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', [path.stem for path in LINKAGES])
 def test_compiled_gallery_linkages_equal_the_steps_bit_for_bit(name):
     closure = closure_of(name)
@@ -141,7 +141,7 @@ def test_compiled_gallery_linkages_equal_the_steps_bit_for_bit(name):
     assert left < 0.01 * closed, 'so many states leave the compiled way'
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('family', FAMILIES)
 def test_compiled_random_linkages_equal_the_steps_bit_for_bit(family):
     seen = set()

@@ -52,7 +52,7 @@ def told_of(
     return told
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_gallery_linkages_in_c_equal_the_steps(name, tmp_path):
@@ -61,7 +61,7 @@ def test_gallery_linkages_in_c_equal_the_steps(name, tmp_path):
     assert sum(one.status == 'CLOSED' for one in told) > COUNT / (3 if name in KINDS else 6)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('family', COMPILED)
 def test_random_linkages_in_c_equal_the_steps(family, tmp_path):
     topology = FAMILIES[family].make(random.Random(family))
@@ -154,7 +154,7 @@ def test_c_code_returns_indeterminate_for_values_not_finite(odd, place, tmp_path
     ]
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
 @pytest.mark.parametrize('header', [False, True])
 @pytest.mark.parametrize('name', GALLERY)

@@ -48,7 +48,7 @@ def right(name: str, given: Sequence[State]) -> list[Told]:
     ]
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @needs['C99']
 @pytest.mark.parametrize('name', GALLERY)
 def test_c_code_equals_the_steps_at_huge_rates(name, tmp_path):
@@ -58,7 +58,7 @@ def test_c_code_equals_the_steps_at_huge_rates(name, tmp_path):
     assert max(abs(value) for one in told for value in one.values) > 1e120
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', GALLERY)
 def test_python_module_equals_the_steps_at_huge_rates(name):
     given = huge_states(name)
@@ -66,7 +66,7 @@ def test_python_module_equals_the_steps_at_huge_rates(name):
     assert [told_by(solve, state) for state in given] == right(name, given)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @needs['JavaScript']
 # Not Bennett's linkage: joints that close by redundant equations are differences of large numbers.
 @pytest.mark.parametrize('name', [name for name in GALLERY if name != 'bennett'])

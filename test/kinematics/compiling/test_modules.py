@@ -61,7 +61,7 @@ def told_by(solve: Solve, state: State) -> Told:
     return Told(NUMBERS[status], tuple(value for group in groups for value in group))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_python_module_equals_the_steps_bit_for_bit(name):
@@ -218,7 +218,7 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
     return worst
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @needs['JavaScript']
 @pytest.mark.timeout(600)
 # Not the ankle: states next to its toggles magnify the last bits of sine and cosine.
@@ -322,7 +322,7 @@ EXCHANGED = {
 """For each linkage what is given instead of its inputs: joints, coordinates, distances, angles."""
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     'run',
     [

@@ -331,7 +331,7 @@ def neighbours(closure: Closure, state: tuple[float, ...]) -> list[Position]:
     ]
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS, EXCHANGED])
 def test_batch_equals_single_states_inside_and_beyond_the_range(name):
     closure, inputs = case_of(name)
@@ -353,7 +353,7 @@ def test_batch_equals_single_states_of_iterated_spatial_linkages(name):
     assert {Status.CLOSED} < check(closure, samples(beyond, 30))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('family', FAMILIES)
 def test_batch_equals_single_states_of_random_linkages(family):
     topology = FAMILIES[family].make(random.Random(f'{SEED}/{family}/0'))

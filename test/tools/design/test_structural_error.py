@@ -364,7 +364,7 @@ def test_fit_recovers_free_zeros():
     assert found.pivots == true.pivots
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('number', range(12))
 @pytest.mark.parametrize('noise', [1e-3, 0.03])
 def test_angle_fit_improves_the_equation_fit(number, noise):
@@ -419,7 +419,7 @@ def test_free_zeros_reduce_the_fit_error():
     assert root_mean_square(free) < 0.2 * root_mean_square(fit_angles(start))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('number', range(12))
 def test_nearest_four_bar_has_the_least_error(number):
     """Noise on eight pairs: the linkage that they were taken of is one that must be beaten."""

@@ -68,7 +68,7 @@ def struck_by_leaders(axes: Any) -> list[str]:
     return struck
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', linkage_names())
 def test_names_in_a_picture_do_not_overlap(name):
     figure = drawn(name)

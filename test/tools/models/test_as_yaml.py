@@ -46,7 +46,7 @@ def check(data):
     assert read.split() == text.split(), 'lines are folded, and that is all'
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('write', [urdf_model, mujoco_model])
 @pytest.mark.parametrize('file', FILES, ids=lambda file: f'{file.parent.name}/{file.stem}')
 def test_shipped_models_are_one_yaml_text(file, write):
@@ -101,7 +101,7 @@ def test_models_with_odd_names_are_one_yaml_text(names, robot):
 EXPRESSIONS = ['${1+1}', 'a$(pwd)', '$${x}', '$$(x)', '${']
 
 
-@pytest.mark.sample(15)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize('odd', EXPRESSIONS)
 @pytest.mark.parametrize('place', range(9))
 def test_urdf_refuses_names_that_xacro_would_evaluate(place, odd):

@@ -469,7 +469,7 @@ def robot_file(folder, name):
     return file, {}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names(), *CHOICES])
 def test_imported_linkage_file_equals_the_robot_exactly(tmp_path, name):
     file, told = robot_file(tmp_path, name)

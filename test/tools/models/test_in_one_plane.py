@@ -219,6 +219,7 @@ IN_SPACE = ('animation', 'engine', 'page')
 """What is written of a spatial linkage too."""
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('output', OUTPUTS)
 @pytest.mark.parametrize('source', DRAWN)
 def test_planar_commands_accept_planar_robots_only(tmp_path, monkeypatch, source, output, capsys):

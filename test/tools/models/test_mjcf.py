@@ -77,7 +77,7 @@ def case(name):
     return closure_of(name) if name in ODD else moving(LINKAGES / f'{name}.yaml').closures[0]
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', CASES)
 def test_mujoco_model_starts_closed(name):
     closure = case(name)
@@ -102,7 +102,7 @@ ROUNDING = 1e-14
 """Of the linkage's size: what the sums of some ten lengths round to."""
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', CASES)
 def test_mujoco_model_is_closed_after_reset(name):
     """Where no key is asked for, a simulation starts at qpos0: that is the same pose."""
@@ -124,7 +124,7 @@ def test_mujoco_model_is_closed_after_reset(name):
     assert np.isfinite(state.qpos).all()
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', CASES)
 def test_mujoco_model_moves_as_the_closure(name):
     closure = case(name)

@@ -45,7 +45,7 @@ def off(model, state, closure):
     return worst / closure.scale
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', spatial_linkage_names())
 def test_spatial_mjcf_starts_closed_and_moves_as_the_closure(name):
     closure = load(name)

@@ -48,7 +48,7 @@ def models():
     return {}
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('powers', [FINE, COARSE], ids=['fine', 'coarse'])
 @pytest.mark.parametrize('name', [*linkage_names(), *spatial_linkage_names()])
 def test_cad_noise_and_joint_order_change_no_pose(tmp_path, models, name, powers):

@@ -362,6 +362,7 @@ def hexapod(tmp_path_factory):
     return model_and_robot('hexapod', tmp_path_factory.mktemp('hexapod'))
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize('name', [*spatial_linkage_names(), *STRUTS])
 def test_spatial_linkage_survives_the_urdf_round_trip(tmp_path, name, request):
     file = STRUTS.get(name, name)

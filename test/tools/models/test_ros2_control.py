@@ -129,7 +129,7 @@ def described(closure, joints, commanded, reductions, offsets=None):
     return [*lines, 'configure']
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', CASES)
 def test_transmission_maps_motors_to_joints_and_back(programs, name):
     """Numbers are those of the closure; efforts are those of virtual work."""
@@ -437,7 +437,7 @@ def test_uncreatable_package_folder_is_refused_in_one_line(name, tmp_path, capsy
     assert [file.name for file in tmp_path.iterdir()] == ['file']
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('count', range(6))
 @pytest.mark.parametrize('force', [False, True])
 def test_full_disk_leaves_no_partial_package(count, force, tmp_path, capsys, monkeypatch):

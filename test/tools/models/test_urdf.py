@@ -99,7 +99,7 @@ def limits_of(data):
     }
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_urdf_limits_enclose_the_published_joints_closely(name):
     """A node that starts where the linkage starts publishes nothing beyond the limits."""
@@ -142,7 +142,7 @@ def swept(pipeline, name, values):
             yield heard(message)
 
 
-@pytest.mark.sample(20)
+@pytest.mark.sample(10)
 @pytest.mark.parametrize('angles', ['continuous', 'wrapped'])
 @pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_urdf_limits_enclose_the_whole_input_range(name, angles):

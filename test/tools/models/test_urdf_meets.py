@@ -57,7 +57,7 @@ def check(data, closure, messages, within=1e-12):
     return count, cuts
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ONE_INPUT)
 def test_urdf_cut_pins_of_gallery_linkages_meet(name):
     file = LINKAGES / f'{name}.yaml'
@@ -79,7 +79,7 @@ def test_urdf_cut_pins_of_a_five_bar_meet():
     assert count == 60
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', ODD)
 def test_urdf_cut_pins_of_odd_frames_meet(name):
     closure = closure_of(name)

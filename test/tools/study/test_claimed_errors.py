@@ -131,7 +131,7 @@ def joints_of(name, theta):
     return {'drive_joint': theta, 'crank_joint': theta}
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ('name', 'text', 'method', 'limits', 'like', 'truth'), TORQUE, ids=lambda each: str(each)[:24]
 )
@@ -326,7 +326,7 @@ def of_all_phases(closure, speed, age):
     }
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize('rpm', SPEEDS)
 @pytest.mark.parametrize('name', ['four_bar', 'whitworth_quick_return', 'slider_crank'])
 @pytest.mark.parametrize('periods', [QUICK, 300])
@@ -345,7 +345,7 @@ def test_age_in_use_error_covers_all_crank_phases(tmp_path, name, rpm, periods):
             assert rms / 1.35 <= claimed.rms <= 1.35 * rms, (rate, use)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('rpm', SPEEDS)
 @pytest.mark.parametrize('carried', [True, False])
 def test_command_age_error_covers_all_crank_phases(tmp_path, rpm, carried):

@@ -64,7 +64,7 @@ def states_of(closure: Closure, found: dict[str, Any]) -> list[list[list[float]]
     return states
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @needs_node
 @pytest.mark.parametrize('name', sorted(linkage_names()))
 def test_compiled_model_moves_every_link_as_the_closure(name: str, tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_frame_rates_equal_differences_of_frames(tmp_path: Path) -> None:
     assert now['frameRates'] == pytest.approx(differences, abs=1e-8)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('name', linkage_names())
 def test_model_names_joints_pins_and_lengths_of_the_file(name: str) -> None:
     found = build_model(text_of(name), name)
@@ -145,7 +145,7 @@ def test_quick_model_omits_ranges_and_quality() -> None:
     assert {'others', 'ranges', 'quality', 'warnings'}.isdisjoint(found)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', linkage_names())
 def test_quick_model_equals_the_whole_model_otherwise(name: str) -> None:
     found = build_model(text_of(name), name)

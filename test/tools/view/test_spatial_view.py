@@ -86,7 +86,7 @@ def drag(page: Any, start: np.ndarray, end: np.ndarray) -> None:
     page.mouse.up()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('name', COMPILED)
 def test_page_places_points_as_the_closure(
     browser: Any, stills: Callable[[str], Path], name: str

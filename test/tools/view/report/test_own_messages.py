@@ -214,7 +214,7 @@ REJECTED = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('reason', REJECTED)
 def test_report_names_the_reason_of_rejected_samples(tmp_path, reason):
     bad = REJECTED[reason]

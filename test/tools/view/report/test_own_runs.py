@@ -145,7 +145,7 @@ HAPPENS = {
 }
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('block', [8192, 64])
 @pytest.mark.parametrize('name', HAPPENS)
 def test_event_appears_on_its_track_at_its_time(tmp_path, monkeypatch, name, block):
@@ -242,7 +242,7 @@ BEGUN_LATER = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('block', [8192, 1])
 @pytest.mark.parametrize('name', BEGUN_LATER)
 def test_fault_begun_before_the_bag_starts_with_it(tmp_path, monkeypatch, name, block):

@@ -831,7 +831,7 @@ HIDDEN_LEGENDS = """() => [...document.querySelectorAll('[data-plot]')]
   })"""
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('width', [400, 700, 1000])
 @pytest.mark.parametrize('name', ['n{}', 'cylinder_number_{}'])
 def test_buttons_hide_no_legend(browser, tmp_path, name, width):

@@ -86,7 +86,7 @@ def test_report_points_equal_those_of_the_closure(file):
     assert found.apart.max() < 1e-12 * size
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_report_shapes_equal_those_of_draw(file):
     closure = closure_of(file)
@@ -180,7 +180,7 @@ def of(text, kind):
     return np.frombuffer(b64decode(text), kind)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_gallery_links_are_drawn_at_the_recorded_inputs(tmp_path, file):
     scene_file = tmp_path / 's.yaml'
