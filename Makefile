@@ -200,23 +200,11 @@ accuracy_page: $(STAMP)
 round_trips: $(STAMP)
 	@$(BIN)/python -m campaigns.synthesis
 
-damage: $(STAMP)
-	@$(BIN)/python -m campaigns.damage --write
-
-kills: $(STAMP)
-	@$(BIN)/python -m campaigns.kills --write
-
-disk: $(STAMP)
-	@$(BIN)/python -m campaigns.disk --write
-
-attacks: $(STAMP)
-	@$(BIN)/python -m campaigns.attacks --write
+damage kills disk attacks endurance: $(STAMP)
+	@$(BIN)/python -m campaigns.reliability $@ --write
 
 mutants: $(STAMP)
 	@$(BIN)/python -m campaigns.mutants $(if $(SEED),--seed $(SEED))
-
-endurance: $(STAMP)
-	@$(BIN)/python -m campaigns.endurance --write
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py

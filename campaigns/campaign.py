@@ -38,6 +38,14 @@ class Page(NamedTuple):
     introduction: str
 
 
+class Findings(NamedTuple):
+    """The outcome of a campaign: tables, a line for each violation, rows about the run."""
+
+    tables: list[Table]
+    faults: list[str]
+    facts: Sequence[tuple[str, str]] = ()
+
+
 def parser_of(
     name: str,
     description: str | None,

@@ -9,7 +9,7 @@
 """
 A disk whose calls fail, one by one: what ends a recording, what does not, and what is counted.
 
-All calls in all ways are the matter of ``campaigns.disk``.
+All calls in all ways are the matter of ``campaigns.reliability.disk``.
 """
 
 import errno

@@ -14,10 +14,16 @@ from pathlib import Path
 import random
 from random import Random
 
-from campaigns.attacks import files, signals
-from campaigns.attacks.bags import attack, change_bag, COMMANDS as BAG_COMMANDS, fault_of
-from campaigns.attacks.files import mutated
-from campaigns.in_process import Ended
+from campaigns.reliability import hostile_files, signals
+from campaigns.reliability.hostile_bags import (
+    attack,
+    change_bag,
+    COMMANDS as BAG_COMMANDS,
+    MANNERS,
+)
+from campaigns.reliability.hostile_files import manners, mutated
+from campaigns.reliability.judge import fault_of
+from campaigns.reliability.processes import Ended
 from linkage_ros.cli import COMMANDS
 import pytest
 
@@ -33,9 +39,10 @@ COUNT = sample_count(40, 12)
 
 
 def test_changed_files_cause_no_findings() -> None:
-    tried, findings = files.attack(COUNT, SEED)
-    assert findings == []
-    assert sum(tried.values()) == COUNT
+    attacked = hostile_files.attack(COUNT, SEED)
+    assert attacked.findings == []
+    tried = attacked.tried
+    assert tried.total() == COUNT
     assert any(end.endswith(': 0') for end in tried)
     assert any(end.endswith(': 2') for end in tried)
 
@@ -55,13 +62,13 @@ def test_every_linkage_command_is_attacked_with_changed_files() -> None:
         'compare',
         'completion',
     }
-    assert set(files.COMMANDS) == set(COMMANDS) - without
+    assert set(hostile_files.COMMANDS) == set(COMMANDS) - without
 
 
 def test_signals_end_commands() -> None:
-    tried, findings = signals.attack(6, SEED)
-    assert findings == []
-    assert sum(tried.values()) == 6
+    attacked = signals.attack(6, SEED)
+    assert attacked.findings == []
+    assert attacked.tried.total() == 6
 
 
 def test_mutated_files_differ_in_many_ways() -> None:
@@ -85,6 +92,7 @@ def test_mutated_files_differ_in_many_ways() -> None:
             False,
         ),
         ('accuracy', 0, 'accuracy of x: 4 of 30\n', False),
+        ('animate', 0, 'pictures: 1 of 4\n', False),
         ('accuracy', 2, 'accuracy of x: 4 of 30\nlinkage accuracy: x: is wrong\n', False),
         ('replay', 2, 'linkage replay: one\nlinkage replay: other\n', True),
         ('replay', 0, 'RuntimeWarning: overflow', True),
@@ -99,7 +107,7 @@ def test_mutated_files_differ_in_many_ways() -> None:
     ],
 )
 def test_the_judge_detects_faults(command, code, errors, is_fault) -> None:
-    assert bool(files.fault_of(command, code, errors)) is is_fault
+    assert bool(fault_of(Ended(code, errors), manners(command))) is is_fault
 
 
 # A sample of the attacks with bags: each command shows the content, or one line with the reason.
@@ -113,9 +121,9 @@ SAMPLE = 20
 
 
 def test_changed_bags_cause_no_findings() -> None:
-    tried, findings = attack(SAMPLE, BAG_SEED)
-    assert findings == []
-    assert sum(tried.values()) == SAMPLE * len(BAG_COMMANDS)
+    attacked = attack(SAMPLE, BAG_SEED)
+    assert attacked.findings == []
+    assert attacked.tried.total() == SAMPLE * len(BAG_COMMANDS)
 
 
 def test_equal_seeds_change_a_bag_equally(tmp_path: Path) -> None:
@@ -145,7 +153,7 @@ def test_equal_seeds_change_a_bag_equally(tmp_path: Path) -> None:
 )
 def test_judge_reports_bad_ends_of_commands(end: tuple[object, str, str], fault: str) -> None:
     code, stdout, stderr = end
-    finding = fault_of(Ended(code, stderr, stdout))
+    finding = fault_of(Ended(code, stderr, stdout), MANNERS)
     assert fault in finding
     assert bool(finding) == bool(fault)
 

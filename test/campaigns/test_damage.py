@@ -13,20 +13,18 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from campaigns import damage as judge_module
-from campaigns.damage import (
-    FAULT,
+from campaigns.reliability import damage as judge_module
+from campaigns.reliability.damage import (
     judge_reading,
     judge_salvage,
     JUDGES,
-    KILLED,
-    KINDS,
     make,
-    OURS,
     parts,
-    run,
+    run_parts,
     Tally,
 )
+from campaigns.reliability.judge import FAULT
+from campaigns.reliability.recording import KILLED, OURS, WRITERS
 from linkage_ros.bag import Bag, BagMessage
 import pytest
 
@@ -42,14 +40,14 @@ SIZE = 40_000
 @pytest.fixture(scope='module')
 def tally() -> Tally:
     tally = Tally()
-    for _, judged in run(parts([*KINDS], SEED, SIZE, SAMPLE), jobs=1):
+    for _, judged in run_parts(parts([*WRITERS], SEED, SIZE, SAMPLE), jobs=1):
         tally.add(judged)
     return tally
 
 
 def test_damage_is_reported_or_harmless(tally: Tally) -> None:
     assert tally.faults == []
-    assert sum(tally.verdicts.values()) == len(KINDS) * 2 * SAMPLE * len(JUDGES)
+    assert sum(tally.verdicts.values()) == len(WRITERS) * 2 * SAMPLE * len(JUDGES)
 
 
 @pytest.mark.sample(0)

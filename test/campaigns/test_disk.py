@@ -14,22 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from campaigns.campaign import results_of
-from campaigns.disk import filling, stalling
-from campaigns.disk.failing import attempt, injections, Part, Tried
-from campaigns.disk.filling import Disk, NotPermittedError
-from campaigns.disk.injection import FAULTS, why_not
-from campaigns.disk.judge import (
-    COMPLETE,
-    EARLY,
-    Expectation,
-    expected_messages,
-    judge,
-    MESSAGES,
-    record,
-    Recorded,
-    REFUSED,
-    SETTINGS,
-)
+from campaigns.reliability import filling, stalling
+from campaigns.reliability.disk import attempt, MESSAGES, Part, record_short, SETTINGS, Tried
+from campaigns.reliability.filling import Disk, NotPermittedError
+from campaigns.reliability.judge import COMPLETE, EARLY, Expectation, judge, REFUSED
+from campaigns.reliability.recording import expected_messages, Phase, Recorded
+from campaigns.reliability.system_calls import FAULTS, injections, why_not
 from linkage_ros.bag import METADATA_FILE
 import pytest
 
@@ -63,7 +53,7 @@ def test_disk_sample_covers_targets_phases_and_faults(tried: list[Tried]) -> Non
     failed = [one.failed_call for one in tried if one.failed_call]
     assert len(failed) == len(tried)
     assert {call.target for call in failed} >= {'file', 'metadata', 'folder', 'reserve'}
-    assert {call.phase for call in failed} == {'beginning', 'recording', 'closing'}
+    assert {call.phase for call in failed} == {*Phase} - {Phase.STARTING, Phase.CLOSED}
     assert {one.injection.fault for one in tried if one.injection} >= {
         fault for fault in FAULTS if fault != 'EOPNOTSUPP'
     }
@@ -107,8 +97,13 @@ def test_stalled_disk_delays_no_tick_and_loses_no_message(stalled: stalling.Stal
     assert stalled.during > 100
 
 
+class Unwatched:
+    def enter(self, phase: Phase, written: int) -> None:
+        pass
+
+
 def at_rest(folder: Path) -> Recorded:
-    return record(folder, SETTINGS['one file'], lambda phase: None)
+    return record_short(folder, SETTINGS['one file'], Unwatched())
 
 
 def test_the_judge_detects_a_wrong_count(tmp_path: Path) -> None:

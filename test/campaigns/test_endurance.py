@@ -16,9 +16,10 @@ import shutil
 from subprocess import PIPE, Popen
 import sys
 
-from campaigns.endurance import over_dds
-from campaigns.endurance.accelerated import Plan, run_all
-from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
+from campaigns.reliability import over_dds
+from campaigns.reliability.accelerated import Plan, run_all
+from campaigns.reliability.judge import shortcomings
+from campaigns.reliability.memory import flatness, MOST_GROWTH, Usage, usage
 from linkage_ros.bag import BagWriter, Topic, TopicCounts
 import pytest
 

@@ -6,9 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Floods of messages and storms of calls, from `campaigns.attacks.graph`, bounded in time."""
+"""Floods of messages and storms of calls, from `campaigns.reliability.graph`, bounded in time."""
 
-from campaigns.attacks.graph import attack
+from campaigns.reliability.graph import attack
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.messages import JointStateWriter, SampleRouter
@@ -24,8 +24,9 @@ REAL_STARTS = True
 
 
 def test_message_floods_and_call_storms_leave_counts_exact():
-    tried, findings = attack(12.0, 7)
-    assert findings == []
+    attacked = attack(12.0, 7)
+    assert attacked.findings == []
+    tried = attacked.tried
     assert tried['of these received'] > 100
     assert tried['of these rejected'] > 0
     assert tried['change_state'] > 0

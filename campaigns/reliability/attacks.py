@@ -7,23 +7,22 @@
 # language governing permissions and limitations under the License.
 
 """
-``python -m campaigns.attacks``: random hostile input to everything that takes input.
+Random hostile input to everything that takes input.
 
 No input may cause a traceback, a hang, unlimited memory, or more than a screen of output.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
-from datetime import datetime
 from functools import partial
 from pathlib import Path
-import sys
-import time
 
-from bench.report import machine_table, say, Table
-from campaigns.attacks import bags, files, graph, signals
-from campaigns.campaign import exit_code, Page, parser_of, publish
+from bench.report import Table
+from campaigns.campaign import Findings, Page
+from campaigns.reliability import graph, hostile_bags, hostile_files, signals
+from campaigns.reliability.attack import Attacked
 
 PAGE = Page(
     Path('docs/recordings/attacks.md'),
@@ -45,38 +44,28 @@ account for every message. Any other outcome is a finding.
 """,
 )
 
-_Attack = Callable[[], tuple[dict[str, int], list[str]]]
 
-
-def main() -> int:
-    """Attack; return 1 if there are findings."""
-    parser = parser_of('attacks', __doc__, page=PAGE)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--files', type=int, default=3000, help='changed files')
     parser.add_argument('--signals', type=int, default=60, help='commands that get a signal')
     parser.add_argument('--bags', type=int, default=300, help='hostile bags')
     parser.add_argument('--seconds', type=float, default=60.0, help='duration on the graph')
-    options = parser.parse_args()
-    started, begin = time.monotonic(), datetime.now().astimezone()
-    attacks: dict[str, _Attack] = {
-        'Files': partial(files.attack, options.files, options.seed, options.jobs),
-        'Bags': partial(bags.attack, options.bags, options.seed, options.jobs),
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Attack."""
+    attacks: dict[str, Callable[[], Attacked]] = {
+        'Files': partial(hostile_files.attack, options.files, options.seed, options.jobs),
+        'Bags': partial(hostile_bags.attack, options.bags, options.seed, options.jobs),
         'Signals': partial(signals.attack, options.signals, options.seed),
         'Graph': partial(graph.attack, options.seconds, options.seed),
     }
-    tables, any_findings = [], False
+    findings = Findings([], [])
     for name, attack in attacks.items():
-        tried, findings = attack()
-        table = Table(f'{name}: {sum(tried.values()):,} tried, {len(findings)} findings', ('', ''))
-        table.rows.extend((end, f'{count:,}') for end, count in tried.items())
-        tables.append(table)
-        any_findings |= bool(findings)
-        for finding in findings:
-            say(finding)
-    took = f'{time.monotonic() - started:.0f} s'
-    tables.append(machine_table(begin, ('seed', str(options.seed)), ('took', took)))
-    publish(tables, PAGE if options.write else None)
-    return int(any_findings)
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))
+        done = attack()
+        title = f'{name}: {done.tried.total():,} tried, {len(done.findings)} findings'
+        rows = [(end, f'{count:,}') for end, count in done.tried.items()]
+        findings.tables.append(Table(title, ('', ''), [*rows]))
+        findings.faults.extend(done.findings)
+    return findings

@@ -26,18 +26,18 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any, NamedTuple
 
-from bench.report import say
+from bench.report import say, Table
 from campaigns.campaign import progress_lines
-from campaigns.endurance.memory import shortcomings, Usage, usage
+from campaigns.reliability.judge import shortcomings
+from campaigns.reliability.memory import nearest, Usage, usage, verdict_table
+from campaigns.reliability.recording import JOINT_STATE, START, wait_for
 from linkage_ros.bag import BagWriter, Recorder, RecordingSummary, Storage, Topic
-from linkage_ros.description import load_scene, Scene
+from linkage_ros.description import load_scene
 from linkage_ros.messages import JointStateWriter, NANOSECONDS
 from linkage_ros.tick import Pipeline, TickLoop
 from rosbags.typesys import get_typestore, Stores
 
 SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
-_BEGIN = 1_700_000_000 * NANOSECONDS
-_JOINT_STATE = 'sensor_msgs/msg/JointState'
 _SPEED = 0.5  # of the crank [turns/s]
 _BURST = 500  # ticks between two checks of the queue
 _FLUSH_PERIOD = 0.004
@@ -85,7 +85,8 @@ def run(plan: Plan) -> Run:
 
 
 def _run(plan: Plan, folder: Path) -> Run:
-    scene = _scene(plan, folder)
+    rate = r'^rate: [\d.]+', f'rate: {plan.rate:g}'
+    scene = load_scene(changed_scene(folder, plan.scene, *rate))
     pending: list[tuple[bytes, dict[str, Any]]] = []
     take = partial(_take, pending)
     pipeline = Pipeline(scene)
@@ -108,16 +109,16 @@ def _run(plan: Plan, folder: Path) -> Run:
     begin = time.monotonic()
     samples = [usage(0.0)]
     for tick in range(1, ticks + 1):
-        now = _BEGIN + tick * period
+        now = START + tick * period
         if from_topic:
             angle, rate = _crank_at(tick / plan.rate)
             message = crank(now - 100_000, (angle,), (rate,))
             pending.append((message, {'source_timestamp': now - 90_000}))
         loop.tick_at(now)
         if tick % _BURST == 0:
-            _wait_for(recorder, 4 * _BURST)
+            wait_for(recorder, 4 * _BURST)
         if tick % between == 0:
-            _wait_for(recorder, 0)
+            wait_for(recorder, 0)
             samples.append(usage(tick / plan.rate))
             progress(between)
     seconds = time.monotonic() - begin
@@ -136,12 +137,6 @@ def _run(plan: Plan, folder: Path) -> Run:
     return done
 
 
-def _wait_for(recorder: Recorder, most: int) -> None:
-    """Wait until the recorder's queue has at most so many messages."""
-    while recorder.failure is None and sum(c.waiting for c in recorder.read_counts()) > most:
-        time.sleep(0.001)
-
-
 def _take(pending: list[tuple[bytes, dict[str, Any]]]) -> tuple[bytes, dict[str, Any]] | None:
     return pending.pop() if pending else None
 
@@ -152,23 +147,23 @@ def _crank_at(seconds: float) -> tuple[float, float]:
     return turns + 0.3 * sin(turns), tau * _SPEED * (1.0 + 0.3 * cos(turns))
 
 
-def _scene(plan: Plan, folder: Path) -> Scene:
-    """Return the scene with another rate."""
-    text = (SCENES / f'{plan.scene}.yaml').read_text()
-    text = re.sub(r'^rate: [\d.]+', f'rate: {plan.rate:g}', text, flags=re.MULTILINE)
-    file = folder / f'{plan.scene}.yaml'
+def changed_scene(folder: Path, name: str, pattern: str, by: str) -> Path:
+    """Write a scene that comes with the package, with another line; return its file."""
+    text = (SCENES / f'{name}.yaml').read_text()
+    text = re.sub(pattern, by, text, flags=re.MULTILINE)
+    file = folder / f'{name}.yaml'
     file.write_text(text.replace('../linkages', str(SCENES.parent / 'linkages')))
-    return load_scene(file)
+    return file
 
 
 def _topics(pipeline: Pipeline) -> list[Topic]:
     """Describe the topics in the order of the tick loop's numbers."""
     kinds = {
-        '/joint_states': _JOINT_STATE,
+        '/joint_states': JOINT_STATE,
         '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
     }
     if pipeline.topic:
-        kinds['/crank_states'] = _JOINT_STATE
+        kinds['/crank_states'] = JOINT_STATE
     if pipeline.suppresses_ticks:
         kinds['/linkage_node/withheld'] = 'builtin_interfaces/msg/Time'
     kinds |= {
@@ -179,3 +174,52 @@ def _topics(pipeline: Pipeline) -> list[Topic]:
         Topic(name, kind, store.generate_msgdef(kind, ros_version=2)[0], store.hash_rihs01(kind))
         for name, kind in kinds.items()
     ]
+
+
+MESSAGES = ('', 'received', 'recorded', 'dropped', 'removed by the ring')
+
+
+def tables_of(runs: Sequence[Run]) -> list[Table]:
+    """Return the memory by the hour, its verdicts, the counts of messages and the durations."""
+    first = runs[0].plan
+    title = f'Accelerated: {first.hours:g} h at {first.rate:g} Hz'
+    memory = Table(
+        f'{title}, memory in kB',
+        ('hour', *(f'{run.plan.name} ({run.plan.hours:g} h)' for run in runs)),
+    )
+    step = first.hours / 24.0
+    for index in range(25):
+        memory.rows.append(
+            [f'{index * step:.3g}', *(_at(run.samples, 3600.0 * index * step) for run in runs)]
+        )
+    single = [run.plan.name for run in runs if not run.plan.keep_files]
+    verdicts = verdict_table(title, {run.plan.name: run.samples for run in runs}, single)
+    messages = Table(f'{title}, messages', MESSAGES)
+    for run in runs:
+        for counts in run.summary.topics:
+            numbers = (counts.received, counts.recorded, counts.dropped, counts.discarded)
+            messages.rows.append([f'{run.plan.name}: {counts.name}', *(f'{n:,}' for n in numbers)])
+    took = Table(
+        f'{title}, duration',
+        ('', 'h', 'ticks', 's', 'µs a tick', 'faults'),
+        [
+            [
+                run.plan.name,
+                f'{run.plan.hours:g}',
+                f'{ticks:,}',
+                f'{run.seconds:.0f}',
+                f'{1e6 * run.seconds / ticks:.1f}',
+                '; '.join(run.faults) or 'none',
+            ]
+            for run in runs
+            for ticks in [round(run.plan.hours * 3600.0 * run.plan.rate)]
+        ],
+    )
+    return [memory, verdicts, messages, took]
+
+
+def _at(samples: Sequence[Usage], time: float) -> str:
+    """Return the memory at a time; '' after the end."""
+    if time > samples[-1].time * 1.001:
+        return ''
+    return f'{nearest(samples, time).resident:,}'

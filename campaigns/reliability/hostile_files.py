@@ -15,21 +15,18 @@ a line that is no longer than a screen. Any other outcome is a finding.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping
-import os
 from pathlib import Path
 import random
 import re
 from shutil import rmtree
-import subprocess
-import sys
-from typing import Any
 import warnings
 
-from campaigns.campaign import attack_in_parts
-from campaigns.in_process import confined, in_process
-from linkage_ros.bag import BagWriter, Topic
+from campaigns.reliability.attack import attack_in_parts, Attacked
+from campaigns.reliability.judge import fault_of, Manners
+from campaigns.reliability.processes import confined, Ended, in_own_process, in_process
+from campaigns.reliability.recording import by_linkage_ros, JOINT_STATE, START
+from linkage_ros.bag import Topic
 from linkage_ros.description import parse_yaml, read_linkage
 from linkage_ros.messages import JointStateWriter
 from linkage_ros.resources import shipped_path
@@ -152,16 +149,8 @@ def _replaced(pattern: re.Pattern[bytes], data: bytes, rng: random.Random, by: b
     return data[:start] + by + data[end:]
 
 
-_PART = 50
-"""Number of files in a part."""
-
 _SECONDS = 60.0
 """Time limit of a command, in [s]; on a shared processor the slowest takes seconds."""
-
-_LONGEST_LINE = 1000
-
-_BESIDE = 'left out: ', 'accuracy of '
-"""Begin of lines beside a result: omissions of an import, progress of a measurement."""
 
 _NODE = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF',
@@ -199,23 +188,18 @@ _TABLES = {
 }
 
 
-def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
-    """Run commands on a number of changed files; return what `attack_in_parts` returns."""
-    return attack_in_parts(_part, count, seed, _PART, jobs)
+def attack(count: int, seed: int, jobs: int = 1) -> Attacked:
+    """Run commands on a number of changed files."""
+    return attack_in_parts(_attack, count, seed, jobs, part=50)
 
 
-def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
-    seed, begin, end = part
-    tried, findings = Counter[str](), []
+def _attack(seed: int, numbers: range, attacked: Attacked) -> None:
     with warnings.catch_warnings(), confined() as folder:
         warnings.simplefilter('default')
         originals = _originals(folder)
-        for index in range(begin, end):
-            outcome, finding = _try(originals, f'{seed} {index}')
-            tried[outcome] += 1
-            if finding:
-                findings.append(f'file {seed} {index}: {finding}')
-    return tried, findings
+        for number in numbers:
+            outcome, finding = _try(originals, f'{seed} {number}')
+            attacked.add(outcome, finding and f'file {seed} {number}: {finding}')
 
 
 def _originals(folder: Path) -> dict[str, dict[str, bytes]]:
@@ -247,13 +231,12 @@ def _record(linkages: Mapping[str, bytes]) -> None:
         for driven in read_linkage(parse_yaml(content, name)).inputs
     }
     write = JointStateWriter([*inputs]).write
-    topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', 'text', 'RIHS01_' + '0a' * 32)
-    bag = BagWriter(Path('bag'), [topic], {})
-    for index in range(20):
-        stamp = 1_700_000_000_000_000_000 + 1_000_000 * index
-        angles = [0.01 * index] * len(inputs)
-        bag.write(0, stamp, stamp, write(stamp, angles, [10.0] * len(inputs)))
-    bag.close()
+    topic = Topic('/crank_states', JOINT_STATE, 'text', 'RIHS01_' + '0a' * 32)
+    stamps = [START + 1_000_000 * index for index in range(20)]
+    rates = [10.0] * len(inputs)
+    samples = [write(stamp, [0.01 * i] * len(inputs), rates) for i, stamp in enumerate(stamps)]
+    messages = [(0, stamp, stamp, data) for stamp, data in zip(stamps, samples, strict=True)]
+    by_linkage_ros(Path('bag'), [topic], {}, messages)
 
 
 def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
@@ -272,44 +255,33 @@ def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
         case _:
             command, arguments = 'synthesize', ['synthesize', f'--{name}', _FILE]
             arguments += ['--candidates', '200']
-    starts_node = command in ('run', 'relay')
-    code, errors = _node(arguments) if starts_node else in_process(arguments, _SECONDS)[:2]
+    if command in ('run', 'relay'):
+        ended = in_own_process(arguments, _SECONDS, **_NODE)
+        # Leave out the log lines of the node.
+        lines = [line for line in ended.stderr.splitlines() if line[:4] not in ('INFO', 'WARN')]
+        ended = Ended(ended.code, '\n'.join(lines))
+    else:
+        ended = in_process(arguments, _SECONDS)
     for folder in ('page', 'runs'):
         rmtree(folder, ignore_errors=True)
-    fault = fault_of(command, code, errors)
-    return f'{command}: {code}', fault and f'{name}: {changes}: {" ".join(arguments)}: {fault}'
+    fault = fault_of(ended, manners(command))
+    outcome = f'{command}: {ended.code}'
+    return outcome, fault and f'{name}: {changes}: {" ".join(arguments)}: {fault}'
 
 
-def _node(arguments: list[str]) -> tuple[Any, str]:
-    """Run a command that starts a node in a process of its own; return exit code and errors."""
-    try:
-        ended = subprocess.run(
-            [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
-            env=os.environ | _NODE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            timeout=_SECONDS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return 'no end', f'more than {_SECONDS} s'
-    # Leave out the log lines of the node.
-    lines = [line for line in ended.stderr.splitlines() if not line.startswith(('INFO', 'WARN'))]
-    return ended.returncode, '\n'.join(lines)
+_BESIDE = '^(left out: |accuracy of |pictures: )'
+"""Lines beside a result: omissions of an import, progress of a measurement or of an animation."""
+
+_OTHERWISE = {
+    # All errors of a scene are reported.
+    'scene': Manners(errors=1000, beside=_BESIDE),
+    # There may be no linkage that meets the task.
+    'synthesize': Manners((0, 1, 2), beside=_BESIDE),
+    # What cannot be compared is told beside the result.
+    'replay': Manners(beside=_BESIDE, with_result='^linkage replay: '),
+}
 
 
-def fault_of(command: str, code: Any, errors: str) -> str:
-    """Return the fault of an end, in a line; '' if it is correct."""
-    lines = [line for line in errors.splitlines() if not line.startswith(_BESIDE)]
-    if command == 'replay' and code == 0:
-        lines = [line for line in lines if not line.startswith('linkage replay: ')]
-    if code == 0 or (command, code) == ('synthesize', 1):
-        return f'unexpected line: {lines[0][:200]}' if lines else ''
-    if code != 2:
-        return f'{code}: {errors.strip()[:300]}'
-    longest = max(map(len, lines), default=0)
-    # With jsonschema, all errors of a scene are reported.
-    if not lines or (len(lines) > 1 and command != 'scene'):
-        return f'{len(lines)} lines: {errors.strip()[:300]}'
-    return f'a line of {longest} characters: {errors[:100]}' if longest > _LONGEST_LINE else ''
+def manners(command: str) -> Manners:
+    """Return how a command has to end."""
+    return _OTHERWISE.get(command, Manners(beside=_BESIDE))

@@ -14,29 +14,37 @@ The disks have a few MiB and are mounted temporarily, where that is permitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
+from itertools import product
 import os
 from pathlib import Path
 import pickle
 import select
 import shutil
-import signal
+import socket
 import subprocess
 from tempfile import TemporaryDirectory
 from threading import Event, Thread
 from time import monotonic, sleep
 from typing import NamedTuple
 
-from campaigns.disk.judge import (
-    Expectation,
+from bench.report import say, Table
+from campaigns.reliability.judge import Expectation, judge, Outcome
+from campaigns.reliability.processes import forked
+from campaigns.reliability.recording import (
+    ATTACHMENTS,
     expected_messages,
-    judge,
-    offer_all,
-    Outcome,
+    message,
+    NumberedMessage,
+    record,
     Recorded,
+    time_of,
+    TOPICS,
+    wait_for,
 )
-from linkage_ros.bag import Storage
+from linkage_ros.bag import BagWriter, Recorder, Storage
 
 _NOBODY = 65534
 
@@ -115,6 +123,8 @@ def _do(*command: str) -> None:
 FLOOR = 1_500_000
 _PATIENCE = 120.0  # [s]
 _BLOCK = 4096
+_BURST = 50
+_MOST_WAITING = 400
 
 STORAGES: Mapping[str, Storage] = {
     'one file': Storage(flush_period=0.05),
@@ -127,22 +137,13 @@ STORAGES: Mapping[str, Storage] = {
 }
 
 
-class Filler(NamedTuple):
-    """
-    Another process that writes to the disk at a rate in [bytes/s].
-
-    If it is hungry, it continues to take all space that becomes free.
-    """
-
-    speed: float
-    hungry: bool
-
-
-FILLERS: Mapping[str, Filler | None] = {
+FILLERS: Mapping[str, bool | None] = {
+    # Whether another process, if there is one, continues to take all space that becomes free.
     'the recording alone': None,
-    'another process too': Filler(2e6, hungry=False),
-    'another process, which takes all free space': Filler(2e6, hungry=True),
+    'another process too': False,
+    'another process, which takes all free space': True,
 }
+_SPEED = 2e6  # of that process [bytes/s]
 
 
 class Filled(NamedTuple):
@@ -169,108 +170,110 @@ def fill(disk: Disk, storage: str, filler: str, count: int) -> Filled:
     Storage and filler are named in `STORAGES` and `FILLERS`. A NotPermittedError says that the
     disk cannot be mounted here.
     """
-    how = STORAGES[storage]
+    how, hungry = STORAGES[storage], FILLERS[filler]
     with (
         TemporaryDirectory(prefix='linkage_ros_full_') as name,
         mounted(disk, Path(name)) as folder,
     ):
         # The recording's user needs access.
         Path(name).chmod(0o755)
-        other = _Other(folder, FILLERS[filler])
-        done = _in_child(lambda: offer_all(folder / 'bag', how, count), disk.user, other.start)
-        other.stop()
+        recording = partial(_record, folder / 'bag', how, count, disk.user)
+        with forked(recording) as (_, ours), _beside(folder, hungry) as least:
+            done = _answer_of(ours)
         free = free_on(folder)
-        outcome = Outcome(faults=['did not end'])
-        if done is not None:
-            # Make space for the recovered bag.
-            other.make_room()
-            expectation = Expectation(expected_messages(done.offered))
-            outcome = judge(done, folder / 'bag', expectation, Path(name) / 'recovered')
-            if how.keep_files and filler == 'the recording alone' and done.failure:
-                outcome.faults.append('a ring that fits on the disk ended')
-        if how.min_free_bytes and FILLERS[filler] is None and other.least < how.min_free_bytes:
-            below = how.min_free_bytes - other.least
+        # Make space for the recovered bag.
+        (folder / 'other').unlink(missing_ok=True)
+        expectation = Expectation(expected_messages(done.offered if done else 0))
+        outcome = judge(done, folder / 'bag', expectation, Path(name) / 'recovered')
+        if done and how.keep_files and hungry is None and done.failure:
+            outcome.faults.append('a ring that fits on the disk ended')
+        below = how.min_free_bytes - least[0]
+        if how.min_free_bytes and hungry is None and below > 0:
             outcome.faults.append(f'{below:,} bytes below the floor')
         failure = (done.refused or done.failure or '') if done else ''
         failure = failure.replace(f'{folder}/bag: ', '')
-        return Filled(disk.name, storage, filler, outcome, other.least, free, failure)
+        return Filled(disk.name, storage, filler, outcome, least[0], free, failure)
 
 
-def cases(disks: Sequence[Disk]) -> Iterator[tuple[Disk, str, str]]:
-    """Yield all combinations of disk, storage and filler."""
-    for disk in disks:
-        for filler in FILLERS:
-            for storage in STORAGES:
-                yield disk, storage, filler
+def _record(folder: Path, storage: Storage, count: int, user: int, theirs: socket.socket) -> None:
+    """Record in a process of its own, as a user, until the recorder fails or all is offered."""
+
+    def messages(recorder: Recorder) -> Iterator[NumberedMessage]:
+        for index in range(count):
+            if index % _BURST == 0:
+                wait_for(recorder, _MOST_WAITING)
+                if recorder.failure is not None:
+                    return
+            yield message(index, time_of(index))
+
+    if user != os.geteuid():
+        os.setuid(user)
+    done = record(lambda: BagWriter(folder, TOPICS, ATTACHMENTS, storage), messages)
+    theirs.sendall(pickle.dumps(done))
+    theirs.close()
 
 
-class _Other:
-    """Watches the free space, and writes to the disk if it has a filler."""
+@contextmanager
+def _beside(folder: Path, hungry: bool | None) -> Iterator[list[int]]:
+    """Watch the least free space, and write to the disk beside the recording, if wanted."""
+    ended, least = Event(), [free_on(folder)]
 
-    def __init__(self, folder: Path, filler: Filler | None) -> None:
-        self._folder = folder
-        self._filler = filler
-        self._ended = Event()
-        self._thread = Thread(target=self._run)
-        self.least = free_on(folder)
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self) -> None:
-        self._ended.set()
-        if self._thread.ident is not None:
-            self._thread.join()
-
-    def make_room(self) -> None:
-        (self._folder / 'other').unlink(missing_ok=True)
-
-    def _run(self) -> None:
-        begin, written, full = monotonic(), 0, False
-        file = os.open(self._folder / 'other', os.O_WRONLY | os.O_CREAT) if self._filler else -1
-        try:
-            while not self._ended.is_set():
-                self.least = min(self.least, free_on(self._folder))
-                if self._filler is not None and not full:
-                    try:
-                        while written < self._filler.speed * (monotonic() - begin):
-                            written += os.write(file, bytes(_BLOCK))
-                    except OSError:
-                        full = not self._filler.hungry
+    def watch() -> None:
+        begin, written, full = monotonic(), 0, hungry is None
+        with Path(os.devnull if full else folder / 'other').open('wb', buffering=0) as file:
+            while not ended.is_set():
+                least[0] = min(least[0], free_on(folder))
+                try:
+                    while not full and written < _SPEED * (monotonic() - begin):
+                        written += file.write(bytes(_BLOCK)) or 0
+                except OSError:
+                    full = not hungry
                 sleep(0.0002)
-        finally:
-            if file >= 0:
-                os.close(file)
 
-
-def _in_child(
-    do: Callable[[], Recorded], user: int, started: Callable[[], None]
-) -> Recorded | None:
-    """Record in a process of its own, as a user; return None if it does not end."""
-    reads, writes = os.pipe()
-    process = os.fork()
-    if not process:
-        try:
-            os.close(reads)
-            if user != os.geteuid():
-                os.setuid(user)
-            answer = pickle.dumps(do())
-            with os.fdopen(writes, 'wb') as pipe:
-                pipe.write(answer)
-        finally:
-            os._exit(0)
-    os.close(writes)
-    # Start threads only after the fork.
-    started()
-    answer, until = b'', monotonic() + _PATIENCE
+    thread = Thread(target=watch)
+    thread.start()
     try:
-        while select.select([reads], [], [], max(0.0, until - monotonic()))[0]:
-            part = os.read(reads, 1 << 16)
-            if not part:
-                return pickle.loads(answer) if answer else None
-            answer += part
-        return None
+        yield least
     finally:
-        os.close(reads)
-        os.kill(process, signal.SIGKILL)
-        os.waitpid(process, 0)
+        ended.set()
+        thread.join()
+
+
+def _answer_of(ours: socket.socket) -> Recorded | None:
+    """Return the outcome of a recording in another process; None if it does not end."""
+    answer, until = b'', monotonic() + _PATIENCE
+    while select.select([ours], [], [], max(0.0, until - monotonic()))[0]:
+        part = ours.recv(1 << 16)
+        if not part:
+            return pickle.loads(answer) if answer else None
+        answer += part
+    return None
+
+
+def fill_all(count: int) -> tuple[list[Table], list[str]]:
+    """Let all disks fill in all ways; return the table of the outcomes, and the faults."""
+    table = Table(
+        'Disks that fill',
+        ('disk, storage', 'filled by', 'verdict', 'received', 'recorded',
+         'removed by the ring', 'least free, kB', 'free at the end, kB', 'faults'),
+    )  # fmt: skip
+    faults: list[str] = []
+    cases = [*product(DISKS, FILLERS, STORAGES)]
+    for disk, filler, storage in cases:
+        one = fill(disk, storage, filler, count)
+        outcome = one.outcome
+        faults += [f'{fault}: {one[:3]}' for fault in outcome.faults]
+        numbers = (outcome.offered, outcome.recorded, outcome.discarded)
+        table.rows.append(
+            (
+                f'{one.disk}; {one.storage}',
+                one.filler,
+                outcome.verdict,
+                *(f'{number:,}' for number in numbers),
+                f'{one.least_free / 1e3:,.0f}',
+                f'{one.free / 1e3:,.0f}',
+                '; '.join(outcome.faults) or 'none',
+            )
+        )
+        say(f'{len(table.rows)} of {len(cases)} disks that fill')
+    return [table], faults

@@ -16,24 +16,23 @@ library makes it. No compiler, tracer or privilege is needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 import ctypes
 import errno
 import fcntl
-from functools import partial
 import os
 from pathlib import Path
 import pickle
 import platform
 import select
-import signal
 import socket
 import struct
 from time import monotonic
 from typing import NamedTuple
 
-from campaigns.disk.judge import Recorded
+from campaigns.reliability.processes import forked
+from campaigns.reliability.recording import Phase, Recorded, Watch
 
 _WRITES = frozenset({'write', 'pwrite'})
 _TAKE_ROOM = _WRITES | {'create', 'fsync', 'rename', 'fallocate', 'mkdir', 'close'}
@@ -187,15 +186,12 @@ class Listener:
 
     def allow(self, call: Call) -> None:
         """Let the kernel execute a call."""
-        self._answer(call, 0, 0, _CONTINUE)
+        self.answer(call, flags=_CONTINUE)
 
-    def refuse(self, call: Call, error: int) -> None:
-        """Answer a call with an error number, without executing it."""
-        self._answer(call, 0, -error, 0)
-
-    def answer(self, call: Call, value: int) -> None:
-        """Answer a call with a return value, without executing it."""
-        self._answer(call, value, 0, 0)
+    def answer(self, call: Call, value: int = 0, error: int = 0, flags: int = 0) -> None:
+        """Answer a call with a return value or an error number, without executing it."""
+        answer = bytearray(_ANSWER.pack(call.identifier, value, -error, flags))
+        fcntl.ioctl(self.descriptor, _SEND, answer)
 
     def data(self, call: Call) -> bytes:
         """Return the data to write."""
@@ -214,10 +210,6 @@ class Listener:
         """Close the listener; waiting calls fail."""
         os.close(self.descriptor)
         os.close(self._process)
-
-    def _answer(self, call: Call, value: int, error: int, flags: int) -> None:
-        answer = bytearray(_ANSWER.pack(call.identifier, value, error, flags))
-        fcntl.ioctl(self.descriptor, _SEND, answer)
 
 
 def _descriptor_path(thread: int, descriptor: int) -> str:
@@ -246,15 +238,13 @@ def _error() -> OSError:
 _PATIENCE = 8.0
 """Time limit of a recording [s]."""
 
-Do = Callable[[Callable[[str], None]], Recorded]
-
 
 class SeenCall(NamedTuple):
     """A system call on a part of a bag: file, metadata, folder, reserve or parent folder."""
 
     name: str
     target: str
-    phase: str
+    phase: Phase
 
 
 class Injection(NamedTuple):
@@ -265,20 +255,20 @@ class Injection(NamedTuple):
     lasting: bool  # Whether all later calls that can have this fault fail too
 
 
-def run(
-    do: Do, folder: Path, injection: Injection | None
+def run_with(
+    injection: Injection | None, folder: Path, do: Callable[[Watch], Recorded]
 ) -> tuple[Recorded | None, list[SeenCall]]:
     """
     Run a recording and let calls fail.
 
     Parameters
     ----------
-    do
-        Records; its argument is the function to call with each phase.
-    folder
-        The folder of the bag; calls on other files are allowed.
     injection
         The fault to inject; None for none.
+    folder
+        The folder of the bag; calls on other files are allowed.
+    do
+        Records, watched by its argument.
 
     Returns
     -------
@@ -286,43 +276,31 @@ def run(
         The result of the recording, None if it did not end, and all its calls on the bag.
 
     """
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
-    process = os.fork()
-    if not process:
-        ours.close()
-        _child(do, theirs)
-    theirs.close()
-    try:
-        _, (descriptor, *_), *_ = socket.recv_fds(ours, 1, 1)
-        listener = Listener(descriptor, process)
-        try:
-            return _Supervisor(listener, ours, folder, injection).supervise()
-        finally:
-            # Kill first: a waiting call fails when the listener is closed.
-            with suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
-            listener.close()
-    finally:
-        ours.close()
-        os.waitpid(process, 0)
 
-
-def _child(do: Do, theirs: socket.socket) -> None:
-    """Record, send the result, and end without running inherited handlers."""
-    try:
+    def recording(theirs: socket.socket) -> None:
         listener = listen()
         socket.send_fds(theirs, [b'L'], [listener])
-        done = do(partial(_enter_phase, theirs))
+        done = do(_Announcer(theirs))
         theirs.sendall(b'D' + pickle.dumps(done))
         theirs.shutdown(socket.SHUT_WR)
-    finally:
-        os._exit(0)
+
+    with ExitStack() as after, forked(recording) as (process, ours):
+        _, (descriptor, *_), *_ = socket.recv_fds(ours, 1, 1)
+        listener = Listener(descriptor, process)
+        # Closed after the kill: a waiting call fails when the listener is closed.
+        after.callback(listener.close)
+        return _Supervisor(listener, ours, folder, injection).supervise()
 
 
-def _enter_phase(theirs: socket.socket, phase: str) -> None:
-    """Send the phase, and wait for the receipt: none of its calls may be seen before."""
-    theirs.sendall(b'P' + phase.encode())
-    theirs.recv(1)
+class _Announcer:
+    """Sends each phase, and waits for the receipt: none of its calls may be seen before."""
+
+    def __init__(self, theirs: socket.socket) -> None:
+        self._theirs = theirs
+
+    def enter(self, phase: Phase, _written: int) -> None:
+        self._theirs.sendall(b'P' + bytes([phase]))
+        self._theirs.recv(1)
 
 
 class _Supervisor:
@@ -335,7 +313,7 @@ class _Supervisor:
         self._ours = ours
         self._folder = str(folder)
         self._injection = injection
-        self._phase = 'beginning'
+        self._phase = Phase.STARTING
         self._seen: list[SeenCall] = []
         # Size of each file at its last successful fsync.
         self._safe: dict[str, int] = {}
@@ -357,7 +335,7 @@ class _Supervisor:
                 if not part:
                     break
                 if not answer and part[:1] == b'P':
-                    self._phase = part[1:].decode()
+                    self._phase = Phase(part[1])
                     self._ours.sendall(b'!')
                 else:
                     answer += part
@@ -379,7 +357,7 @@ class _Supervisor:
         elif fault.error:
             if fault.loses:
                 self._lose(call)
-            self._listener.refuse(call, fault.error)
+            self._listener.answer(call, error=fault.error)
         else:
             self._listener.answer(call, self._write_half(call) if fault.short else 0)
 
@@ -444,3 +422,12 @@ def _flags(call: Call) -> int:
 
 def _makes_nameless(call: Call) -> bool:
     return call.name == 'open' and _flags(call) & os.O_TMPFILE == os.O_TMPFILE
+
+
+def injections(calls: Sequence[SeenCall]) -> Iterator[Injection]:
+    """Yield all possible injections for the calls of a recording without faults."""
+    for index, call in enumerate(calls):
+        for fault in FAULTS:
+            if can_befall(fault, call.name, call.target):
+                yield Injection(index, fault, lasting=False)
+                yield Injection(index, fault, lasting=True)

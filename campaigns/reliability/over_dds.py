@@ -13,22 +13,23 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import json
 from pathlib import Path
-import subprocess
-import sys
 from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
+from bench.report import Table
 from campaigns.campaign import progress_lines
-from campaigns.endurance.accelerated import SCENES
-from campaigns.endurance.memory import Counts, counts_of, shortcomings, Usage, usage
+from campaigns.reliability.accelerated import changed_scene, MESSAGES
+from campaigns.reliability.judge import Counts, counts_of, shortcomings
+from campaigns.reliability.memory import nearest, Usage, usage, verdict_table
+from campaigns.reliability.processes import in_own_process, recording_node
 from linkage_ros.bag import read_bag
-from linkage_ros.processes import Graph, MeasurementError, private_domain
+from linkage_ros.processes import MeasurementError
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500
-_START = 30.0
-"""Time limit for the beginning of the recording [s]."""
+_PATIENCE = 3600.0
+"""Time limit for the replay [s]."""
 
 _SAMPLES = 600
 """Number of samples of the node's memory, at most one per second."""
@@ -54,12 +55,12 @@ def run(minutes: float) -> DdsRun:
     """
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
         folder = Path(name)
-        scene = _scene(folder, max(min(60.0, 6.0 * minutes), 1.0))
-        # Below 102, so that the ports stay below the kernel's ephemeral ones.
-        graph = Graph(private_domain(), folder, longest=round(60.0 * minutes) + 120)
+        split_seconds = max(min(60.0, 6.0 * minutes), 1.0)
+        record = f'record: {{directory: {folder}, name: bag, split_seconds: {split_seconds:g}}}'
+        scene = changed_scene(folder, 'demo', 'record: {directory: runs}', record)
         done = DdsRun(minutes)
         try:
-            _record(graph, scene, folder / 'bag', done)
+            _record(folder, scene, done)
         except MeasurementError as error:
             done.faults.append(str(error))
             return done
@@ -72,14 +73,10 @@ def run(minutes: float) -> DdsRun:
         return done
 
 
-def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
+def _record(folder: Path, scene: Path, done: DdsRun) -> None:
     """Run node and source, sample the node's usage, and end both."""
-    node_arguments = ['--ros-args', '-p', f'scene:={scene}']
-    with graph.run_module('linkage_ros.node.linkage_node', node_arguments) as node:
-        until = time.monotonic() + _START
-        while not (bag / 'metadata.yaml').exists() and time.monotonic() < until:
-            node.check_running()
-            time.sleep(0.05)
+    longest = 60.0 * done.minutes + 120
+    with recording_node(folder, scene, folder / 'bag', longest) as (graph, node):
         source_arguments = ['--ros-args', '-p', f'rate:={_CRANK_RATE}.0']
         with graph.run_module('linkage_ros.node.crank_source', source_arguments) as source:
             begin = time.monotonic()
@@ -94,17 +91,6 @@ def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
                 time.sleep(max(0.0, begin + step * len(done.samples) - time.monotonic()))
     node.check_end()
     source.check_end()
-
-
-def _scene(folder: Path, split_seconds: float) -> Path:
-    """Write the demo scene with a bag that is split."""
-    text = (SCENES / 'demo.yaml').read_text()
-    text = text.replace('../linkages', str(SCENES.parent / 'linkages'))
-    record = f'record: {{directory: {folder}, name: bag, split_seconds: {split_seconds:g}}}'
-    text = text.replace('record: {directory: runs}', record)
-    file = folder / 'demo.yaml'
-    file.write_text(text)
-    return file
 
 
 def _ticks(bag: Path) -> dict[str, str]:
@@ -127,10 +113,50 @@ def _ticks(bag: Path) -> dict[str, str]:
 
 def _replayed(bag: Path) -> dict[str, Any]:
     """Return the result of ``linkage replay --json`` for a bag."""
-    command = [sys.executable, '-m', 'linkage_ros.cli.main', 'replay', str(bag), '--json']
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    answer = in_own_process(['replay', str(bag), '--json'], _PATIENCE)
     try:
         result: dict[str, Any] = json.loads(answer.stdout)
     except ValueError:
         return {'verdict': f'missing: {answer.stderr.strip()}'}
     return result
+
+
+_TICKS = (
+    'Events since startup',
+    'Joint states published',
+    'Samples received',
+    'Samples used',
+    'Lost ticks',
+    'Late by more than a period',
+    'Lateness p50 (us)',
+    'Lateness p99 (us)',
+    'Lateness max (us)',
+)
+
+
+def tables_of(run: DdsRun) -> list[Table]:
+    """Return the memory by the minute, its verdict, the counts of messages, and the ticks."""
+    title = f'Over DDS: {run.minutes:g} min'
+    memory = Table(f'{title}, memory of the node', ('minute', 'kB', 'open files', 'threads'))
+    for index in range(11):
+        time = 6.0 * run.minutes * index
+        if run.samples:
+            sample = nearest(run.samples, time)
+            memory.rows.append(
+                (f'{sample.time / 60.0:.1f}', *(f'{value:,}' for value in sample[1:]))
+            )
+    verdicts = verdict_table(title, {'linkage_node': run.samples} if run.samples else {})
+    messages = Table(f'{title}, messages', MESSAGES)
+    for topic, received in run.counts.get('received', {}).items():
+        numbers = [run.counts[kind][topic] for kind in ('recorded', 'dropped', 'discarded')]
+        messages.rows.append([topic, f'{received:,}', *(f'{number:,}' for number in numbers)])
+    ticks = Table(f'{title}, ticks', ('', ''), [(k, run.ticks.get(k, '')) for k in _TICKS])
+    replayed = run.replayed
+    ticks.rows.append(
+        (
+            'Replay',
+            f'{replayed.get("verdict")}, {replayed.get("compared_ticks", 0):,} ticks compared',
+        )
+    )
+    ticks.rows.append(('Faults', '; '.join(run.faults) or 'none'))
+    return [memory, verdicts, messages, ticks]

@@ -6,32 +6,41 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""A node that records to a disk that stalls: the effect on its ticks and its bag."""
+"""
+A node that records to a disk that stalls: the effect on its ticks and its bag.
+
+``python -m campaigns.reliability.stalling FILE ARGUMENTS…`` is the node on such a disk, where no
+file system can be frozen. As long as FILE exists, no write and no flush of this process returns.
+They stall in the interpreter, not in the kernel.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 import fcntl
 from itertools import pairwise
-from math import inf
+from math import inf, isfinite
 import os
 from pathlib import Path
 import signal
+import sys
 from tempfile import TemporaryDirectory
 from time import monotonic, sleep, time_ns
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from campaigns.disk.filling import Disk, mounted
-from campaigns.endurance.memory import Counts, counts_of
-from linkage_ros.bag import METADATA_FILE, read_bag
+from bench.report import say, Table
+from campaigns.campaign import percentile_texts
+from campaigns.reliability.filling import Disk, mounted
+from campaigns.reliability.judge import Counts, counts_of, shortcomings
+from campaigns.reliability.processes import recording_node
+from linkage_ros.bag import read_bag
 from linkage_ros.errors import BagError
-from linkage_ros.processes import Graph, MeasurementError, private_domain
+from linkage_ros.processes import MeasurementError
 
 _FREEZE, _THAW = 0xC0045877, 0xC0045878
 _DISK = Disk('ext4, 256 MiB', 'ext4', 256)
-_START = 20.0  # [s]
 _MOST_TO_END = 25.0
 """Time limit for a node to end while its disk does not respond [s]."""
 _SECOND = 1_000_000_000
@@ -124,19 +133,13 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
     scene.write_text(
         _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
     )
-    # Below 102, so that the ports stay below the kernel's ephemeral ones.
-    graph = Graph(private_domain(), work, longest=round(plan.seconds) + 60)
-    arguments = ['--ros-args', '-p', f'scene:={scene}']
-    module = 'linkage_ros.node.linkage_node'
-    if file:
-        module, arguments = 'campaigns.disk.slow_node', [str(file), *arguments]
-    log = work / f'{module.rsplit(".", 1)[-1]}.log'
+    slowed_by = ('campaigns.reliability.stalling', str(file)) if file else ()
+    log = work / f'{"stalling" if file else "linkage_node"}.log'
     try:
-        with graph.run_module(module, arguments) as node:
-            until = monotonic() + _START
-            while not (folder / 'bag' / METADATA_FILE).exists() and monotonic() < until:
-                node.check_running()
-                sleep(0.05)
+        with recording_node(work, scene, folder / 'bag', plan.seconds + 60, *slowed_by) as (
+            _,
+            node,
+        ):
             sleep(0.5 * (plan.seconds - plan.stall))
             begin = time_ns()
             with _stalled(folder, file, plan):
@@ -236,16 +239,7 @@ def _judge(done: Stalled, folder: Path, begin: int, end: int) -> None:
                 f'does not report that the disk has not answered: {done.last_line!r}'
             )
         return
-    if not done.counts:
-        done.faults.append('the bag has no counts')
-    for topic, received in done.counts.get('received', {}).items():
-        recorded, dropped = (done.counts[kind][topic] for kind in ('recorded', 'dropped'))
-        if received != recorded + dropped:
-            done.faults.append(f'{topic}: the counts do not add up')
-        if dropped and not _drops(plan):
-            done.faults.append(f'{topic}: {dropped} dropped')
-    if done.counts and done.counts['recorded']['/joint_states'] != done.ticks:
-        done.faults.append(f'{done.ticks} ticks in the bag, another number in its counts')
+    done.faults += shortcomings(folder, may_drop=_drops(plan))
     if _drops(plan) and not done.total('dropped'):
         done.faults.append('more messages than the queue holds, but none dropped')
     if not done.after:
@@ -272,3 +266,67 @@ def _lateness(times: Sequence[int], period: int) -> list[int]:
 def _behind(times: Sequence[int], period: int) -> list[int]:
     offsets = [time - index * period for index, time in enumerate(times)]
     return [offset - min(offsets) for offset in offsets]
+
+
+def stall_all() -> tuple[list[Table], list[str]]:
+    """Carry out all plans; return the outcomes for ticks and for messages, and the faults."""
+    ticks = Table(
+        'Disks that stall: ticks',
+        ('stall', 'ticks in the bag', 'missing', 'of these dropped', 'lateness, µs: p50',
+         'p99', 'most', 'during the stall: ticks', 'p50', 'p99', 'most'),
+    )  # fmt: skip
+    messages = Table(
+        'Disks that stall: messages',
+        ('stall', 'received', 'recorded', 'dropped', 'node ended after, s', 'last line', 'faults'),
+    )
+    faults: list[str] = []
+    for plan in PLANS:
+        say(f'a disk that stalls: {plan.name}')
+        done = run(plan, frozen=True)
+        faults += [f'{fault}: {plan.name}' for fault in done.faults]
+        dropped = done.counts.get('dropped', {}).get('/joint_states', 0)
+        kinds = ('received', 'recorded', 'dropped')
+        ticks.rows.append(
+            (
+                plan.name,
+                f'{done.ticks:,}',
+                f'{done.gaps:,}',
+                f'{dropped:,}' if done.counts else '',
+                *percentile_texts([t / 1e3 for t in done.lateness], 0),
+                f'{done.during:,}',
+                *percentile_texts([t / 1e3 for t in done.lateness_during], 0),
+            )
+        )
+        messages.rows.append(
+            (
+                plan.name,
+                *(f'{done.total(kind):,}' if done.counts else '' for kind in kinds),
+                f'{done.ended:.1f}' if done.ended and isfinite(done.ended) else '',
+                done.last_line.partition(', /linkage_node')[0],
+                '; '.join(done.faults) or 'none',
+            )
+        )
+    return [ticks, messages], faults
+
+
+def _stalling(call: Callable[..., Any], file: Path) -> Callable[..., Any]:
+    def stalled(*arguments: Any) -> Any:
+        while file.exists():
+            sleep(0.005)
+        return call(*arguments)
+
+    return stalled
+
+
+def main() -> int:
+    """Make the calls wait while the file exists, and run the node."""
+    from linkage_ros.node import linkage_node  # local import: the campaign runs without ROS
+
+    file = Path(sys.argv.pop(1))
+    for name in ('fsync', 'pwrite', 'replace', 'posix_fallocate'):
+        setattr(os, name, _stalling(getattr(os, name), file))
+    return linkage_node.main()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

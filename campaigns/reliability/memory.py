@@ -6,54 +6,18 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Memory, open files and threads of a process, their growth, and the counts of a bag."""
+"""Memory, open files and threads of a process, and their growth."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
-import json
 from pathlib import Path
 import re
 from statistics import median
 from typing import NamedTuple
 
-from linkage_ros.bag import read_bag, STATS_RECORD
-from linkage_ros.errors import BagError
-from mcap.reader import make_reader
-
-Counts = dict[str, dict[str, int]]
-
-
-def counts_of(folder: Path) -> Counts:
-    """Return received, recorded, dropped and discarded by topic, from the bag's last file."""
-    with read_bag(folder).files[-1].open('rb') as stream:
-        metadata = {each.name: each.metadata for each in make_reader(stream).iter_metadata()}
-    return {kind: json.loads(text) for kind, text in metadata.get(STATS_RECORD, {}).items()}
-
-
-def shortcomings(folder: Path) -> list[str]:
-    """Return the inconsistencies and missing parts of a bag."""
-    try:
-        bag = read_bag(folder)
-        messages = Counter(message.topic for message in bag.messages())
-        counts = counts_of(folder)
-    except BagError as error:
-        return [str(error)]
-    if not counts:
-        return ['the bag has no counts']
-    faults = []
-    for topic, received in counts['received'].items():
-        recorded = counts['recorded'][topic]
-        if recorded != messages[topic]:
-            faults.append(f'{topic}: {recorded} counted, {messages[topic]} in the bag')
-        if received != recorded + counts['dropped'][topic] + counts['discarded'][topic]:
-            faults.append(f'{topic}: the counts do not add up')
-        if counts['dropped'][topic]:
-            faults.append(f'{topic}: {counts["dropped"][topic]} dropped')
-    return faults
-
+from bench.report import Table
 
 WARM_UP = 0.25
 """The share of a run that is not judged: buffers, caches and pools fill."""
@@ -119,3 +83,33 @@ def flatness(samples: Sequence[Usage]) -> Flatness:
 def _more(first: Sequence[int], last: Sequence[int]) -> int:
     """Return by how much the lower quartile of the counts is higher at the end."""
     return sorted(last)[len(last) // 4] - sorted(first)[len(first) // 4]
+
+
+def verdict_table(
+    title: str, runs: Mapping[str, Sequence[Usage]], exempt: Collection[str] = ()
+) -> Table:
+    """Return the growth of some runs by name; those that are exempt may grow."""
+    table = Table(
+        f'{title}, verdicts',
+        ('', 'slope, kB/h', 'growth, kB', 'peak, kB', 'more files', 'more threads', 'verdict'),
+    )
+    for name, samples in runs.items():
+        growth = flatness(samples)
+        verdict = 'flat' if growth.flat else 'grows'
+        table.rows.append(
+            [
+                name,
+                f'{3600.0 * growth.slope:.1f}',
+                f'{growth.growth:,.0f}',
+                f'{growth.peak:,.0f}',
+                str(growth.files),
+                str(growth.threads),
+                'one file: not judged' if name in exempt else verdict,
+            ]
+        )
+    return table
+
+
+def nearest(samples: Sequence[Usage], time: float) -> Usage:
+    """Return the sample next to a time."""
+    return min(samples, key=lambda sample: abs(sample.time - time))

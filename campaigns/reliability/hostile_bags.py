@@ -17,16 +17,18 @@ and memory, with the remaining content or with one line. Any other outcome is a 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 import json
 from pathlib import Path
 from random import Random
+from shutil import rmtree
 from struct import Struct
 
-from campaigns.campaign import attack_in_parts
-from campaigns.damage import KINDS, make
-from campaigns.in_process import confined, Ended, in_process
+from campaigns.reliability.attack import attack_in_parts, Attacked
+from campaigns.reliability.damage import make
+from campaigns.reliability.judge import fault_of, Manners
+from campaigns.reliability.processes import confined, in_process
+from campaigns.reliability.recording import JOINT_STATE, START, WRITERS
 from linkage_ros.bag import BagWriter, METADATA_FILE, RUN_FILE, Storage, Topic
 from linkage_ros.description import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.tick import Pipeline
@@ -41,20 +43,14 @@ COMMANDS = {
 }
 """Commands to run on each bag, with the arguments after its name."""
 
-_PART = 10
-"""Number of bags in a part."""
-
 _SECONDS = 60
 """Time limit of a command, in [s]; on a shared processor the slowest takes one second."""
 
-_LONGEST_LINE = 7000
-_LINES = 4
-"""Maximum number of lines on standard error of a successful command."""
+MANNERS = Manners((0, 1, 2), notes=4, longest=7000, beside=': unfinished: ', silent=False)
+"""A missing end is reported in addition to other damage."""
 
 _SIZE = 12_000
-_BEGIN = 1_700_000_000_000_000_000
 _PERIOD = 1_000_000
-_JOINT_STATE = 'sensor_msgs/msg/JointState'
 _SCENE = b"""linkage: l.yaml
 drive: {sine: {amplitude: 1.0, frequency: 2.0}}
 effects: {velocity: {}, delay: {seconds: 0.002}, bias: {joints: {rocker_joint: 0.01}}}
@@ -71,57 +67,30 @@ _AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
 """Offset of the checksum in each record; an attachment has it at its end."""
 
 
-def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
-    """Run the commands on a number of changed bags; return what `attack_in_parts` returns."""
-    return attack_in_parts(_part, count, seed, _PART, jobs)
+def attack(count: int, seed: int, jobs: int = 1) -> Attacked:
+    """Run the commands on a number of changed bags."""
+    return attack_in_parts(_attack, count, seed, jobs, part=10)
 
 
-def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
-    seed, begin, end = part
-    tried, findings = Counter[str](), []
+def _attack(seed: int, numbers: range, attacked: Attacked) -> None:
     with confined():
-        for index in range(begin, end):
+        for number in numbers:
             Path('bag').mkdir()
-            changes = change_bag(Path('bag'), Random(f'{seed} {index}'))
+            changes = change_bag(Path('bag'), Random(f'{seed} {number}'))
             for command, arguments in COMMANDS.items():
                 ended = in_process([command, 'bag', *arguments], _SECONDS)
-                tried[f'{command}: {ended.code}'] += 1
-                if fault := fault_of(ended):
-                    findings.append(f'bag {seed} {index}: {changes}: {command}: {fault}')
-            for file in Path('bag').iterdir():
-                file.unlink()
-            Path('bag').rmdir()
-    return tried, findings
-
-
-def fault_of(ended: Ended) -> str:
-    """Return the fault of an end, in a line; '' if it is correct."""
-    code, errors, out = ended
-    # A missing end is reported in addition to other damage.
-    lines = [line for line in errors.splitlines() if ': unfinished: ' not in line]
-    fault = ''
-    if code not in (0, 1, 2):
-        fault = f'{code}: {errors.strip()}'
-    elif len(lines) > (1 if code == 2 else _LINES) or (code == 2 and not lines):
-        fault = f'{len(lines)} lines: {errors.strip()}'
-    elif not all(line.isprintable() for line in (*lines, *out.split('\n'))):
-        fault = 'a line that is not printable'
-    elif any(len(line) > _LONGEST_LINE for line in lines):
-        fault = f'a line of {max(map(len, lines))} characters'
-    elif code == 0 and not out:
-        fault = 'no output'
-    return fault[:300]
+                fault = fault_of(ended, MANNERS)
+                finding = fault and f'bag {seed} {number}: {changes}: {command}: {fault}'
+                attacked.add(f'{command}: {ended.code}', finding)
+            rmtree('bag')
 
 
 def change_bag(folder: Path, random: Random) -> str:
     """Make a bag in an empty folder and change it; return the description of the changes."""
-    kind = random.choice((*['of a scene'] * 6, *KINDS))
+    kind = random.choice((*['of a scene'] * 6, *WRITERS))
     texts = {RUN_FILE: b'', SCENE_FILE: _SCENE, LINKAGE_FILE: _LINKAGE}
     if kind != 'of a scene':
         make(kind, folder / 'made', random.randrange(10**9), _SIZE)
-        for file in (folder / 'made').iterdir():
-            file.rename(folder / file.name)
-        (folder / 'made').rmdir()
         done = []
     elif random.random() < 0.4:
         name = random.choice([*texts])
@@ -130,6 +99,9 @@ def change_bag(folder: Path, random: Random) -> str:
     else:
         done = []
         _record(folder, lambda _, text: text, random)
+    for made in [*(folder / 'made').iterdir()]:
+        made.rename(folder / made.name)
+    (folder / 'made').rmdir()
     metadata = folder / METADATA_FILE
     if metadata.exists() and random.random() < 0.2:
         metadata.write_bytes(_edited(metadata.read_bytes(), random))
@@ -162,7 +134,7 @@ def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -
         'extra_topics': [],
     }
     texts = files | {RUN_FILE: json.dumps(run).encode()}
-    topics = [Topic('/joint_states', _JOINT_STATE, 'text', 'RIHS01_' + '0a' * 32)]
+    topics = [Topic('/joint_states', JOINT_STATE, 'text', 'RIHS01_' + '0a' * 32)]
     topics.append(Topic('/withheld', 'builtin_interfaces/msg/Time', 'text', ''))
     writer = BagWriter(
         folder / 'made',
@@ -171,15 +143,12 @@ def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -
         Storage(compression=random.choice(('none', 'lz4', 'zstd'))),
     )
     for index in range(40):
-        stamp = _BEGIN + index * _PERIOD
+        stamp = START + index * _PERIOD
         if message := pipeline.tick(stamp).message:
             writer.write(0, stamp, stamp, message)
         if index % 15 == 0:
             writer.flush()
     writer.close({})
-    for file in (folder / 'made').iterdir():
-        file.rename(folder / file.name)
-    (folder / 'made').rmdir()
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int]]:

@@ -16,17 +16,17 @@ react. A signal may also come after the command has ended.
 
 from __future__ import annotations
 
-from collections import Counter
 import contextlib
 import os
 from pathlib import Path
 import random
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 
+from campaigns.reliability.attack import Attacked
+from campaigns.reliability.processes import LINKAGE
 from linkage_ros.resources import shipped_path
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -51,16 +51,13 @@ _COMMANDS = {
 }  # fmt: skip
 
 
-def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
-    """Send signals; return the number of each kind of end, and the violations, one line each."""
-    tried: Counter[str] = Counter()
-    findings = []
-    for index in range(count):
-        end, finding = _try(random.Random(f'{seed} {index}'))
-        tried[end] += 1
-        if finding:
-            findings.append(f'signal {seed} {index}: {finding}')
-    return dict(sorted(tried.items())), findings
+def attack(count: int, seed: int) -> Attacked:
+    """Send signals to a number of commands."""
+    attacked = Attacked()
+    for number in range(count):
+        outcome, finding = _try(random.Random(f'{seed} {number}'))
+        attacked.add(outcome, finding and f'signal {seed} {number}: {finding}')
+    return attacked
 
 
 def _try(rng: random.Random) -> tuple[str, str]:
@@ -72,7 +69,7 @@ def _try(rng: random.Random) -> tuple[str, str]:
             shipped_path('linkages/jansen_leg.yaml').read_bytes()
         )
         process = subprocess.Popen(
-            [sys.executable, '-m', 'linkage_ros.cli.main', command, *_COMMANDS[command]],
+            [*LINKAGE, command, *_COMMANDS[command]],
             cwd=folder,
             env=os.environ | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'},
             stdout=subprocess.DEVNULL,
