@@ -16,111 +16,11 @@ is given, and with them κ.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import pi
-from typing import Any
 
-from campaigns.accuracy.motion import ORDER
-from campaigns.accuracy.reference import FACTORIALS, PRECISIONS, UNIT_ROUNDOFF
-from flint import arb, arb_series, ctx
-
-_CORRECT = 2.0**-163
-"""Maximum width of a result, relative to κ: fifty digits."""
-
-
-class Tape:
-    """All series of a case, in the order in which they are made."""
-
-    def __init__(self) -> None:
-        ctx.prec, ctx.cap = PRECISIONS[0], ORDER
-        self.sources: list[tuple[tuple[int, Any], ...]] = []  # Of each: index and slope
-        self.widths: dict[int, Sequence[float]] = {}  # By which κ varies what is given
-
-    def number(self, *motion: Any) -> Series:
-        """Return a given number, or value, rate and acceleration of a given motion."""
-        orders = [arb(part) / factor for part, factor in zip(motion, FACTORIALS, strict=False)]
-        series = Series(self, arb_series(orders))
-        self.widths[series.index] = [abs(float(part)) for part in motion]
-        return series
-
-    def row(self, *motion: Sequence[Any]) -> Row:
-        """Return a given vector, or a moving point."""
-        return [self.number(*parts) for parts in zip(*motion, strict=True)]
-
-    def distance(self, one: Sequence[float], other: Sequence[float]) -> Series:
-        """Return the exact distance of two places, as a number of its own."""
-        squares = ((arb(a) - arb(b)) ** 2 for a, b in zip(one, other, strict=True))
-        return self.number(sum(squares, arb(0)).sqrt())
-
-
-class Series:
-    """A power series in time on a tape, made of others."""
-
-    __slots__ = ('index', 'tape', 'value')
-
-    def __init__(self, tape: Tape, value: Any, *sources: tuple[Series, Any]) -> None:
-        self.tape, self.value, self.index = tape, value, len(tape.sources)
-        tape.sources.append(tuple([(one.index, slope) for one, slope in sources]))
-
-    def __add__(self, other: Series) -> Series:
-        return Series(self.tape, self.value + other.value, (self, 1), (other, 1))
-
-    def __sub__(self, other: Series) -> Series:
-        return Series(self.tape, self.value - other.value, (self, 1), (other, -1))
-
-    def __mul__(self, other: Series) -> Series:
-        a, b = self.value, other.value
-        return Series(self.tape, a * b, (self, b), (other, a))
-
-    def __truediv__(self, other: Series) -> Series:
-        part = other.value.inv()
-        value = self.value * part
-        return Series(self.tape, value, (self, part), (other, -value * part))
-
-    def times(self, factor: float) -> Series:
-        """Return a multiple."""
-        return Series(self.tape, self.value * factor, (self, factor))
-
-    def sqrt(self) -> Series:
-        """Return the root."""
-        value = self.value.sqrt()
-        return Series(self.tape, value, (self, 0.5 * value.inv()))
-
-    def cos_sin(self) -> tuple[Series, Series]:
-        """Return cosine and sine."""
-        s, c = self.value.sin_cos()
-        return Series(self.tape, c, (self, -s)), Series(self.tape, s, (self, c))
-
-    def slopes(self) -> list[Any]:
-        """Return the derivative by each series of the tape up to this one; None if it is 0."""
-        found: list[Any] = [None] * (self.index + 1)
-        found[-1] = arb_series([1])
-        for index in range(self.index, -1, -1):
-            slope = found[index]
-            if slope is not None:
-                for source, factor in self.tape.sources[index]:
-                    more, before = slope * factor, found[source]
-                    found[source] = more if before is None else before + more
-        return found
-
-    def orders(self) -> list[Any]:
-        """Return value, rate and acceleration."""
-        return [self.value[k] * factor for k, factor in enumerate(FACTORIALS)]
-
-    def sizes(self, widths: Mapping[int, Sequence[float]]) -> list[float]:
-        """Return for each order its size and its changes, as each given one changes by a width."""
-        slopes, sums = self.slopes(), [abs(float(order)) for order in self.orders()]
-        for index, motion in widths.items():
-            slope = slopes[index] if index <= self.index else None
-            if slope is not None:
-                parts = [abs(float(slope[k])) for k in range(ORDER)]
-                for m, width in enumerate(motion):
-                    for k in range(m, ORDER) if width else ():
-                        sums[k] += FACTORIALS[k] / FACTORIALS[m] * parts[k - m] * width
-        return sums
-
-
-Row = list[Series]
+from campaigns.series import CORRECT, ORDER, Row, Series, Tape, UNIT_ROUNDOFF
+from flint import arb
 
 
 def errors_of(
@@ -144,7 +44,7 @@ def errors_of(
         off[0] -= 2 * round(float(off[0]) / (2 * pi)) * arb.pi()
     errors = []
     for error, size in zip(off, kappa, strict=True):
-        assert float(error.rad()) <= _CORRECT * size, 'fewer than fifty digits are proven'
+        assert float(error.rad()) <= CORRECT * size, 'fewer than fifty digits are proven'
         errors.append(abs(float(error)) / (UNIT_ROUNDOFF * size) if error != 0 else 0.0)
     return errors
 
@@ -189,14 +89,14 @@ def hinge_angle(place: Row, to: Row, rod: Series, sign: int) -> Series:
     rest = h - z
     r, d = dot([a, b], [a, b]), dot([x, y], [x, y])
     even = r + d + (rest * rest - rod * rod)
-    turn = angle_of(even, ((r * d).times(4.0) - even * even).sqrt())
-    return angle_of(x, y) - angle_of(a, b) + turn.times(sign)
+    turn = angle_of(even, ((r * d) * 4.0 - even * even).sqrt())
+    return angle_of(x, y) - angle_of(a, b) + turn * sign
 
 
 def slide_length(place: Row, to: Row, rod: Series, sign: int) -> Series:
     """Return the slide along z that brings a place to a distance from a point."""
     x, y, z = less(to, place)
-    return z + (rod * rod - dot([x, y], [x, y])).sqrt().times(sign)
+    return z + (rod * rod - dot([x, y], [x, y])).sqrt() * sign
 
 
 def three_spheres(ends: Sequence[Row], rods: Row, sign: int) -> Row:
@@ -207,13 +107,12 @@ def three_spheres(ends: Sequence[Row], rods: Row, sign: int) -> Row:
     # (X − P0)·d = (l0² − l1² + |d|²)/2, likewise e.
     first = rods[0] * rods[0]
     sides = [
-        (first - rod * rod + dot(edge, edge)).times(0.5)
-        for rod, edge in ((rods[1], d), (rods[2], e))
+        (first - rod * rod + dot(edge, edge)) * 0.5 for rod, edge in ((rods[1], d), (rods[2], e))
     ]
     square = dot(normal, normal)
     ways = zip(cross(e, normal), cross(normal, d), strict=True)
     foot = [dot(sides, [*pair]) / square for pair in ways]
-    height = ((first - dot(foot, foot)) / square).sqrt().times(sign)
+    height = ((first - dot(foot, foot)) / square).sqrt() * sign
     return [s + f + height * n for s, f, n in zip(start, foot, normal, strict=True)]
 
 

@@ -25,18 +25,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from campaigns.accuracy.mechanism import CRANK, Mechanism, Spot
-from campaigns.accuracy.motion import (
-    Array,
-    conjugate,
-    imag,
-    inverse,
-    Motion,
-    real,
-    root,
-    Tangent,
-    times,
-)
-from flint import acb
+from campaigns.accuracy.motion import decided, Motion, root
+from campaigns.series import Series
 from linkage_ros.kinematics import Side
 
 
@@ -95,49 +85,30 @@ class RPR(_Dyad):
         diagonal = end - start
         base = (
             _pin_at_zero(motion, self.slider, self.a.point, self.d.point)
-            * motion.constants.directions[self.slider].conjugate()
+            * motion.directions[self.slider].conjugate()
         )
-        height = base.imag
-        reach = root(real(diagonal * conjugate(diagonal)) - height * height)
+        height = base.imag()
+        reach = root(diagonal.norm() - height * height)
         if (self.side < 0) != (self.fold and bool((motion.phi / 2).sin() < 0)):
             reach = -reach
-        motion.inverse.append(inverse(reach))
-        motion.slide[self.slider] = reach - base.real
-        unit = diagonal / ((reach + acb(0, height)) * motion.constants.directions[self.slider])
+        motion.slide[self.slider] = reach - base.part()
+        unit = diagonal / ((reach + height * 1j) * motion.directions[self.slider])
         motion.place(self.rail, unit, self.a.point, start)
         block = motion.mechanism.sliders[self.slider].block
         if block is not None:
-            twist = motion.constants.twists[self.slider]
+            twist = motion.twists[self.slider]
             # The block turns with the rail, whose angle is passed on once.
             motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
 
-    def margin(self, motion: Motion) -> Any:
+    def margin(self, motion: Motion) -> Series:
         """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         base = (
             _pin_at_zero(motion, self.slider, self.a.point, self.d.point)
-            * motion.constants.directions[self.slider].conjugate()
+            * motion.directions[self.slider].conjugate()
         )
-        return abs(diagonal[0]) - abs(base.imag)
-
-    def vary(self, tangent: Tangent) -> None:
-        # E = (g + r·n)·u
-        slide = tangent.mechanism.sliders[self.slider]
-        base, base_change = _vary_pin_at_zero(tangent, self.slider, self.a.point, self.d.point)
-        unit = tangent.unit[self.rail]
-        direction = tangent.direction[self.slider]
-        direction_change = tangent.direction_change[self.slider]
-        value = tangent.slide_value[self.slider]
-        start, end = tangent.at(self.a), tangent.at(self.d)
-        rest = end - start - unit * base_change - times(value, unit) * direction_change
-        along = times((unit * direction).conj(), rest)
-        turn = times(tangent.next_inverse(), along.imag)
-        tangent.place(self.rail, turn, self.a.point, start)
-        tangent.slide[self.slider] = along.real + (base * direction.conjugate()).imag * turn
-        if slide.block is not None:
-            turn_block = tangent.turn[self.rail].copy()
-            turn_block[0] += tangent.twist_change[self.slider]
-            tangent.place(slide.block, turn_block, self.d.point, end)
+        height = base.imag()
+        return diagonal.norm().sqrt() - _positive(height)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,40 +141,23 @@ class RRP(_Dyad):
         start = motion.at(self.a)
         b = motion.vector(self.one, self.a.point, self.pin)
         base, line, block = motion.line(self.slider, self.pin)
-        across = (base - start) * conjugate(line)
-        height = imag(across)
-        reach = root((b * b.conjugate()).real - height * height)
+        across = (base - start) * line.conjugate()
+        height = across.imag()
+        reach = root(b.norm() - height * height)
         if self.side < 0:
             reach = -reach
-        motion.inverse.append(inverse(reach))
-        slide = reach - real(across)
-        motion.slide[self.slider] = slide
+        motion.slide[self.slider] = reach - across.part()
         arm = line * (reach + height * 1j)
         motion.place(self.one, arm / b, self.a.point, start)
         if block is not None:
             motion.ride(self.slider, block, self.pin, start + arm)
 
-    def margin(self, motion: Motion) -> object:
+    def margin(self, motion: Motion) -> Series:
         """Return the distance to the toggle, in the constants' unit; negative if open."""
         base, line, _ = motion.line(self.slider, self.pin)
-        across = ((base - motion.at(self.a)) * conjugate(line))[0].imag
-        return abs(motion.vector(self.one, self.a.point, self.pin)) - abs(across)
-
-    def vary(self, tangent: Tangent) -> None:
-        # A + b·u − Q − r·N = 0
-        b, b_change = tangent.vector(self.one, self.a.point, self.pin)
-        unit = tangent.unit[self.one]
-        start = tangent.at(self.a)
-        line, line_change, base_change, block_turn = tangent.line(self.slider, self.pin)
-        slide = tangent.slide_value[self.slider]
-        rest = base_change + times(slide, line_change) - start - unit * b_change
-        along = times(line.conj(), rest)
-        turn = times(tangent.next_inverse(), along.imag)
-        where = start + unit * b_change + 1j * times(unit * b, turn)
-        tangent.place(self.one, turn, self.a.point, start)
-        tangent.slide[self.slider] = -times(times(unit * b, line.conj()).imag, turn) - along.real
-        if block_turn is not None:
-            tangent.ride(self.slider, self.pin, block_turn, where)
+        across = ((base - motion.at(self.a)) * line.conjugate()).imag()
+        reach = motion.vector(self.one, self.a.point, self.pin).norm().sqrt()
+        return reach - _positive(across)
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,16 +198,13 @@ class RRR(_Dyad):
             height = -height
         one = diagonal * (foot + height * 1j) / square
         two = one - diagonal
-        # two × one, the divisor of both rates.
-        motion.inverse.append(inverse(height))
         motion.place(self.one, one / b, self.a.point, start)
         motion.place(self.two, two / c, self.d.point, motion.at(self.d))
 
-    def _triangle(self, motion: Motion, diagonal: Any) -> tuple[Any, ...]:
+    def _triangle(self, motion: Motion, diagonal: Series) -> tuple[Series, ...]:
         b = motion.vector(self.one, self.a.point, self.pin)
         c = motion.vector(self.two, self.d.point, self.pin)
-        square = real(diagonal * conjugate(diagonal))
-        b_square, c_square = (b * b.conjugate()).real, (c * c.conjugate()).real
+        square, b_square, c_square = diagonal.norm(), b.norm(), c.norm()
         foot = (square + (b_square - c_square)) * 0.5
         return b, c, square, foot, square * b_square - foot * foot
 
@@ -266,26 +217,15 @@ class RRR(_Dyad):
             side = -side
         return side
 
-    def margin(self, motion: Motion) -> Any:
+    def margin(self, motion: Motion) -> Series:
         """Return the distance to the toggle, in the constants' unit; negative if open."""
         diagonal = motion.at(self.d) - motion.at(self.a)
-        s = abs(diagonal[0])
-        b = abs(motion.vector(self.one, self.a.point, self.pin))
-        c = abs(motion.vector(self.two, self.d.point, self.pin))
-        return (s - abs(b - c)).min(b + c - s)
-
-    def vary(self, tangent: Tangent) -> None:
-        # A + b·u1 − c·u2 − D = 0
-        b, b_change = tangent.vector(self.one, self.a.point, self.pin)
-        c, c_change = tangent.vector(self.two, self.d.point, self.pin)
-        unit_one, unit_two = tangent.unit[self.one], tangent.unit[self.two]
-        start = tangent.at(self.a)
-        rest = tangent.at(self.d) - start - unit_one * b_change + unit_two * c_change
-        by = tangent.next_inverse()
-        turn_one = times(by, times((unit_two * c).conj(), rest).real)
-        turn_two = times(by, times((unit_one * b).conj(), rest).real)
-        tangent.place(self.one, turn_one, self.a.point, start)
-        tangent.place(self.two, turn_two, self.d.point, tangent.at(self.d))
+        s = diagonal.norm().sqrt()
+        b = motion.vector(self.one, self.a.point, self.pin).norm().sqrt()
+        c = motion.vector(self.two, self.d.point, self.pin).norm().sqrt()
+        folded = s - _positive(b - c)
+        stretched = b + c - s
+        return folded if folded.value[0].real < stretched.value[0].real else stretched
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,30 +248,17 @@ class PRP(_Dyad):
     def close(self, motion: Motion) -> None:
         base_one, line_one, block_one = motion.line(self.one, self.pin)
         base_two, line_two, block_two = motion.line(self.two, self.pin)
-        over = _meet(motion, base_two - base_one, line_one, line_two)
+        over = _meet(base_two - base_one, line_one, line_two)
         motion.slide[self.one], motion.slide[self.two] = over[0], -over[1]
         where = base_one + line_one * over[0]
         for name, block in ((self.one, block_one), (self.two, block_two)):
             if block is not None:
                 motion.ride(name, block, self.pin, where)
 
-    def margin(self, motion: Motion) -> Any:
+    def margin(self, motion: Motion) -> Series:
         """Return the sine of the angle between the lines."""
         lines = [motion.line(name, self.pin)[1] for name in (self.one, self.two)]
-        return abs((lines[0] * conjugate(lines[1]))[0].imag)
-
-    def vary(self, tangent: Tangent) -> None:
-        line_one, change_one, base_one, turn_one = tangent.line(self.one, self.pin)
-        line_two, change_two, base_two, turn_two = tangent.line(self.two, self.pin)
-        value_one = tangent.slide_value[self.one]
-        rest = base_two - base_one - times(value_one, change_one)
-        rest = rest + times(tangent.slide_value[self.two], change_two)
-        slide_one, minus_two = _vary_meeting(tangent, rest, line_one, line_two)
-        tangent.slide[self.one], tangent.slide[self.two] = slide_one, -minus_two
-        where = base_one + times(value_one, change_one) + times(line_one, slide_one)
-        for name, turn in ((self.one, turn_one), (self.two, turn_two)):
-            if turn is not None:
-                tangent.ride(name, self.pin, turn, where)
+        return _positive((lines[0] * lines[1].conjugate()).imag())
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,79 +292,41 @@ class RPP(_Dyad):
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
         base, line, unit = motion.line(self.outer, outer.point)
-        slot = unit * motion.constants.directions[self.inner]
+        slot = unit * motion.directions[self.inner]
         start = motion.at(self.a)
         rest = start - base - unit * _pin_at_zero(motion, self.inner, outer.point, self.a.point)
-        over = _meet(motion, rest, slot, line)
+        over = _meet(rest, slot, line)
         motion.slide[self.inner], motion.slide[self.outer] = over
         motion.ride(self.outer, unit, outer.point, base + line * over[1])
         if inner.block is not None:
-            turned = unit * motion.constants.twists[self.inner]
+            turned = unit * motion.twists[self.inner]
             motion.place(inner.block, turned, self.a.point, start)
 
-    def margin(self, motion: Motion) -> Any:
+    def margin(self, motion: Motion) -> Series:
         """Return the sine of the angle between the lines."""
         outer = motion.mechanism.sliders[self.outer]
         _, line, unit = motion.line(self.outer, outer.point)
-        return abs((unit * motion.constants.directions[self.inner] * conjugate(line))[0].imag)
-
-    def vary(self, tangent: Tangent) -> None:
-        inner, outer = (tangent.mechanism.sliders[name] for name in (self.inner, self.outer))
-        line, line_change, base, turn = tangent.line(self.outer, outer.point)
-        assert turn is not None, 'a yoke is a block, and keeps its angle'
-        offset, offset_change = _vary_pin_at_zero(tangent, self.inner, outer.point, self.a.point)
-        unit = tangent.unit[inner.along]
-        slot = unit * tangent.direction[self.inner]
-        slot_change = unit * tangent.direction_change[self.inner] + 1j * times(slot, turn)
-        start = tangent.at(self.a)
-        rest = start - base - unit * offset_change - 1j * times(unit * offset, turn)
-        rest = rest - times(tangent.slide_value[self.inner], slot_change)
-        value = tangent.slide_value[self.outer]
-        rest = rest - times(value, line_change)
-        slides = _vary_meeting(tangent, rest, slot, line)
-        tangent.slide[self.inner], tangent.slide[self.outer] = slides
-        where = base + times(value, line_change) + times(line, slides[1])
-        tangent.ride(self.outer, outer.point, turn, where)
-        if inner.block is not None:
-            turn_block = turn.copy()
-            turn_block[0] += tangent.twist_change[self.inner]
-            tangent.place(inner.block, turn_block, self.a.point, start)
+        return _positive((unit * motion.directions[self.inner] * line.conjugate()).imag())
 
 
-def _pin_at_zero(motion: Motion, slider: str, origin: str, pin: str) -> Any:
-    """Return the block's pin at slide 0, from a point of the link with the line, in its frame."""
+def _pin_at_zero(motion: Motion, slider: str, origin: str, pin: str) -> Series:
+    """Return a pin of a slider's block at a slide of 0, from the origin of the slider's link."""
     slide = motion.mechanism.sliders[slider]
     place = motion.vector(slide.along, origin, slide.through)
     if slide.block is None or slide.point == pin:
         return place
-    arm = motion.vector(slide.block, slide.point, pin)
-    return place + arm * motion.constants.twists[slider]
+    return place + motion.vector(slide.block, slide.point, pin) * motion.twists[slider]
 
 
-def _vary_pin_at_zero(
-    tangent: Tangent, slider: str, origin: str, pin: str
-) -> tuple[complex, Array]:
-    """Return the value of `_pin_at_zero` and its change."""
-    slide = tangent.mechanism.sliders[slider]
-    place, change = tangent.vector(slide.along, origin, slide.through)
-    if slide.block is None or slide.point == pin:
-        return place, change
-    arm, arm_change = tangent.vector(slide.block, slide.point, pin)
-    twist, twist_change = tangent.twist[slider], tangent.twist_change[slider]
-    return place + arm * twist, change + twist * (arm_change + 1j * arm * twist_change)
+def _positive(number: Series) -> Series:
+    """Return the absolute value of a real number."""
+    return -number if number.value[0].real < 0 else number
 
 
-def _meet(motion: Motion, rest: Any, one: Any, two: Any) -> tuple[Any, Any]:
+def _meet(rest: Series, one: Series, two: Series) -> tuple[Series, Series]:
     """Solve x·one + y·two = rest for real x and y."""
-    by = inverse(imag(one * conjugate(two)))
-    motion.inverse.append(by)
-    return imag(rest * conjugate(two)) * by, -imag(rest * conjugate(one)) * by
-
-
-def _vary_meeting(tangent: Tangent, rest: Any, one: Any, two: Any) -> tuple[Any, Any]:
-    by = tangent.next_inverse()
-    x = times(by, times(two.conj(), rest).imag)
-    return x, -times(by, times(one.conj(), rest).imag)
+    by = decided((one * two.conjugate()).imag())
+    return (rest * two.conjugate()).imag() / by, -(rest * one.conjugate()).imag() / by
 
 
 def is_nearly_paired(mechanism: Mechanism) -> bool:

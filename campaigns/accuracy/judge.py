@@ -22,17 +22,15 @@ from math import isfinite, pi
 from typing import Any, NamedTuple
 
 from campaigns.accuracy.mechanism import Mechanism, Turn
-from campaigns.accuracy.motion import Array
 from campaigns.accuracy.reference import (
+    Array,
     condition_numbers,
-    exact_condition_numbers,
-    FACTORIALS,
     is_at_limit,
     Outcome,
     Reference,
     Truth,
-    UNIT_ROUNDOFF,
 )
+from campaigns.series import CORRECT, FACTORIALS, UNIT_ROUNDOFF
 from flint import arb, ctx
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Status
@@ -53,9 +51,6 @@ In u·κ. For a closed case with a larger error, it is checked whether the case 
 κ is a first-order estimate. It holds where rounding changes the distance to a toggle by less than
 that distance. Nearer to a toggle a rate has no correct digit, whatever the status.
 """
-
-_CORRECT = 2.0**-163
-"""Maximum width of a result's enclosure, relative to κ, with u = 2⁻⁵³: fifty digits."""
 
 _LEAST = 2.0**-960
 """Below this κ, u·κ is subnormal."""
@@ -147,34 +142,24 @@ def _measure(
     answers: dict[int, Answer],
     quantities: tuple[str, ...],
 ) -> None:
-    if not answers:
-        return
-    cases = list(answers)
-    arguments = [truths[i] for i in cases], [phi[i] for i in cases], [alpha[i] for i in cases]
-    if reference.mechanism.ties is None:
-        kappa = condition_numbers(reference, *arguments)
-    else:
-        kappa = np.array(
-            [exact_condition_numbers(reference, *a) for a in zip(*arguments[1:], strict=True)]
-        )
-    for i, least in zip(cases, kappa, strict=True):
-        condition = np.maximum(least, _LEAST)
+    for i, answer in answers.items():
+        condition = np.maximum(condition_numbers(truths[i]), _LEAST)
         count = len(quantities)
-        off, width, zero = _differences(reference, truths[i], answers[i])
+        off, width, zero = _differences(reference, truths[i], answer)
         # A published angle counts its turns, and is rounded relative to its size.
         for j, joint in enumerate(reference.mechanism.joints.values()):
             if isinstance(joint, Turn):
-                condition[j, 0] += max(0.0, abs(answers[i][0][j]) - pi)
+                condition[j, 0] += max(0.0, abs(answer[0][j]) - pi)
         # The κ of a joint that does not move is 0, but its terms are not 0 and are rounded.
         condition[zero] = np.maximum(condition[zero], 1.0)
-        while not (width <= _CORRECT * condition)[:, :count].all():
+        while not (width <= CORRECT * condition)[:, :count].all():
             truths[i] = reference.solve(phi[i], alpha[i], 2 * truths[i].precision)
-            off, width, zero = _differences(reference, truths[i], answers[i])
+            off, width, zero = _differences(reference, truths[i], answer)
         errors = off[:, :count] / (UNIT_ROUNDOFF * condition[:, :count])
         errors[off[:, :count] == 0.0] = 0.0
         errors[np.isnan(errors)] = np.inf
         if errors[:, 0].max() > _SUSPICIOUS and _is_other_assembly(
-            reference, phi[i], alpha[i], answers[i], off[:, 0].max()
+            reference, phi[i], alpha[i], answer, off[:, 0].max()
         ):
             findings.count(i, 'wrong')
             continue
@@ -191,9 +176,8 @@ def _measure(
 
 def _differences(reference: Reference, truth: Truth, answer: Answer) -> tuple[Array, Array, Array]:
     """Return the errors of an answer, the widths of the truth, and whether the truth may be 0."""
-    exponent = reference.constants().exponent
     ctx.prec = truth.precision
-    unit = arb(2) ** -exponent
+    unit = arb(2) ** -truth.motion.exponent
     off = np.zeros((len(truth.joints), 3))
     width = np.zeros((len(truth.joints), 3))
     zero = np.zeros((len(truth.joints), 3), bool)

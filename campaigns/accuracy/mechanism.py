@@ -74,8 +74,6 @@ class Dyad(Protocol):
 
     def close(self, motion: Any) -> None: ...
 
-    def vary(self, tangent: Any) -> None: ...
-
     def margin(self, motion: Any) -> Any: ...
 
 
@@ -124,6 +122,14 @@ class Mechanism:
         """Return the origin of a slider's line."""
         slide = self.sliders[slider]
         return Spot(slide.along, slide.through)
+
+    def passed_pins(self) -> frozenset[str | Spot]:
+        """Return what later dyads take from a dyad: the pins of links, and points of links."""
+        if len(self.dyads) < 2:
+            return frozenset()
+        links = [link for link in self.links if link not in {GROUND, CRANK}]
+        spots = {spot for dyad in self.dyads[1:] for spot in dyad.given(self)}
+        return frozenset([*links, *(spot for spot in spots if spot.link != GROUND)])
 
     def opening(self) -> float:
         """

@@ -35,38 +35,23 @@ cancel. The stages are
   accelerations. They are sums of terms already counted; each coordinate counts with its absolute
   value.
 
-The reference computes all of it: ∂y/∂zₖ is the effect of changing zₖ between two of its dyads.
+The reference computes all of it, by one way back through the tape of a solution.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from enum import Enum
-from math import inf, pi, remainder
 from typing import Any, NamedTuple
 
-from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot, Turn
-from campaigns.accuracy.motion import (
-    Array,
-    conjugate,
-    Constants,
-    imag,
-    Motion,
-    OpenError,
-    ORDER,
-    passed_results,
-    PassedResult,
-    Tangent,
-    turn_sizes,
-    turn_values,
-    turning,
-    UndecidedError,
-)
-from flint import arb, ctx
+from campaigns.accuracy.mechanism import Key, Mechanism, Tie
+from campaigns.accuracy.motion import Motion, OpenError, UndecidedError
+from campaigns.series import PRECISIONS, real_series, Series, UNIT_ROUNDOFF
 import numpy as np
+import numpy.typing as npt
 
-PRECISIONS = (256, 512, 1024, 2048, 4096)
-"""In bits. The next precision is used if a result has fewer than 50 proven digits."""
+Array = npt.NDArray[Any]
 
 
 class Outcome(Enum):
@@ -85,21 +70,16 @@ class Truth(NamedTuple):
     joints: tuple[Any, ...]
     motion: Motion
     precision: int
+    # The joints on the tape of the motion, with the absolute values of their terms.
+    made: tuple[tuple[Series, list[float]], ...] = ()
 
 
 class Reference:
     """A mechanism, ready to be solved; its numbers may be replaced by balls."""
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        numbers: Mapping[Key, Any] | None = None,
-        changed: tuple[PassedResult, Any] | None = None,
-    ) -> None:
-        self._changed = changed
+    def __init__(self, mechanism: Mechanism, numbers: Mapping[Key, Any] | None = None) -> None:
         self.mechanism = mechanism
         self.numbers = mechanism.numbers() if numbers is None else numbers
-        self._constants: dict[int, Constants] = {}
 
     def solve(self, phi: Any, alpha: Any, lowest: int = PRECISIONS[0]) -> Truth:
         """
@@ -108,224 +88,55 @@ class Reference:
         The input angle is in [rad], its acceleration in [rad/s²]; its rate is 1 rad/s.
         """
         for precision in [p for p in PRECISIONS if p >= lowest] or [lowest]:
-            ctx.prec = precision
-            motion = self.motion(precision)
+            motion = Motion(self.mechanism, self.numbers, precision, phi, alpha)
             try:
-                motion.solve(arb(phi), arb(alpha))
+                motion.solve()
             except OpenError:
                 return Truth(Outcome.OPEN, (), motion, precision)
             except UndecidedError:
                 continue
-            return Truth(Outcome.CLOSED, self._joints(motion), motion, precision)
+            made = tuple(motion.joints())
+            joints = tuple(real_series(joint.value) for joint, _ in made)
+            return Truth(Outcome.CLOSED, joints, motion, precision, made)
         return Truth(Outcome.SINGULAR, (), motion, precision)
 
-    def motion(self, precision: int) -> Motion:
-        """Return an unsolved motion at a precision, in bits."""
-        if precision not in self._constants:
-            self._constants[precision] = Constants(self.mechanism, self.numbers)
-        pivot = next(iter(self.mechanism.links[CRANK]))
-        return Motion(self.mechanism, self._constants[precision], pivot, self._changed)
 
-    def constants(self) -> Constants:
-        """Return the numbers as balls, at the lowest precision."""
-        ctx.prec = PRECISIONS[0]
-        self.motion(PRECISIONS[0])
-        return self._constants[PRECISIONS[0]]
+def condition_numbers(truth: Truth) -> Array:
+    """
+    Return κ of a closed case, [joint, derivative].
 
-    def _joints(self, motion: Motion) -> tuple[Any, ...]:
-        values = []
-        for joint in self.mechanism.joints.values():
-            if isinstance(joint, Turn):
-                unit = motion.unchanged[joint.child]
-                if joint.parent != 'ground':
-                    unit = unit * conjugate(motion.unchanged[joint.parent])
-                values.append(turning(unit))
-            else:
-                values.append(motion.slide[joint])
-        return tuple(values)
-
-
-def series(values: Any) -> list[complex]:
-    """Return a power series as doubles, all of its coefficients."""
-    coefficients = [complex(c) for c in values.coeffs()]
-    return coefficients + [0j] * (ORDER - len(coefficients))
-
-
-FACTORIALS = (1.0, 1.0, 2.0)
-
-_PRECISION = 1024
-_STEP = 300
-"""Minus the exponent of the step of differences: both errors are then below 50 digits."""
-
-
-def condition_numbers(
-    reference: Reference, truths: list[Truth], phi: list[float], alpha: list[float]
-) -> Array:
-    """Return κ of all closed cases in doubles, [case, joint, derivative]."""
-    mechanism = reference.mechanism
-    motions = [truth.motion for truth in truths]
-    values: dict[str | int, Array] = {}
-    for name in mechanism.links:
-        values[name] = np.array([series(m.unit[name]) for m in motions]).T
-    for name in mechanism.sliders:
-        values[name] = np.array([series(m.slide[name]) for m in motions]).real.T
-    for i in range(len(mechanism.dyads)):
-        values[i] = np.array([series(m.inverse[i]) for m in motions]).real.T
-    tangent = Tangent(
-        mechanism,
-        reference.constants(),
-        reference.numbers,
-        values,
-        {
-            handed.owner: np.array([series(_place(m, handed.owner)) for m in motions]).T
-            for handed in passed_results(mechanism)
-            if handed.quantity == 'x' and not handed.power
-        },
-        np.array([remainder(angle, 2 * pi) for angle in phi]),
-        np.array(alpha),
-        np.array([_opening(reference, angle) for angle in phi]),
+    The dependent lengths of a linkage, as of a parallelogram, vary together.
+    """
+    motion = truth.motion
+    widths, ties, tied = motion.tape.widths, motion.mechanism.ties, []
+    if ties is not None:
+        numbers = {at for at, _ in motion.numbers.values()}
+        widths = {at: width for at, width in widths.items() if at not in numbers}
+        tied = [_tied(motion, tie) for tie in ties]
+    kappa = np.array(
+        [np.add(joint.changes(widths, tied), terms) for joint, terms in truth.made], float
     )
-    kappa = np.empty((len(truths), len(mechanism.joints), 3))
-    for j, joint in enumerate(mechanism.joints.values()):
-        if isinstance(joint, Turn):
-            change = tangent.unchanged[joint.child] - tangent.unchanged[joint.parent]
-        else:
-            change = tangent.slide[joint]
-        kappa[:, j] = np.abs(change).sum(axis=2).T
-    return (kappa + _published(reference, motions)) * FACTORIALS
-
-
-def exact_condition_numbers(
-    reference: Reference, phi: float, alpha: float, independent: bool = False
-) -> Array | None:
-    """
-    Return κ of one case by differences of balls, [joint, derivative]; None if it is singular.
-
-    If ``independent``, each number varies independently, even if the linkage has dependent
-    lengths.
-    """
-    base = reference.solve(phi, alpha, _PRECISION)
-    if base.outcome is not Outcome.CLOSED:
-        return None
-    precision = base.precision
-    ctx.prec = precision
-    step = arb(2) ** -_STEP
-    numbers = reference.numbers
-    ties = reference.mechanism.ties
-    if ties is None or independent:
-        ties = tuple({key: value} for key, value in numbers.items() if value)
-    kappa = np.zeros((len(base.joints), 3))
-    exact = _coefficients(base)
-    passed = passed_results(reference.mechanism)
-    conditions = [0.0] * len(passed)
-    joints = list(reference.mechanism.joints.values())
-
-    def add(changed: Truth) -> None:
-        for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
-            for k in range(3):
-                difference = other[k] - one[k]
-                if k == 0 and isinstance(joints[j], Turn):
-                    # An angle next to π is on the other side of it as soon as anything changes.
-                    difference -= 2 * round(float(difference) / (2 * pi)) * arb.pi()
-                kappa[j, k] += abs(float(difference / step))
-        for i, handed in enumerate(passed):
-            conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
-
-    for tie in ties:
-        varied: dict[Key, Any] = dict(numbers)
-        for key, change in tie.items():
-            varied[key] = arb(numbers[key]) + step * arb(change)
-        add(Reference(reference.mechanism, varied).solve(phi, alpha, precision))
-    turned = remainder(phi, 2 * pi)
-    add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
-    add(reference.solve(arb(phi) + step * arb(_opening(reference, phi)), alpha, precision))
-    add(reference.solve(phi, arb(alpha) * (1 + step), precision))
-    # The derivative by the rate ω, which is 1: y' is proportional to ω, and y'' = g·ω² + h·α.
-    for j, y in enumerate(exact):
-        kappa[j, 1] += abs(float(y[1]))
-    still = _coefficients(reference.solve(phi, 0.0, precision))
-    for j, y in enumerate(still):
-        kappa[j, 2] += 2 * abs(float(y[2]))
-    # The part g·ω² of an acceleration, which remains where α is 0, counts twice.
-    still_motion = reference.solve(phi, 0.0, precision).motion
-    for i, handed in enumerate(passed):
-        if handed.quantity in {'turn', 'slide'} and handed.power:
-            of = base.motion if handed.power == 1 else still_motion
-            conditions[i] += handed.power * abs(_value(of, handed))
-    for i, handed in enumerate(passed):
-        amount = step * arb(_size(base.motion, handed) + conditions[i])
-        changed = Reference(reference.mechanism, numbers, (handed, amount))
-        add(changed.solve(phi, alpha, precision))
-    kappa += _published(reference, [base.motion])[0]
-    if ties is reference.mechanism.ties:
+    if ties is not None:
         # A joint of such a linkage may not move at all. Its κ would be 0, but its terms are as
         # large as the crank's rate and acceleration, and are rounded.
-        kappa[:, 1:] = np.maximum(kappa[:, 1:], (1.0, max(1.0, abs(alpha))))
-    return kappa * FACTORIALS
+        alpha = abs(float(motion.crank.orders()[2]))
+        kappa[:, 1:] = np.maximum(kappa[:, 1:], (1.0, 2.0 * max(1.0, alpha)))
+    return kappa
 
 
-def _coefficients(truth: Truth) -> list[list[Any]]:
-    return [[y[0], y[1], y[2]] for y in truth.joints]
+def _tied(motion: Motion, tie: Tie) -> dict[int, complex]:
+    """Return the changes of dependent lengths by their index on the tape."""
+    changes: dict[int, complex] = {}
+    for key, size in tie.items():
+        at, part = motion.numbers[key]
+        changes[at] = changes.get(at, 0.0) + part * size * 2.0**-motion.exponent
+    return changes
 
 
-def _opening(reference: Reference, phi: float) -> float:
-    """Return the angle that the first dyad uses if it is a rounded sum; otherwise 0."""
-    opening = reference.mechanism.opening()
-    return remainder(phi + opening, 2 * pi) if opening else 0.0
-
-
-def _published(reference: Reference, motions: list[Motion]) -> Array:
-    """Return the absolute terms of the published joints, summed, [case, joint, power]."""
-    sizes = np.zeros((len(motions), len(reference.mechanism.joints), 3))
-    for j, joint in enumerate(reference.mechanism.joints.values()):
-        if isinstance(joint, Turn):
-            for link in {joint.child, joint.parent} - {GROUND}:
-                sizes[:, j] += turn_sizes(
-                    np.array([series(m.unchanged[link]) for m in motions]).T
-                ).T
-            sizes[:, j, 0] = pi
-        else:
-            sizes[:, j] = np.abs([series(m.slide[joint]) for m in motions])
-    return sizes
-
-
-def _place(motion: Motion, owner: str | Spot) -> Any:
-    return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
-
-
-def _size(motion: Motion, handed: PassedResult) -> float:
-    """Return the absolute value of a passed result."""
-    if handed.quantity == 'turn' and not handed.power:
-        return pi
-    return abs(_value(motion, handed))
-
-
-def _value(motion: Motion, handed: PassedResult) -> float:
-    owner, quantity, power = handed
-    if quantity == 'turn':
-        return float(turn_values(np.array([series(motion.unchanged[owner])]).T)[power, 0])
-    if quantity == 'slide':
-        return series(motion.slide[owner])[power].real
-    place = series(_place(motion, owner))[power]
-    return place.real if quantity == 'x' else place.imag
-
-
-def _change(motion: Motion, changed: Motion, handed: PassedResult) -> Any:
-    """Return the change of an angle or a slide; 0 for a pin, which counts with its size."""
-    owner, quantity, power = handed
-    if quantity == 'turn':
-        return imag(changed.unchanged[owner] * conjugate(motion.unchanged[owner]))[power]
-    if quantity == 'slide':
-        return (changed.slide[owner] - motion.slide[owner])[power]
-    return 0
-
-
-UNIT_ROUNDOFF = 2.0**-53
 TOLERANCE = 16.0 * UNIT_ROUNDOFF
 """Relative to the sum of all lengths and the condition number of the distance to a toggle."""
 
 _LIMIT_PRECISION = 1024
-_LIMIT_STEP = 300
 
 
 def is_at_limit(reference: Reference, phi: float) -> bool:
@@ -341,35 +152,14 @@ def is_at_limit(reference: Reference, phi: float) -> bool:
 
 def margins(reference: Reference, phi: float) -> list[tuple[float, float]]:
     """Return the margin of each dyad up to the first open one, and its tolerance."""
-    base = _margins(reference, arb(phi))
-    step = arb(2) ** -_LIMIT_STEP
-    numbers = reference.numbers
-    conditions = [0.0] * len(base)
-
-    def add(changed: list[Any]) -> None:
-        for i in range(len(base)):
-            slope = float((changed[i] - base[i]) / step) if i < len(changed) else inf
-            conditions[i] += abs(slope)
-
-    for key, value in numbers.items():
-        if value:
-            varied: dict[Key, Any] = dict(numbers)
-            varied[key] = arb(value) * (1 + step)
-            add(_margins(Reference(reference.mechanism, varied), arb(phi)))
-    add(_margins(reference, arb(phi) + step * arb(remainder(phi, 2 * pi))))
-    size = reference.mechanism.size() * 2.0 ** -reference.constants().exponent
-    return [
-        (float(margin), TOLERANCE * (condition + size))
-        for margin, condition in zip(base, conditions, strict=True)
-    ]
-
-
-def _margins(reference: Reference, phi: Any) -> list[Any]:
-    ctx.prec = _LIMIT_PRECISION
-    motion: Motion = reference.motion(_LIMIT_PRECISION)
-    try:
-        motion.solve(phi, arb(0))
-        placed = len(reference.mechanism.dyads)
-    except (OpenError, UndecidedError):
-        placed = len(motion.inverse) + 1
-    return [dyad.margin(motion) for dyad in reference.mechanism.dyads[:placed]]
+    mechanism = reference.mechanism
+    motion = Motion(mechanism, reference.numbers, _LIMIT_PRECISION, phi)
+    with suppress(OpenError, UndecidedError):
+        motion.solve()
+    size = mechanism.size() * 2.0**-motion.exponent
+    found = []
+    for dyad in mechanism.dyads[: motion.placed + 1]:
+        margin = dyad.margin(motion)
+        condition = margin.changes(motion.widths)[0]
+        found.append((float(margin.value[0].real), TOLERANCE * (condition + size)))
+    return found

@@ -24,15 +24,9 @@ from campaigns.accuracy.dyads import is_nearly_paired
 from campaigns.accuracy.judge import Findings, judge, QUANTITIES, Tally
 from campaigns.accuracy.mechanism import Mechanism
 from campaigns.accuracy.random_families import ANGLES, RANDOM
-from campaigns.accuracy.reference import (
-    exact_condition_numbers,
-    FACTORIALS,
-    margins,
-    Outcome,
-    Reference,
-    UNIT_ROUNDOFF,
-)
+from campaigns.accuracy.reference import condition_numbers, margins, Outcome, Reference
 from campaigns.campaign import Part, parts_of, tallies_of
+from campaigns.series import FACTORIALS, UNIT_ROUNDOFF
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure
 
@@ -133,8 +127,8 @@ def _show_angle(reference: Reference, phi: float, alpha: float) -> None:
     print(f'truth: {truth.outcome.name} at {truth.precision} bits')
     if truth.outcome is not Outcome.CLOSED:
         return
-    kappa = exact_condition_numbers(reference, phi, alpha)
-    unit = 2.0 ** reference.constants().exponent
+    kappa = condition_numbers(truth)
+    unit = 2.0**truth.motion.exponent
     for j, (name, joint) in enumerate(reference.mechanism.joints.items()):
         for k, quantity in enumerate(QUANTITIES):
             size = unit if isinstance(joint, str) else 1.0
@@ -142,6 +136,4 @@ def _show_angle(reference: Reference, phi: float, alpha: float) -> None:
             text = f'{name} {quantity}: truth {exact!r}'
             if k < len(found) and found[k]:
                 text += f', package {found[k][j]!r}'
-            if kappa is not None:
-                text += f', u·κ {UNIT_ROUNDOFF * kappa[j, k] * size:.3g}'
-            print(text)
+            print(f'{text}, u·κ {UNIT_ROUNDOFF * kappa[j, k] * size:.3g}')

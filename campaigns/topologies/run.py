@@ -28,7 +28,7 @@ import traceback
 from typing import NamedTuple
 
 from campaigns.campaign import Part, parts_of, tallies_of
-from campaigns.in_process import in_process
+from campaigns.reliability.processes import in_process
 from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges

@@ -115,14 +115,14 @@ def _solve(mechanism: Mechanism, phi: float, digits: int) -> list[Any]:
     reference = Reference(mechanism)
     truth = reference.solve(phi, 0.0, 4 * digits)
     with mp.workdps(digits):
-        unit = mpf(2) ** truth.motion.constants.exponent
+        unit = mpf(2) ** truth.motion.exponent
 
         def number(ball: Any) -> mpf:
             return mpf(ball.mid().str(digits, radius=False))
 
         if truth.outcome is Outcome.OPEN:
             (dyad,) = mechanism.dyads
-            return [-number(dyad.margin(truth.motion)) * unit]
+            return [-number(dyad.margin(truth.motion).orders()[0]) * unit]
         if truth.outcome is Outcome.SINGULAR:
             return [mpf(0), Quantity(mpf(0), inf), Quantity(mpf(0), inf)]
         slides = [isinstance(joint, str) for joint in mechanism.joints.values()]
@@ -132,7 +132,7 @@ def _solve(mechanism: Mechanism, phi: float, digits: int) -> list[Any]:
             for series, sliding in zip(truth.joints, slides, strict=True)
         ]
         values[:2] = [v if slides[k] else turned(v) for k, v in enumerate(values[:2])]
-        kappa = condition_numbers(reference, [truth], [phi], [0.0])[0].T.flatten().tolist()
+        kappa = condition_numbers(truth).T.flatten().tolist()
         # There an angle counts as π, and the crank's rate ω is an input: y' ~ ω, y'' ~ ω².
         beside = [*(0.0 if slides[k] else pi - abs(values[k]) for k in range(2))]
         beside += [abs(value) for value in values[2:4]] + [2 * abs(value) for value in values[4:]]

@@ -85,7 +85,7 @@ def test_interval_enclosures_contain_the_power_series_solutions(family):
                 continue
             found = prove(linkage, [phi], [1.0], [alpha])
             for joint, turning in enumerate(closure.turning):
-                unit = 1.0 if turning else 2.0**expected.motion.constants.exponent
+                unit = 1.0 if turning else 2.0**expected.motion.exponent
                 for order in range(3):
                     value = coefficient(expected, joint, order, unit)
                     ball = found[order][joint]
