@@ -11,7 +11,6 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from datetime import datetime
 import multiprocessing
@@ -169,45 +168,6 @@ def tallies_of(
         tallies[part.test, part.family].merge(tally)
         progress(part.size)
     return tallies
-
-
-def attack_in_parts(
-    do: Callable[[tuple[int, int, int]], tuple[Counter[str], list[str]]],
-    count: int,
-    seed: int,
-    part: int,
-    jobs: int,
-) -> tuple[dict[str, int], list[str]]:
-    """
-    Try random inputs, each known by the seed and its number.
-
-    Parameters
-    ----------
-    do
-        Takes a seed and a range of numbers; tries these inputs and returns what `attack_in_parts`
-        returns.
-    count, seed
-        The number of inputs, and their seed.
-    part
-        Number of inputs that a process tries before it reports.
-    jobs
-        Number of processes.
-
-    Returns
-    -------
-    tried : dict
-        Number of tries, by command and by how it ended.
-    findings : list
-        The violations, one line each.
-
-    """
-    parts = [(seed, begin, min(begin + part, count)) for begin in range(0, count, part)]
-    tried: Counter[str] = Counter()
-    findings: list[str] = []
-    for counts, lines in results_of(do, parts, jobs):
-        tried += counts
-        findings += lines
-    return dict(sorted(tried.items())), findings
 
 
 def progress_lines(total: float, unit: str) -> Callable[[float], None]:

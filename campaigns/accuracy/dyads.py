@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from campaigns.accuracy.mechanism import CRANK, Mechanism, Spot
 from campaigns.accuracy.motion import decided, Motion, root
@@ -31,25 +31,33 @@ from linkage_ros.kinematics import Side
 
 
 class _Dyad:
-    """A dyad; by default it has one assembly, and passes on no angle and no slide."""
+    """A dyad; its class names the fields that say what it joins and what it passes on."""
 
     __slots__ = ()
 
+    CLOSING: ClassVar[tuple[str, Side, Side] | None] = None  # The field, and its two sides
+    TURNED: ClassVar[tuple[str, ...]] = ()  # Links whose angles it computes
+    SLID: ClassVar[tuple[str, ...]] = ()  # Sliders that place a block
+    ENDS: ClassVar[tuple[str, str]] = ('a', 'd')  # What joins it to placed links
+
     @property
     def assembly(self) -> tuple[str, Side] | None:
-        return None
+        if self.CLOSING is None:
+            return None
+        closing, ahead, behind = self.CLOSING
+        return getattr(self, closing), ahead if self.side > 0 else behind
 
     @property
     def turned(self) -> tuple[str, ...]:
-        return ()
+        return tuple(getattr(self, field) for field in self.TURNED)
 
     @property
     def slid(self) -> tuple[str, ...]:
-        return ()
+        return tuple(getattr(self, field) for field in self.SLID)
 
     @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        raise NotImplementedError
+    def ends(self) -> tuple[Spot | str, ...]:
+        return tuple(getattr(self, field) for field in self.ENDS)
 
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return tuple(end if isinstance(end, Spot) else mechanism.start(end) for end in self.ends)
@@ -68,17 +76,8 @@ class RPR(_Dyad):
     # Whether the pins coincide when the crank lies along the ground; the side changes there.
     fold: bool = False
 
-    @property
-    def assembly(self) -> tuple[str, Side]:
-        return self.slider, 'ahead' if self.side > 0 else 'behind'
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return (self.rail,)
-
-    @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.d
+    CLOSING = ('slider', 'ahead', 'behind')
+    TURNED = ('rail',)
 
     def close(self, motion: Motion) -> None:
         start, end = motion.at(self.a), motion.at(self.d)
@@ -121,21 +120,10 @@ class RRP(_Dyad):
     slider: str  # Name of the slider
     side: int  # +1: B lies ahead of A along the line, -1: behind
 
-    @property
-    def assembly(self) -> tuple[str, Side]:
-        return self.slider, 'ahead' if self.side > 0 else 'behind'
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return (self.one,)
-
-    @property
-    def slid(self) -> tuple[str, ...]:
-        return (self.slider,)
-
-    @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.slider
+    CLOSING = ('slider', 'ahead', 'behind')
+    TURNED = ('one',)
+    SLID = ('slider',)
+    ENDS = ('a', 'slider')
 
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
@@ -177,17 +165,8 @@ class RRR(_Dyad):
     fold: bool = False
     stretch: bool = False
 
-    @property
-    def assembly(self) -> tuple[str, Side]:
-        return self.pin, 'left' if self.side > 0 else 'right'
-
-    @property
-    def turned(self) -> tuple[str, ...]:
-        return self.one, self.two
-
-    @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.d
+    CLOSING = ('pin', 'left', 'right')
+    TURNED = ('one', 'two')
 
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
@@ -237,13 +216,8 @@ class PRP(_Dyad):
     two: str
     pin: str  # The pin of both blocks; the point of slider ``two`` if its block is virtual
 
-    @property
-    def slid(self) -> tuple[str, ...]:
-        return self.one, self.two
-
-    @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        return self.one, self.two
+    SLID = ('one', 'two')
+    ENDS = ('one', 'two')
 
     def close(self, motion: Motion) -> None:
         base_one, line_one, block_one = motion.line(self.one, self.pin)
@@ -281,13 +255,8 @@ class RPP(_Dyad):
     inner: str
     outer: str
 
-    @property
-    def slid(self) -> tuple[str, ...]:
-        return (self.outer,)
-
-    @property
-    def ends(self) -> tuple[Spot | str, Spot | str]:
-        return self.a, self.outer
+    SLID = ('outer',)
+    ENDS = ('a', 'outer')
 
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
