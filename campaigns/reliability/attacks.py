@@ -15,14 +15,15 @@ No input may cause a traceback, a hang, unlimited memory, or more than a screen 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
 from bench.report import Table
-from campaigns.campaign import Findings, Page
+from campaigns.campaign import Findings, Page, results_of
 from campaigns.reliability import graph, hostile_bags, hostile_files, signals
-from campaigns.reliability.attack import Attacked
+from campaigns.reliability.judge import Try
 
 PAGE = Page(
     Path('docs/recordings/attacks.md'),
@@ -53,19 +54,41 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--seconds', type=float, default=60.0, help='duration on the graph')
 
 
+Tries = Callable[[int, range], Iterable[Try]]
+"""Tries the inputs of a seed and of some numbers."""
+
+Attacked = tuple[Counter[str], list[str]]
+"""The number of tries by how each ended, and the violations."""
+
+
+def attack(tries: Tries, count: int, seed: int, jobs: int = 1, part: int = 10) -> Attacked:
+    """Try a number of random inputs in several processes, ``part`` of them at a time."""
+    parts = [range(begin, min(begin + part, count)) for begin in range(0, count, part)]
+    tried, findings = Counter[str](), []
+    for some in results_of(partial(_attack_part, tries, seed), parts, jobs):
+        tried.update(outcome for outcome, _ in some)
+        findings += [finding for _, finding in some if finding]
+    return Counter(dict(sorted(tried.items()))), findings
+
+
+def _attack_part(tries: Tries, seed: int, numbers: range) -> list[Try]:
+    return [*tries(seed, numbers)]
+
+
 def run(options: argparse.Namespace) -> Findings:
     """Attack."""
+    seed, jobs = options.seed, options.jobs
     attacks: dict[str, Callable[[], Attacked]] = {
-        'Files': partial(hostile_files.attack, options.files, options.seed, options.jobs),
-        'Bags': partial(hostile_bags.attack, options.bags, options.seed, options.jobs),
-        'Signals': partial(signals.attack, options.signals, options.seed),
-        'Graph': partial(graph.attack, options.seconds, options.seed),
+        'Files': partial(attack, hostile_files.tries, options.files, seed, jobs, part=50),
+        'Bags': partial(attack, hostile_bags.tries, options.bags, seed, jobs),
+        'Signals': partial(attack, signals.tries, options.signals, seed),
+        'Graph': partial(graph.attack, options.seconds, seed),
     }
     findings = Findings([], [])
-    for name, attack in attacks.items():
-        done = attack()
-        title = f'{name}: {done.tried.total():,} tried, {len(done.findings)} findings'
-        rows = [(end, f'{count:,}') for end, count in done.tried.items()]
+    for name, do in attacks.items():
+        tried, found = do()
+        title = f'{name}: {tried.total():,} tried, {len(found)} findings'
+        rows = [(end, f'{count:,}') for end, count in tried.items()]
         findings.tables.append(Table(title, ('', ''), [*rows]))
-        findings.faults.extend(done.findings)
+        findings.faults.extend(found)
     return findings

@@ -228,7 +228,7 @@ def _run_part(part: Part) -> tuple[Part, Tally]:
                             f'{name}, {part.kind}, {part.damage} {place}: {verdict}'
                         )
                 file.seek(at)
-                file.write(content[at : at + 1 if part.damage == 'flip' else None])
+                file.write(content[slice(at, at + 1 if part.damage == 'flip' else None)])
     return part, tally
 
 

@@ -21,7 +21,6 @@ from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
 
-from campaigns.reliability.attack import Attacked
 from linkage_ros.processes import Graph, MeasurementError, private_domain
 from linkage_ros.resources import shipped_path
 
@@ -41,8 +40,8 @@ _CLOSING = re.compile(
 )
 
 
-def attack(seconds: float, seed: int) -> Attacked:
-    """Attack a node for some seconds."""
+def attack(seconds: float, seed: int) -> tuple[Counter[str], list[str]]:
+    """Attack a node for some seconds; return the tries by kind, and a line per violation."""
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
         folder = Path(name)
         linkage = shipped_path('linkages/four_bar.yaml')
@@ -64,10 +63,10 @@ def attack(seconds: float, seed: int) -> Attacked:
             # 1: the snapshot memory overflowed in a flood, which the node reports.
             node.check_end(1)
         except MeasurementError as error:
-            return Attacked(findings=[str(error)])
+            return Counter(), [str(error)]
         log = (folder / 'linkage_node.log').read_text(errors='replace')
     tried = Counter[str](outcome['tried'])
-    return Attacked(tried, outcome['findings'] + _faults_in(log, tried))
+    return tried, outcome['findings'] + _faults_in(log, tried)
 
 
 def _faults_in(log: str, tried: Counter[str]) -> list[str]:

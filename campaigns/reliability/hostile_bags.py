@@ -24,9 +24,8 @@ from random import Random
 from shutil import rmtree
 from struct import Struct
 
-from campaigns.reliability.attack import attack_in_parts, Attacked
 from campaigns.reliability.damage import make
-from campaigns.reliability.judge import fault_of, Manners
+from campaigns.reliability.judge import fault_of, Manners, Try
 from campaigns.reliability.processes import confined, in_process
 from campaigns.reliability.recording import JOINT_STATE, START, WRITERS
 from linkage_ros.bag import BagWriter, METADATA_FILE, RUN_FILE, Storage, Topic
@@ -67,12 +66,8 @@ _AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
 """Offset of the checksum in each record; an attachment has it at its end."""
 
 
-def attack(count: int, seed: int, jobs: int = 1) -> Attacked:
-    """Run the commands on a number of changed bags."""
-    return attack_in_parts(_attack, count, seed, jobs, part=10)
-
-
-def _attack(seed: int, numbers: range, attacked: Attacked) -> None:
+def tries(seed: int, numbers: range) -> Iterator[Try]:
+    """Run the commands on changed bags."""
     with confined():
         for number in numbers:
             Path('bag').mkdir()
@@ -81,7 +76,7 @@ def _attack(seed: int, numbers: range, attacked: Attacked) -> None:
                 ended = in_process([command, 'bag', *arguments], _SECONDS)
                 fault = fault_of(ended, MANNERS)
                 finding = fault and f'bag {seed} {number}: {changes}: {command}: {fault}'
-                attacked.add(f'{command}: {ended.code}', finding)
+                yield f'{command}: {ended.code}', finding
             rmtree('bag')
 
 

@@ -15,15 +15,14 @@ a line that is no longer than a screen. Any other outcome is a finding.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 import random
 import re
 from shutil import rmtree
 import warnings
 
-from campaigns.reliability.attack import attack_in_parts, Attacked
-from campaigns.reliability.judge import fault_of, Manners
+from campaigns.reliability.judge import fault_of, Manners, Try
 from campaigns.reliability.processes import confined, Ended, in_own_process, in_process
 from campaigns.reliability.recording import by_linkage_ros, JOINT_STATE, START
 from linkage_ros.bag import Topic
@@ -188,18 +187,14 @@ _TABLES = {
 }
 
 
-def attack(count: int, seed: int, jobs: int = 1) -> Attacked:
-    """Run commands on a number of changed files."""
-    return attack_in_parts(_attack, count, seed, jobs, part=50)
-
-
-def _attack(seed: int, numbers: range, attacked: Attacked) -> None:
+def tries(seed: int, numbers: range) -> Iterator[Try]:
+    """Run commands on changed files."""
     with warnings.catch_warnings(), confined() as folder:
         warnings.simplefilter('default')
         originals = _originals(folder)
         for number in numbers:
-            outcome, finding = _try(originals, f'{seed} {number}')
-            attacked.add(outcome, finding and f'file {seed} {number}: {finding}')
+            outcome, fault = _try(originals, f'{seed} {number}')
+            yield outcome, fault and f'file {seed} {number}: {fault}'
 
 
 def _originals(folder: Path) -> dict[str, dict[str, bytes]]:

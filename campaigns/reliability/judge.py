@@ -352,6 +352,10 @@ def shortcomings(folder: Path, *, may_drop: bool = False) -> list[str]:
     return faults
 
 
+Try = tuple[str, str]
+"""How a try ended, and its violation in a line; '' for none."""
+
+
 class Manners(NamedTuple):
     """How a command has to end."""
 

@@ -16,6 +16,7 @@ react. A signal may also come after the command has ended.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import contextlib
 import os
 from pathlib import Path
@@ -25,7 +26,7 @@ import subprocess
 import tempfile
 import time
 
-from campaigns.reliability.attack import Attacked
+from campaigns.reliability.judge import Try
 from campaigns.reliability.processes import LINKAGE
 from linkage_ros.resources import shipped_path
 
@@ -51,16 +52,14 @@ _COMMANDS = {
 }  # fmt: skip
 
 
-def attack(count: int, seed: int) -> Attacked:
-    """Send signals to a number of commands."""
-    attacked = Attacked()
-    for number in range(count):
-        outcome, finding = _try(random.Random(f'{seed} {number}'))
-        attacked.add(outcome, finding and f'signal {seed} {number}: {finding}')
-    return attacked
+def tries(seed: int, numbers: range) -> Iterator[Try]:
+    """Send signals to commands."""
+    for number in numbers:
+        outcome, fault = _try(random.Random(f'{seed} {number}'))
+        yield outcome, fault and f'signal {seed} {number}: {fault}'
 
 
-def _try(rng: random.Random) -> tuple[str, str]:
+def _try(rng: random.Random) -> Try:
     command, sent = rng.choice(sorted(_COMMANDS)), rng.choice(_SIGNALS)
     instant, again = rng.uniform(0.0, _LATEST), rng.random() < 0.3
     results = [word for word in _COMMANDS[command] if word.startswith('x.')]
