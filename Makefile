@@ -172,14 +172,14 @@ timing: $(STAMP)
 
 accuracy: $(STAMP)
 	@status=0; \
-	$(BIN)/python -m campaigns.accuracy || status=$$?; \
-	$(BIN)/python -m campaigns.topologies || status=$$?; \
-	$(BIN)/python -m campaigns.inverse || status=$$?; \
-	$(BIN)/python -m campaigns.space || status=$$?; \
+	$(BIN)/python -m campaigns accuracy --write || status=$$?; \
+	$(BIN)/python -m campaigns topologies --write || status=$$?; \
+	$(BIN)/python -m campaigns inverse || status=$$?; \
+	$(BIN)/python -m campaigns space || status=$$?; \
 	exit $$status
 
 topologies: $(STAMP)
-	@$(BIN)/python -m campaigns.topologies
+	@$(BIN)/python -m campaigns topologies --write
 
 compiled: $(STAMP)
 	@LINKAGE_STATES=100000 $(BIN)/python -m pytest -q test/kinematics/compiling
@@ -198,13 +198,13 @@ accuracy_page: $(STAMP)
 	@$(BIN)/python -m docs.make_accuracy
 
 round_trips: $(STAMP)
-	@$(BIN)/python -m campaigns.synthesis
+	@$(BIN)/python -m campaigns synthesis
 
 damage kills disk attacks endurance: $(STAMP)
-	@$(BIN)/python -m campaigns.reliability $@ --write
+	@$(BIN)/python -m campaigns $@ --write
 
 mutants: $(STAMP)
-	@$(BIN)/python -m campaigns.mutants $(if $(SEED),--seed $(SEED))
+	@$(BIN)/python -m campaigns mutants $(if $(SEED),--seed $(SEED))
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py

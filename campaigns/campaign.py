@@ -6,20 +6,17 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Shared by all campaigns: command-line options, processes, progress lines, tables."""
+"""Shared by all campaigns: work in parts and processes, progress lines, tables, pages."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from datetime import datetime
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import multiprocessing
 from pathlib import Path
 import time
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from bench.report import machine_table, say, show, Table, write_page
-from linkage_ros.cli.terminal import give_up_output
+from bench.report import say, show, Table, write_page
 from linkage_ros.tools.study import percentile
 
 Work = TypeVar('Work')
@@ -43,59 +40,6 @@ class Findings(NamedTuple):
     tables: list[Table]
     faults: list[str]
     facts: Sequence[tuple[str, str]] = ()
-
-
-def parser_of(
-    name: str,
-    description: str | None,
-    *,
-    page: Page | None = None,
-    jobs: int = 2,
-    seed: bool = True,
-) -> argparse.ArgumentParser:
-    """Return a parser with the options that campaigns share; ``jobs`` is the default of --jobs."""
-    parser = argparse.ArgumentParser(f'python -m campaigns.{name}', description=description)
-    parser.add_argument('--jobs', type=int, default=jobs, help='number of processes')
-    if seed:
-        parser.add_argument('--seed', type=int, default=1, help='of all random numbers')
-    if page is not None:
-        parser.add_argument('--write', action='store_true', help=f'write the page {page.file}')
-    return parser
-
-
-def parse_families(
-    parser: argparse.ArgumentParser, families: Collection[str], place: str = 'LINKAGE'
-) -> argparse.Namespace:
-    """Parse the command line of a campaign with families, which adds --only and --show."""
-    parser.add_argument('--only', nargs='+', metavar='FAMILY', help='only these families')
-    parser.add_argument('--show', nargs=2, metavar=('FAMILY', place), help='repeat one case')
-    arguments = parser.parse_args()
-    for family in [*(arguments.only or []), *(arguments.show or [])[:1]]:
-        if family not in families:
-            parser.error(f'no family {family!r}; the families are: {", ".join(families)}')
-    return arguments
-
-
-def exit_code(main: Callable[[], int]) -> int:
-    """Run the main function of a campaign; at Ctrl-C, or without a reader, without a traceback."""
-    try:
-        return main()
-    except KeyboardInterrupt:
-        say('stopped')
-        return 130
-    except BrokenPipeError:
-        # The reader of the output has gone: there is nobody to report to.
-        give_up_output()
-        return 1
-
-
-def machine_of(
-    begin: datetime, arguments: argparse.Namespace, unit: str, count: int, *rows: tuple[str, str]
-) -> Table:
-    """Return the table of the machine, with the seed, the amount of work and its time."""
-    seconds = (datetime.now().astimezone() - begin).total_seconds()
-    amount = f'{count:,} in {seconds:.0f} s, {arguments.jobs} processes'
-    return machine_table(begin, *rows, ('seed', str(arguments.seed)), (unit, amount))
 
 
 def publish(tables: Sequence[Table], page: Page | None) -> None:

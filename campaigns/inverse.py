@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-``python -m campaigns.inverse``: cranks of a joint's value, their errors and their number.
+Cranks of a joint's value, their errors and their number.
 
 On every branch of every joint of the shipped linkages of one input, at random values and at 1e-14
 of its ends, the error of a crank is compared with what roundings allow. On random four-bars, and
@@ -17,17 +17,15 @@ with the number of passes that a scan of the range finds, and each crank has to 
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterable, Iterator
-from datetime import datetime
 from math import pi, remainder, tau
 import random
-import sys
-from typing import Any
 
 from bench import ROOT
 from bench.report import Table
 from campaigns.accuracy.random_families import DYADS
-from campaigns.campaign import exit_code, machine_of, Page, parser_of, progress_lines, publish
+from campaigns.campaign import Findings, Page, progress_lines
 from campaigns.topologies.topology import TopologyBuilder
 from linkage_ros.description import load
 from linkage_ros.errors import DefinitionError
@@ -51,7 +49,7 @@ PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'inverse.md',
     'How exact the cranks of a joint are',
     """
-Made by `python -m campaigns.inverse --write`, a part of `make accuracy`.
+Made by `python -m campaigns inverse --write`, a part of `make accuracy`.
 
 The error of a crank θ for a value y of a joint is given in units of u·(|θ| + (|y| + 2π)/|f′| + 1),
 with u = 2⁻⁵³ and the joint y = f(θ); for a slide the size of the linkage stands for 2π. The limit
@@ -190,23 +188,25 @@ def passes_of(closure: Closure, joint: str, value: float, count: int = _SCAN) ->
     return passed
 
 
-def main() -> int:
-    """Run the campaign, and return the exit code."""
-    begin = datetime.now().astimezone()
-    parser = parser_of('inverse', __doc__, page=PAGE, jobs=1)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign; it runs in one process."""
+    parser.set_defaults(jobs=1)
     parser.add_argument('--states', type=int, default=6000, help='random values on each branch')
     parser.add_argument(
         '--linkages', type=int, default=10_000, help='random linkages of each family to scan'
     )
-    arguments = parser.parse_args()
-    rng = random.Random(arguments.seed)
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Compare cranks with closed forms and with scans."""
+    rng = random.Random(options.seed)
     table = Table('Errors', ('joint', 'branches', 'values', 'error', 'off'))
     greatest, values = 0.0, 0
     for name, closure in linkages():
         for joint, branches in outputs_of(closure):
-            found = [errors_of(closure, joint, one, arguments.states, rng) for one in branches]
+            found = [errors_of(closure, joint, one, options.states, rng) for one in branches]
             error, off = (max(each) for each in zip(*found, strict=True))
-            count = len(branches) * (arguments.states + 2)
+            count = len(branches) * (options.states + 2)
             greatest, values = max(greatest, error), values + count
             cells = str(len(branches)), f'{count:,}', f'{error:.2f}', f'{off:.1e}'
             table.rows.append((f'{name} {joint}', *cells))
@@ -217,12 +217,12 @@ def main() -> int:
     )
     faults = 0
     for kind, family in (('four-bars', random_four_bars), ('with poles of slides', random_slides)):
-        missed, more, wrong = _compare(family(arguments.linkages, rng), arguments.linkages, rng)
-        scans.rows.append((kind, f'{arguments.linkages:,}', str(missed), str(more), str(wrong)))
+        missed, more, wrong = _compare(family(options.linkages, rng), options.linkages, rng)
+        scans.rows.append((kind, f'{options.linkages:,}', str(missed), str(more), str(wrong)))
         faults += missed + wrong
-    machine: Any = machine_of(begin, arguments, 'values', values)
-    publish([table, scans, machine], PAGE if arguments.write else None)
-    return int(greatest > 8.0 or faults > 0)
+    found = [f'an error of {greatest:.2f}'] if greatest > 8.0 else []
+    found += [f'{faults} linkages with missed or wrong cranks'] if faults else []
+    return Findings([table, scans], found, [('values', f'{values:,}')])
 
 
 def _compare(closures: Iterable[Closure], count: int, rng: random.Random) -> tuple[int, int, int]:
@@ -241,7 +241,3 @@ def _compare(closures: Iterable[Closure], count: int, rng: random.Random) -> tup
             wrong += any(is_wrong(closure, joint, value, crank) for _, crank in cranks)
         advance(1)
     return missed, more, wrong
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))

@@ -19,10 +19,10 @@ package traces functions; cosmic-ray has no random sample of several modules.
 
 from __future__ import annotations
 
+import argparse
 import ast
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -35,14 +35,7 @@ import tempfile
 from typing import NamedTuple
 
 from bench.report import say, Table
-from campaigns.campaign import (
-    exit_code,
-    machine_of,
-    parser_of,
-    progress_lines,
-    publish,
-    results_of,
-)
+from campaigns.campaign import Findings, progress_lines, results_of
 
 ROOT = Path(__file__).parents[1]
 COPIED = (
@@ -240,9 +233,8 @@ def table_of(fates: Sequence[Fate]) -> Table:
     return Table('Mutants', ('module', 'mutants', 'killed'), rows)
 
 
-def main() -> int:
-    """Try random mutants, and list those that live."""
-    parser = parser_of('mutants', __doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--count', type=int, default=100, help='number of mutants')
     parser.add_argument(
         '--longest',
@@ -252,8 +244,10 @@ def main() -> int:
         'end in counts as alive',
     )
     parser.add_argument('--only', nargs='+', choices=TESTS, help='only these modules')
-    arguments = parser.parse_args()
-    begin = datetime.now().astimezone()
+
+
+def run(arguments: argparse.Namespace) -> Findings:
+    """Try random mutants, and list those that live."""
     known = [mutant for module in arguments.only or TESTS for mutant in mutants_of(module)]
     chosen = Random(arguments.seed).sample(known, min(arguments.count, len(known)))
     advance = progress_lines(len(chosen), 'mutants')
@@ -266,10 +260,4 @@ def main() -> int:
         end = f'killed by {fate.killer}' if fate.killer else 'LIVES'
         say(f'{mutant.module}.py:{mutant.line}: {text} -> {mutant.changed}: {end}')
         advance(1)
-    machine = machine_of(begin, arguments, 'mutants', len(chosen))
-    publish([table_of(fates), machine], None)
-    return 0
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))
+    return Findings([table_of(fates)], [], [('mutants', f'{len(chosen):,}')])

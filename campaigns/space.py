@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 """
-``python -m campaigns.space``: errors of spatial linkages, step by step and as a whole.
+Errors of spatial linkages, step by step and as a whole.
 
 Random steps, far from toggles and down to 1e-9 from one, and whole linkages are compared with
 closed forms of more than 50 digits.
@@ -14,32 +14,20 @@ closed forms of more than 50 digits.
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from datetime import datetime
 from functools import cache, partial
 from math import atan2, cos, dist, hypot, pi, remainder, sin, sqrt, tau
 from random import Random
-import sys
 from typing import Any, NamedTuple
 
 from bench import ROOT
 from bench.report import Table
 from campaigns import space_reference as exact
-from campaigns.accuracy.__main__ import accuracy_table, LIMIT, worst_table
-from campaigns.accuracy.judge import Findings, QUANTITIES, Tally
-from campaigns.campaign import (
-    exit_code,
-    machine_of,
-    Page,
-    parse_families,
-    parser_of,
-    Part,
-    parts_of,
-    progress_lines,
-    publish,
-    tallies_of,
-)
+from campaigns.accuracy.judge import Findings as Judged, QUANTITIES, Tally
+from campaigns.accuracy.page import accuracy_table, LIMIT, worst_table
+from campaigns.campaign import Findings, Page, Part, parts_of, progress_lines, tallies_of
 from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
@@ -58,7 +46,7 @@ PAGE = Page(
     ROOT / 'docs' / 'accuracy' / 'space.md',
     'How exact spatial linkages are',
     """
-Made by `python -m campaigns.space --write`, a part of `make accuracy`; `--cases` sets how many.
+Made by `python -m campaigns space --write`, a part of `make accuracy`; `--cases` sets how many.
 
 Errors are given in units of u·κ, as in [campaign.md](campaign.md). For a step κ goes over all that
 it starts from: places, distances, velocities and accelerations. For a linkage it goes over all
@@ -295,7 +283,7 @@ def draw_case(seed: int, family: str, number: int) -> Case:
 def do(part: Part) -> tuple[Part, Tally]:
     """Do one part."""
     errors = [draw_case(part.seed, part.family, number).errors for number in part.numbers]
-    findings = Findings(Counter(cases=part.size))
+    findings = Judged(Counter(cases=part.size))
     for quantity, found in zip(QUANTITIES, zip(*errors, strict=True), strict=True):
         findings.errors[quantity] = [(case, 0, error) for case, error in enumerate(found)]
     tally = Tally()
@@ -303,29 +291,26 @@ def do(part: Part) -> tuple[Part, Tally]:
     return part, tally
 
 
-def main() -> int:
-    """Run the campaign, and return the exit code."""
-    begin = datetime.now().astimezone()
-    parser = parser_of('space', __doc__, page=PAGE)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--cases', type=int, default=1_000_000, help='cases of each step')
-    arguments = parse_families(parser, FAMILIES, 'FIRST:CASE')
-    if arguments.show:
-        family, place = arguments.show
-        print(draw_case(arguments.seed, family, sum(map(int, place.split(':')))))
-        return 0
-    families = arguments.only or FAMILIES
-    counts = {name: max(arguments.cases // SLOWER.get(name, 1), 1) for name in families}
+
+
+def show(options: argparse.Namespace) -> None:
+    """Print a case, named by FIRST:CASE."""
+    family, place = options.show
+    print(draw_case(options.seed, family, sum(map(int, place.split(':')))))
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Compare steps and linkages with the reference."""
+    counts = {name: max(options.cases // SLOWER.get(name, 1), 1) for name in options.only}
     total = sum(counts.values())
-    work = parts_of(arguments.seed, counts, _PART)
-    tallies = tallies_of(do, work, arguments.jobs, Tally, progress_lines(total, 'cases'))
+    work = parts_of(options.seed, counts, _PART)
+    tallies = tallies_of(do, work, options.jobs, Tally, progress_lines(total, 'cases'))
     named = {family: tally for (_, family), tally in tallies.items()}
-    table = accuracy_table(named)
+    table, above = accuracy_table(named), worst_table(named, LIMIT)
     rows = [(name, f'{counts[name]:,}', *cells) for name, *cells in table.rows]
     table = Table(table.title, ('family', 'cases', *table.head[1:]), [*rows])
-    above, machine = worst_table(named, LIMIT), machine_of(begin, arguments, 'cases', total)
-    publish([table, above, machine], PAGE if arguments.write else None)
-    return int(bool(above.rows))
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))
+    facts = [('cases', f'{total:,}')]
+    return Findings([table, above], [' '.join(row) for row in above.rows], facts)

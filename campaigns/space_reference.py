@@ -9,7 +9,7 @@
 The steps in space in balls of 256 bits, by forms of their own: law of cosines, planes of spheres.
 
 Every number is a power series in time: rate and acceleration are coefficients, as in
-`campaigns.accuracy.motion`. A tape keeps what each was made of, δy(t) = Σ slope(t)·δx(t), with
+`campaigns.series`. A tape keeps what each was made of, δy(t) = Σ slope(t)·δx(t), with
 slopes that are power series as well. So one way back from a result has its derivatives by all that
 is given, and with them κ.
 """

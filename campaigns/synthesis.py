@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-``python -m campaigns.synthesis``: four-bars designed back from their own pairs of angles.
+Four-bars designed back from their own pairs of angles.
 
 Three crank angles of a random linkage and its rocker angles there go into Freudenstein's equation;
 the lengths that it gives are compared with the lengths of the linkage. The rocker angles and
@@ -20,28 +20,17 @@ number. So the result does not depend on how the work is shared, and any linkage
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from importlib import metadata
 from math import acos, cos, hypot, pi, sin
 from random import Random
-import sys
 import time
 from typing import Any, NamedTuple
 
-from bench.report import say, show, Table
-from campaigns.campaign import (
-    exit_code,
-    machine_of,
-    parse_families,
-    parser_of,
-    Part,
-    parts_of,
-    progress_lines,
-    publish,
-    tallies_of,
-)
+from bench.report import say, show as show_table, Table
+from campaigns.campaign import Findings, Part, parts_of, progress_lines, tallies_of
 from flint import arb, ctx
 from linkage_ros.tools.design import solve_links, three_pairs
 from linkage_ros.tools.design.pairs.freudenstein import TRUSTED
@@ -387,7 +376,7 @@ def do(part: Part) -> tuple[Part, Tally]:
     return part, judge([make(part.seed, part.family, i) for i in part.numbers], part.first)
 
 
-def run(
+def run_parts(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
     """Run all parts as `tallies_of` does, and return the tally of each family."""
@@ -402,25 +391,26 @@ def _worst(errors: NDArray[np.float64], numbers: NDArray[np.intp]) -> Worst:
     return Worst(float(each[place]), int(numbers[place]))
 
 
-def main() -> int:
-    """Run the campaign; return 1 if an error is above its limit."""
-    parser = parser_of('synthesis', __doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--cases', type=int, default=100_000, help='linkages of each family')
-    arguments = parse_families(parser, FAMILIES)
-    if arguments.show:
-        _show_case(arguments.seed, arguments.show[0], int(arguments.show[1]))
-        return 0
-    begin = datetime.now().astimezone()
-    work = parts(arguments.cases, arguments.seed, arguments.only or [*FAMILIES])
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Design linkages back from their pairs."""
+    work = parts(options.cases, options.seed, options.only)
     progress = progress_lines(sum(part.size for part in work), 'linkages')
-    tallies = run(work, arguments.jobs, progress)
+    tallies = run_parts(work, options.jobs, progress)
     cases = sum(tally.cases for tally in tallies.values())
-    version = 'python-flint', metadata.version('python-flint')
-    machine = machine_of(begin, arguments, 'cases', cases, version)
+    facts = ('cases', f'{cases:,}'), ('python-flint', metadata.version('python-flint'))
     families = [(name, family.description) for name, family in FAMILIES.items()]
     tables = [_errors(tallies), Table('Families', ('family', 'description'), families), _speed()]
-    publish([*tables, machine], None)
-    return int(any(t.worst.error > TRUSTED or t.worst_lost.error > 1.0 for t in tallies.values()))
+    faults = [
+        f'{family}: {tally.worst}, {tally.worst_lost}'
+        for family, tally in tallies.items()
+        if tally.worst.error > TRUSTED or tally.worst_lost.error > 1.0
+    ]
+    return Findings(tables, faults, facts)
 
 
 def _errors(tallies: dict[str, Tally]) -> Table:
@@ -461,8 +451,10 @@ def _speed() -> Table:
     return table
 
 
-def _show_case(seed: int, family: str, index: int) -> None:
-    case = make(seed, family, index)
+def show(options: argparse.Namespace) -> None:
+    """Print a case with its lengths and their digits."""
+    family, index = options.show[0], int(options.show[1])
+    case = make(options.seed, family, index)
     result = three_pairs(case.crank, case.truth.rocker)
     table = Table(f'{family} {index}', ('', 'crank', 'coupler', 'rocker'))
     for name, numbers in (
@@ -473,14 +465,10 @@ def _show_case(seed: int, family: str, index: int) -> None:
         ('digits', result.reliable_digits),
     ):
         table.rows.append([name, *(f'{float(number):.17g}' for number in numbers)])
-    show(table)
+    show_table(table)
     say(f'crank {case.crank}')
     say(f'rocker {case.truth.rocker}')
     say(
         f'assemblies {case.sides}; condition {result.condition:.3g}, doubt '
         f'{result.system_sensitivity}'
     )
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))

@@ -79,7 +79,7 @@ def test_errors_stay_within_their_limits(tallies: dict[str, Tally], family: str)
         if not found.greatest() <= limit:
             worst = found.worst[0]
             beyond.append(
-                f'{quantity}: {found.greatest():.3g} u·κ, see python -m campaigns.accuracy '
+                f'{quantity}: {found.greatest():.3g} u·κ, see python -m campaigns accuracy '
                 f"--seed {SEED} --show '{family}' {worst.linkage}:{worst.case}"
             )
     assert not beyond, '\n'.join(beyond)

@@ -16,7 +16,7 @@ import sys
 def test_closed_output_ends_a_campaign_without_a_traceback():
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, '-m', 'campaigns.space', '--cases', '10', '--only', 'RSSR']
+    command = [sys.executable, '-m', 'campaigns', 'space', '--cases', '10', '--only', 'RSSR']
     root = Path(__file__).parents[2]
     found = run(command, stdout=writer, stderr=PIPE, text=True, check=False, cwd=root, timeout=60)
     os.close(writer)

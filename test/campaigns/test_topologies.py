@@ -49,7 +49,7 @@ def tallies() -> dict[str, dict[str, Tally]]:
 
 def notes_of(tally: Tally, family: str, test: str) -> str:
     return '\n'.join(
-        f'{note.finding}: {note.text}; see python -m campaigns.topologies --seed {SEED} '
+        f'{note.finding}: {note.text}; see python -m campaigns topologies --seed {SEED} '
         f'--test "{test}" --show "{family}" {note.linkage}'
         for notes in tally.notes.values()
         for note in notes

@@ -16,7 +16,7 @@ a general solver at 60 digits.
 
 from math import nan, pi, radians
 
-from campaigns.synthesis import FAMILIES, parts, run
+from campaigns.synthesis import FAMILIES, parts, run_parts
 from hypothesis import assume, given, strategies as st
 from linkage_ros.errors import SynthesisError
 from linkage_ros.tools.design import (
@@ -133,10 +133,10 @@ MIXED = 'both assemblies'
 
 @pytest.fixture(scope='module')
 def tallies():
-    """Return a sample of the campaign; ``python -m campaigns.synthesis`` takes 1,700,000."""
+    """Return a sample of the campaign; ``python -m campaigns synthesis`` takes 1,700,000."""
     many = ['ordinary', 'reversed links', MIXED]
     few = [family for family in FAMILIES if family not in many]
-    return run([*parts(MANY, SEED, many), *parts(FEW, SEED, few)], jobs=2)
+    return run_parts([*parts(MANY, SEED, many), *parts(FEW, SEED, few)], jobs=2)
 
 
 @pytest.mark.slow
@@ -150,7 +150,7 @@ def test_random_four_bars_are_recovered_from_their_pairs(tallies, family):
     and by the true linkage, which the reference works out from the loop.
     """
     tally = tallies[family]
-    where = f"python -m campaigns.synthesis --seed {SEED} --show '{family}'"
+    where = f"python -m campaigns synthesis --seed {SEED} --show '{family}'"
     assert tally.worst.error <= TRUSTED, f'{where} {tally.worst.linkage}'
     assert tally.worst_lost.error <= 1.0, f'{where} {tally.worst_lost.linkage}'
     if family in {'ordinary', 'reversed links', MIXED}:

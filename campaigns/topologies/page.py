@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-``python -m campaigns.topologies``: random linkages of every topology.
+Random linkages of every topology.
 
 They have every dyad on every kind of link, chains, inputs of all kinds, class III and exact change
 points. They are compared with constraint equations that share nothing with the package, and the
@@ -16,22 +16,13 @@ commands are run on their files.
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from datetime import datetime
 from pathlib import Path
-import sys
 
 from bench.report import Table
-from campaigns.campaign import (
-    exit_code,
-    machine_of,
-    Page,
-    parse_families,
-    parser_of,
-    progress_lines,
-    publish,
-)
+from campaigns.campaign import Findings, Page, progress_lines
 from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import QUANTITIES
 from campaigns.topologies.run import (
@@ -43,14 +34,17 @@ from campaigns.topologies.run import (
     KINEMATICS,
     made_for,
     parts,
-    run,
+    run as run_parts,
     Tally,
     TESTS,
 )
 from linkage_ros.description import linkage_text
 import numpy as np
 
-INTRO = """
+PAGE = Page(
+    Path('docs/accuracy/topologies.md'),
+    'Linkages of every topology',
+    """
 Made by `make topologies`, and by `make accuracy`.
 
 Each linkage is made from a pose, so that it closes there. It is solved at 16 states, one by one
@@ -75,7 +69,8 @@ thousandth of the greatest κ of the linkage. The table has the 99th percentile 
 - *range*: a part of the range is missing, or the range is too wide. *singular*: a toggle, a change
   point or a pair of parallel lines is not listed, or a regular input is listed.
 - *error*: an error of more than 16 u·κ. *traceback*: an exception that a user would see.
-"""
+""",
+)
 
 OUTCOMES = ('linkages', 'states closed', 'states open')
 
@@ -165,9 +160,8 @@ def families_table(names: Sequence[str]) -> Table:
     )
 
 
-def main() -> int:
-    """Run the campaign, and write its page; return 1 if there are findings."""
-    parser = parser_of('topologies', __doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--linkages', type=int, default=40, help='of each family')
     parser.add_argument('--checks', type=int, default=500, help='linkages for `check`')
     parser.add_argument(
@@ -175,37 +169,32 @@ def main() -> int:
     )
     parser.add_argument('--files', type=int, default=90, help='linkages to draw and to export')
     parser.add_argument('--accuracy', type=int, default=3, help='`accuracy --quick`, 15 s each')
-    parser.add_argument('--out', type=Path, default=Path('docs/accuracy'), help='folder')
     parser.add_argument('--test', choices=TESTS, default=KINEMATICS, help='the test for --show')
-    arguments = parse_families(parser, FAMILIES)
-    if arguments.show:
-        _show(arguments.seed, arguments.show[0], int(arguments.show[1]), arguments.test)
-        return 0
-    begin = datetime.now().astimezone()
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Compare the package with the equations, and run the commands."""
     wanted = {
-        KINEMATICS: arguments.linkages,
-        CHECK: arguments.checks,
-        CHECK_ALTERED: arguments.altered,
-        FILE: arguments.files,
-        ACCURACY: arguments.accuracy,
+        KINEMATICS: options.linkages,
+        CHECK: options.checks,
+        CHECK_ALTERED: options.altered,
+        FILE: options.files,
+        ACCURACY: options.accuracy,
     }
-    names = arguments.only or [*FAMILIES]
-    work = parts(arguments.seed, wanted, names)
+    work = parts(options.seed, wanted, options.only)
     tried = sum(part.size for part in work)
-    tallies = run(work, arguments.jobs, progress_lines(tried, 'linkages'))
-    tables = [
-        findings_table(tallies),
-        commands_table(tallies),
-        kinematics_table(tallies.get(KINEMATICS, {})),
-        machine_of(begin, arguments, 'linkages', tried),
-        families_table(names),
-    ]
-    publish(tables, Page(arguments.out / 'topologies.md', 'Linkages of every topology', INTRO))
-    return int(any(t.notes for families in tallies.values() for t in families.values()))
+    tallies = run_parts(work, options.jobs, progress_lines(tried, 'linkages'))
+    found = findings_table(tallies)
+    tables = [found, commands_table(tallies), kinematics_table(tallies.get(KINEMATICS, {}))]
+    notes = any(tally.notes for families in tallies.values() for tally in families.values())
+    faults = [' '.join(row) for row in found.rows] if notes else []
+    facts = [('linkages', f'{tried:,}')]
+    return Findings([*tables, families_table(options.only)], faults, facts)
 
 
-def _show(seed: int, family: str, index: int, test: str) -> None:
+def show(options: argparse.Namespace) -> None:
     """Print the file of a linkage and its findings."""
+    seed, family, index, test = options.seed, options.show[0], int(options.show[1]), options.test
     print(linkage_text(made_for(test, seed, family, index), [f'{family} {index}, seed {seed}']))
     findings = examine(seed, family, index, test)
     print(dict(findings.counts))
@@ -213,7 +202,3 @@ def _show(seed: int, family: str, index: int, test: str) -> None:
         print(f'{name}: {note}')
     for quantity, errors in findings.errors.items():
         print(f'worst {quantity}: {max(errors):.3g} u·κ')
-
-
-if __name__ == '__main__':
-    sys.exit(exit_code(main))

@@ -7,7 +7,7 @@
 # language governing permissions and limitations under the License.
 
 """
-``python -m campaigns.accuracy``: errors of the kinematics, in millions of cases.
+Errors of the kinematics, in millions of cases.
 
 Random linkages of all dyads and of chains of three, and known hard cases, are compared with a
 reference of more than fifty digits. Errors are given in units of the error that rounding the
@@ -16,30 +16,24 @@ inputs may cause.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from datetime import datetime
+import argparse
+from collections.abc import Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
-import sys
 from typing import Any
 
 from bench.report import Table
 from campaigns.accuracy.adversarial import ADVERSARIAL
 from campaigns.accuracy.judge import AT_TOGGLE, edges, FAULTS, OCTAVE, QUANTITIES, Tally
 from campaigns.accuracy.random_families import RANDOM
-from campaigns.accuracy.run import parts, run, show_case
-from campaigns.campaign import (
-    exit_code,
-    machine_of,
-    Page,
-    parse_families,
-    parser_of,
-    progress_lines,
-    publish,
-)
+from campaigns.accuracy.run import parts, run as run_parts, show_case
+from campaigns.campaign import Findings, Page, progress_lines
 import numpy as np
 
-INTRO = """
+PAGE = Page(
+    Path('docs/accuracy/campaign.md'),
+    'Accuracy campaign',
+    """
 Made by `make accuracy`.
 
 ![Errors of all cases](campaign.svg)
@@ -60,7 +54,8 @@ limit is 4.
   package reports as a toggle have a table of their own (limit 32).
 - *wrong*: another assembly. *missed*: reported as open, but closed. *false*: reported as closed,
   but open. *refused*: regular, but reported as a toggle or indeterminate. *crashed*: an exception.
-"""
+""",
+)
 
 
 def accuracy_table(tallies: Mapping[str, Tally]) -> Table:
@@ -188,38 +183,41 @@ def draw(tallies: Mapping[str, Tally], file: Path, limit: float) -> None:
     figure.savefig(file, dpi=110, metadata=metadata)
 
 
-LIMIT = 4.0
+LIMIT, TOGGLE = 4.0, 32.0
+"""Greatest errors in u·κ; the latter of positions at a toggle."""
+
+FAMILIES = [*RANDOM, *ADVERSARIAL]
 
 
-def main() -> int:
-    """Run the campaign, and write its page."""
-    parser = parser_of('accuracy', __doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of this campaign."""
     parser.add_argument('--cases', type=int, default=10_000_000, help='random cases')
     parser.add_argument('--adversarial', type=int, default=1_000_000, help='hard cases')
-    parser.add_argument('--out', type=Path, default=Path('docs/accuracy'), help='folder')
-    arguments = parse_families(parser, [*RANDOM, *ADVERSARIAL], 'LINKAGE[:CASE]')
-    if arguments.show:
-        show_case(arguments.seed, *arguments.show)
-        return 0
-    begin = datetime.now().astimezone()
-    work = parts(arguments.cases, arguments.adversarial, arguments.seed)
-    work = [part for part in work if not arguments.only or part.family in arguments.only]
+
+
+def show(options: argparse.Namespace) -> None:
+    """Print a linkage, and all of a case."""
+    show_case(options.seed, *options.show)
+
+
+def run(options: argparse.Namespace) -> Findings:
+    """Compare the package with the reference; with its page, write the picture."""
+    work = parts(options.cases, options.adversarial, options.seed)
+    work = [part for part in work if part.family in options.only]
     progress = progress_lines(sum(part.size for part in work), 'linkages')
-    tallies = run(work, arguments.jobs, progress)
+    tallies = run_parts(work, options.jobs, progress)
     cases = sum(tally.counts['cases'] for tally in tallies.values())
-    version = 'python-flint', metadata.version('python-flint')
-    tables = [
-        accuracy_table(tallies),
-        status_table(tallies),
-        toggle_table(tallies),
-        worst_table(tallies, LIMIT),
-        machine_of(begin, arguments, 'cases', cases, version),
-        families_table(),
-    ]
-    draw(tallies, arguments.out / 'campaign.svg', LIMIT)
-    publish(tables, Page(arguments.out / 'campaign.md', 'Accuracy campaign', INTRO))
-    return 0
+    facts = ('cases', f'{cases:,}'), ('python-flint', metadata.version('python-flint'))
+    tables = [accuracy_table(tallies), status_table(tallies), toggle_table(tallies)]
+    tables += [worst_table(tallies, LIMIT), families_table()]
+    if options.write:
+        draw(tallies, PAGE.file.with_suffix('.svg'), LIMIT)
+    return Findings(tables, [*_faults_of(tallies)], facts)
 
 
-if __name__ == '__main__':
-    sys.exit(exit_code(main))
+def _faults_of(tallies: Mapping[str, Tally]) -> Iterator[str]:
+    for family, tally in tallies.items():
+        for name, errors in tally.quantities.items():
+            if not errors.greatest() <= (TOGGLE if name == AT_TOGGLE else LIMIT):
+                yield f'{family}: {name} {errors.greatest():.3g} u·κ'
+        yield from (f'{family} {note.linkage}:{note.case}: {note.text}' for note in tally.notes)
