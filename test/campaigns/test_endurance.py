@@ -16,8 +16,8 @@ import shutil
 from subprocess import PIPE, Popen
 import sys
 
-from campaigns.reliability import over_dds
 from campaigns.reliability.accelerated import Plan, run_all
+from campaigns.reliability.endurance import run_over_dds
 from campaigns.reliability.judge import shortcomings
 from campaigns.reliability.memory import flatness, MOST_GROWTH, Usage, usage
 from linkage_ros.bag import BagWriter, Topic, TopicCounts
@@ -41,7 +41,7 @@ def test_memory_stays_flat_over_15_minutes(scene: str) -> None:
 @pytest.mark.ros
 @pytest.mark.skipif(find_spec('rclpy') is None, reason='rclpy is not installed')
 def test_a_run_over_dds_counts_its_messages_and_replays() -> None:
-    done = over_dds.run(6.0 / 60.0)
+    done = run_over_dds(6.0 / 60.0)
     assert done.faults == []
     assert done.replayed['verdict'] == 'identical'
     assert done.counts['recorded']['/joint_states'] > 1000

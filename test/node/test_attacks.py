@@ -6,9 +6,9 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Floods of messages and storms of calls, from `campaigns.reliability.graph`, bounded in time."""
+"""Floods of messages and storms of calls on a node, by `campaigns.reliability.attacks`."""
 
-from campaigns.reliability.graph import attack
+from campaigns.reliability.attacks import attack_node
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.messages import JointStateWriter, SampleRouter
@@ -24,7 +24,7 @@ REAL_STARTS = True
 
 
 def test_message_floods_and_call_storms_leave_counts_exact():
-    tried, findings = attack(12.0, 7)
+    tried, findings = attack_node(12.0, 7)
     assert findings == []
     assert tried['of these received'] > 100
     assert tried['of these rejected'] > 0
