@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+import ctypes
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import metadata
@@ -33,7 +34,7 @@ import socket
 import sys
 from tempfile import TemporaryDirectory
 from time import monotonic, monotonic_ns, sleep
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from bench.report import Table
 from campaigns.campaign import Findings, Page, percentile_texts, progress_lines, results_of
@@ -117,81 +118,67 @@ def _plan(random: Random, number: int, *, aimed: bool, seconds: tuple[float, flo
     return Plan(number, storage, round(run * 1e9 / PERIOD_NS), aim, time, delay)
 
 
-_STATE, _OFFERED, _SAFE, _PAUSES, _TICKS = range(5)
-_FIRST_PAUSE = 8
 _MOST_PAUSES = 256
-_FIRST_TICK = _FIRST_PAUSE + 2 * _MOST_PAUSES
 _PHASES = 8
 _DISK_PHASES = (Phase.FLUSHING, Phase.SPLITTING, Phase.CLOSING)
 """Phases in which the recorder waits for the disk and takes no messages."""
 
 
-class Marks:
+class Marks(ctypes.Structure):
     """The marks of one recording, which both processes see."""
 
-    def __init__(self, ticks: int) -> None:
-        self._numbers = memoryview(mmap.mmap(-1, 8 * (_FIRST_TICK + ticks))).cast('q')
+    # Number of messages: offered to the recorder, with the current one; and brought to the disk by
+    # a flush, a split or the close.
+    offered: int
+    safe: int
+    ticks: int  # Number of ticks begun
+    _fields_: ClassVar = [
+        ('state', ctypes.c_int64),
+        ('offered', ctypes.c_int64),
+        ('safe', ctypes.c_int64),
+        ('ticks', ctypes.c_int64),
+        ('pauses', ctypes.c_int64),
+        ('ends_of_pauses', 2 * ctypes.c_int64 * _MOST_PAUSES),
+    ]
+
+    @classmethod
+    def make(cls, ticks: int) -> Marks:
+        """Return marks for a number of ticks."""
+        size = ctypes.sizeof(cls)
+        memory = mmap.mmap(-1, size + 8 * ticks)
+        marks = cls.from_buffer(memory)
         # Begin of each tick, in [ns] of the steady clock; 0 before.
-        self.times = self._numbers[_FIRST_TICK:]
+        marks.times = memoryview(memory)[size:].cast('q')
+        return marks
 
     @property
     def phase(self) -> Phase:
         """Return the current phase, or the one in which the process was killed."""
-        return Phase(self._numbers[_STATE] % _PHASES)
-
-    @property
-    def offered(self) -> int:
-        """Return the number of messages offered to the recorder, with the current one."""
-        return self._numbers[_OFFERED]
-
-    @offered.setter
-    def offered(self, count: int) -> None:
-        self._numbers[_OFFERED] = count
-
-    @property
-    def safe(self) -> int:
-        """Return the number of messages that a flush, split or close has brought to the disk."""
-        return self._numbers[_SAFE]
-
-    @safe.setter
-    def safe(self, count: int) -> None:
-        self._numbers[_SAFE] = count
-
-    @property
-    def ticks(self) -> int:
-        """Return the number of ticks begun."""
-        return self._numbers[_TICKS]
+        return Phase(self.state % _PHASES)
 
     def begin_tick(self) -> int:
         """Mark the begin of a tick; return its time in [ns]."""
-        number, now = self._numbers[_TICKS], monotonic_ns()
-        self.times[number] = now
-        self._numbers[_TICKS] = number + 1
+        self.times[self.ticks] = now = monotonic_ns()
+        self.ticks += 1
         return now
 
     def enter(self, phase: Phase, written: int = 0) -> int:
         """Mark the begin of a phase, with the messages written; return its time in [ns]."""
         now = monotonic_ns()
-        since, before = divmod(self._numbers[_STATE], _PHASES)
+        since, before = divmod(self.state, _PHASES)
         if before in _DISK_PHASES:
             self.safe = written
         # One number, so that a kill cannot come between phase and time.
-        self._numbers[_STATE] = now * _PHASES + phase
+        self.state = now * _PHASES + phase
         if before in _DISK_PHASES:
-            number = self._numbers[_PAUSES]
-            at = _FIRST_PAUSE + 2 * (number % _MOST_PAUSES)
-            self._numbers[at], self._numbers[at + 1] = since, now
-            self._numbers[_PAUSES] = number + 1
+            self.ends_of_pauses[self.pauses % _MOST_PAUSES][:] = since, now
+            self.pauses += 1
         return now
 
     def paused(self, begin: int, end: int) -> int:
         """Return the time, in [ns], that the recorder waited for the disk within an interval."""
-        count = min(self._numbers[_PAUSES], _MOST_PAUSES)
-        pauses = [
-            (self._numbers[at], self._numbers[at + 1])
-            for at in range(_FIRST_PAUSE, _FIRST_PAUSE + 2 * count, 2)
-        ]
-        since, phase = divmod(self._numbers[_STATE], _PHASES)
+        pauses = [tuple(ends) for ends in self.ends_of_pauses[: min(self.pauses, _MOST_PAUSES)]]
+        since, phase = divmod(self.state, _PHASES)
         if phase in _DISK_PHASES:
             pauses.append((since, end))
         return sum(max(0, min(end, until) - max(begin, since)) for since, until in pauses)
@@ -375,7 +362,7 @@ def kill_all(work: Sequence[Plan], jobs: int) -> Iterator[Outcome]:
 def kill(plan: Plan) -> Outcome:
     """Start a recording, kill it as planned, and judge."""
     with TemporaryDirectory(prefix='linkage_ros_kill_') as name:
-        folder, marks = Path(name) / 'bag', Marks(plan.ticks)
+        folder, marks = Path(name) / 'bag', Marks.make(plan.ticks)
         with forked(partial(_record, plan, folder, marks)) as (process, phases):
             if end := _wait_for(plan, phases):
                 raise KillError(end)

@@ -73,7 +73,7 @@ PLAN = Plan(0, Storage(flush_period=0.1), 100, Phase.MAKING, 1, 0.0)
 @pytest.fixture
 def marks() -> Marks:
     """Return marks of 100 ticks, 1 ms apart, the first at 1 s."""
-    marks = Marks(PLAN.ticks)
+    marks = Marks.make(PLAN.ticks)
     marks.enter(Phase.RECORDING)
     for tick in range(PLAN.ticks):
         marks.begin_tick()
@@ -114,7 +114,7 @@ def test_messages_removed_by_the_ring_are_not_lost(tmp_path: Path, marks: Marks)
 
 
 def test_bag_not_yet_made_may_be_missing(tmp_path: Path) -> None:
-    marks = Marks(1)
+    marks = Marks.make(1)
     marks.enter(Phase.MAKING)
     assert judge(PLAN, tmp_path / 'bag', marks, 0).verdicts == {'bag': NO_FOLDER}
     (tmp_path / 'bag').mkdir()
@@ -204,7 +204,7 @@ def test_an_incomplete_closed_bag_is_a_fault(tmp_path: Path, marks: Marks) -> No
 
 
 def test_pauses_count_within_the_interval() -> None:
-    marks = Marks(1)
+    marks = Marks.make(1)
     for _ in range(300):
         marks.enter(Phase.FLUSHING)
         marks.enter(Phase.RECORDING)
