@@ -26,6 +26,7 @@ import numpy.typing as npt
 Real = np.longdouble
 """Mantissa of 64 bits on x86-64, 113 on aarch64; if only 53, the campaign finds less."""
 
+Complex = np.clongdouble
 Array = npt.NDArray[Any]
 
 TURN = 2 * np.arctan2(Real(0), Real(-1))
@@ -40,18 +41,17 @@ _SAMPLES = 5
 
 
 class _Spot(NamedTuple):
-    """A point of a link: the number of the link (−1: the ground), and x and y in its frame."""
+    """A point of a link: the number of the link (−1: the ground), and its place in its frame."""
 
     link: int
-    x: Array
-    y: Array
+    place: Array
 
 
 class _Moved(NamedTuple):
     """A point in the frame of the ground, and the vector to it from the origin of its link."""
 
-    place: tuple[Array, Array]
-    arm: tuple[Array, Array]
+    place: Array
+    arm: Array
     link: int
 
 
@@ -105,12 +105,12 @@ class Equations:
 
     def _spot(self, link: str, place: Sequence[float]) -> _Spot:
         x, y = map(self._varied, place)
-        return _Spot(self._number[link], x, y)
+        return _Spot(self._number[link], x + Complex(1j) * y)
 
-    def _line(self, direction: Sequence[float]) -> tuple[Array, Array]:
+    def _line(self, direction: Sequence[float]) -> Array:
         x, y = map(self._varied, direction)
         length = np.sqrt(x * x + y * y)
-        return x / length, y / length
+        return np.asarray(x / length + Complex(1j) * (y / length))
 
     def unknowns(self, poses: dict[str, tuple[Array, Array, Array]]) -> Array:
         """Return the unknowns, from the angle and position of each link."""
@@ -140,16 +140,18 @@ class Equations:
             row = len(rows)
             if kind == 'pin':
                 one, other = (self._moved(unknowns, turned, spot) for spot in parts)
-                for axis in (0, 1):
-                    rows.append(one.place[axis] - other.place[axis])
+                for part in (np.real, np.imag):
+                    rows.append(part(one.place) - part(other.place))
                     sizes.append(
                         sum(
-                            np.abs(moved.arm[0]) + np.abs(moved.arm[1]) + np.abs(moved.place[axis])
+                            np.abs(moved.arm.real)
+                            + np.abs(moved.arm.imag)
+                            + np.abs(part(moved.place))
                             for moved in (one, other)
                         )
                     )
-                    for sign, moved in ((1, one), (-1, other)):
-                        self._add_place(jacobian, row + axis, moved, axis, sign)
+                for sign, moved in ((1, one), (-1, other)):
+                    self._add_place(jacobian, row, moved, sign)
             elif kind in ('on line', 'slide'):
                 value, size, gradient = self._on_line(unknowns, turned, parts[0], kind)
                 if kind == 'slide':
@@ -193,68 +195,64 @@ class Equations:
                 ends = self._number[given.child], self._number[given.parent]
                 yield 'turn', (*ends, np.zeros(1, Real), i)
 
-    def _turned(self, unknowns: Array) -> tuple[Array, Array]:
+    def _turned(self, unknowns: Array) -> Array:
         angles = unknowns[0::3]
-        return np.cos(angles), np.sin(angles)
+        return np.asarray(np.cos(angles) + Complex(1j) * np.sin(angles))
 
-    def _moved(self, unknowns: Array, turned: tuple[Array, Array], spot: _Spot) -> _Moved:
-        i, x, y = spot
+    def _moved(self, unknowns: Array, turned: Array, spot: _Spot) -> _Moved:
+        i, place = spot
         if i < 0:
-            return _Moved((x, y), (x, y), i)
-        cosine, sine = turned[0][i], turned[1][i]
-        arm = cosine * x - sine * y, sine * x + cosine * y
-        return _Moved((unknowns[3 * i + 1] + arm[0], unknowns[3 * i + 2] + arm[1]), arm, i)
+            return _Moved(place, place, i)
+        arm = turned[i] * place
+        return _Moved(_place(unknowns, i) + arm, arm, i)
 
     @staticmethod
-    def _add_place(jacobian: Array, row: int, moved: _Moved, axis: int, factor: Any) -> None:
-        """Add the derivative of a coordinate of a point, times a factor."""
-        if moved.link < 0:
-            return
-        k = 3 * moved.link
-        jacobian[:, row, k] += factor * (-moved.arm[1] if axis == 0 else moved.arm[0])
-        jacobian[:, row, k + 1 + axis] += factor
+    def _add_place(jacobian: Array, row: int, moved: _Moved, sign: int) -> None:
+        """Add the derivatives of the coordinates of a point."""
+        if moved.link >= 0:
+            k = 3 * moved.link
+            jacobian[:, row, k] -= sign * moved.arm.imag
+            jacobian[:, row + 1, k] += sign * moved.arm.real
+            jacobian[:, row, k + 1] += sign
+            jacobian[:, row + 1, k + 2] += sign
 
-    def _slider(self, name: str) -> tuple[_Spot, _Spot, int, tuple[Array, Array]]:
+    def _slider(
+        self, unknowns: Array, turned: Array, name: str, kind: str
+    ) -> tuple[_Moved, _Moved, int, Array]:
+        """Return point and start of a line, the link that carries it, and what is counted."""
         slider = self.linkage.sliders[name]
         carrier = slider.block or next(
             link for link, points in self.linkage.links.items() if slider.point in points
         )
-        return (
-            self._spots[carrier, slider.point],
-            self._spots[slider.along, slider.through],
-            self._number[slider.along],
-            self._lines[name],
-        )
+        tip = self._moved(unknowns, turned, self._spots[carrier, slider.point])
+        foot = self._moved(unknowns, turned, self._spots[slider.along, slider.through])
+        along, unit = self._number[slider.along], self._lines[name]
+        if along >= 0:
+            unit = turned[along] * unit
+        # The distance from the line is counted along its normal.
+        return tip, foot, along, Complex(1j) * unit if kind == 'on line' else unit
 
     def _on_line(
-        self, unknowns: Array, turned: tuple[Array, Array], name: str, kind: str
+        self, unknowns: Array, turned: Array, name: str, kind: str
     ) -> tuple[Array, Array, Array]:
         """Return the distance of a slider's point from its line, or along it, and the gradient."""
-        point, through, along, (ux, uy) = self._slider(name)
-        tip = self._moved(unknowns, turned, point)
-        foot = self._moved(unknowns, turned, through)
-        if along >= 0:
-            cosine, sine = turned[0][along], turned[1][along]
-            ux, uy = cosine * ux - sine * uy, sine * ux + cosine * uy
-        if kind == 'on line':  # take the normal instead of the direction
-            ux, uy = -uy, ux
-        dx, dy = tip.place[0] - foot.place[0], tip.place[1] - foot.place[1]
-        value = ux * dx + uy * dy
+        tip, foot, along, unit = self._slider(unknowns, turned, name, kind)
+        seen = unit.conj() * (tip.place - foot.place)
+        value = seen.real
         size = sum(
-            np.abs(moved.place[axis]) + np.abs(moved.arm[axis])
+            np.abs(part(moved.place)) + np.abs(part(moved.arm))
             for moved in (tip, foot)
-            for axis in (0, 1)
+            for part in (np.real, np.imag)
         ) * np.ones_like(value)
         gradient = np.zeros((self.count, unknowns.shape[1]), Real)
         for sign, moved in ((1, tip), (-1, foot)):
-            if moved.link < 0:
-                continue
-            k = 3 * moved.link
-            gradient[k] += sign * (uy * moved.arm[0] - ux * moved.arm[1])
-            gradient[k + 1] += sign * ux
-            gradient[k + 2] += sign * uy
+            if moved.link >= 0:
+                k = 3 * moved.link
+                gradient[k] -= sign * (unit.conj() * moved.arm).imag
+                gradient[k + 1] += sign * unit.real
+                gradient[k + 2] += sign * unit.imag
         if along >= 0:
-            gradient[3 * along] += ux * dy - uy * dx
+            gradient[3 * along] += seen.imag
         return value, size, gradient
 
     def _turn(self, unknowns: Array, jacobian: Array, parts: Any) -> tuple[Array, Array]:
@@ -275,8 +273,8 @@ class Equations:
         for kind, parts in self._each():
             if kind == 'pin':
                 one, other = (self._moved(unknowns, turned, spot) for spot in parts)
-                pulls = zip(_pull(one, rates), _pull(other, rates), strict=True)
-                rows.extend(first - second for first, second in pulls)
+                pull = _pull(one, rates) - _pull(other, rates)
+                rows += [pull.real, pull.imag]
             elif kind in ('on line', 'slide'):
                 rows.append(self._line_bend(unknowns, rates, turned, parts[0], kind))
             else:
@@ -287,29 +285,19 @@ class Equations:
         return bend
 
     def _line_bend(
-        self, unknowns: Array, rates: Array, turned: tuple[Array, Array], name: str, kind: str
+        self, unknowns: Array, rates: Array, turned: Array, name: str, kind: str
     ) -> Array:
-        point, through, along, (ux, uy) = self._slider(name)
-        tip = self._moved(unknowns, turned, point)
-        foot = self._moved(unknowns, turned, through)
-        turn: Any = 0.0
-        if along >= 0:
-            cosine, sine = turned[0][along], turned[1][along]
-            ux, uy = cosine * ux - sine * uy, sine * ux + cosine * uy
-            turn = rates[3 * along]
-        if kind == 'on line':
-            ux, uy = -uy, ux
-        between = [tip.place[i] - foot.place[i] for i in (0, 1)]
-        one, other = _velocity(tip, rates), _velocity(foot, rates)
-        speed = [one[i] - other[i] for i in (0, 1)]
-        one, other = _pull(tip, rates), _pull(foot, rates)
-        pull = [one[i] - other[i] for i in (0, 1)]
-        return (
-            ux * pull[0]
-            + uy * pull[1]
-            + 2 * turn * (ux * speed[1] - uy * speed[0])
-            - turn * turn * (ux * between[0] + uy * between[1])
+        tip, foot, along, unit = self._slider(unknowns, turned, name, kind)
+        turn: Any = rates[3 * along] if along >= 0 else 0.0
+        pull, speed, between = (
+            unit.conj() * (one - other)
+            for one, other in (
+                (_pull(tip, rates), _pull(foot, rates)),
+                (_velocity(tip, rates), _velocity(foot, rates)),
+                (tip.place, foot.place),
+            )
         )
+        return np.asarray(pull.real + 2 * turn * speed.imag - turn * turn * between.real)
 
     def joints(
         self, unknowns: Array, rates: Array | None = None, accelerations: Array | None = None
@@ -423,19 +411,20 @@ def _terms(jacobian: Array, values: Array) -> Array:
     return (np.abs(jacobian) @ np.abs(values.T)[:, :, None])[:, :, 0].T
 
 
-def _velocity(moved: _Moved, rates: Array) -> tuple[Any, Any]:
+def _place(values: Array, link: int) -> Array:
+    """Return the position of a link's origin, or its rate."""
+    return np.asarray(values[3 * link + 1] + Complex(1j) * values[3 * link + 2])
+
+
+def _velocity(moved: _Moved, rates: Array) -> Any:
     if moved.link < 0:
-        return 0.0, 0.0
-    turn, vx, vy = rates[slice(3 * moved.link, 3 * moved.link + 3)]
-    return vx - turn * moved.arm[1], vy + turn * moved.arm[0]
+        return 0.0
+    return _place(rates, moved.link) + Complex(1j) * rates[3 * moved.link] * moved.arm
 
 
-def _pull(moved: _Moved, rates: Array) -> tuple[Any, Any]:
+def _pull(moved: _Moved, rates: Array) -> Any:
     """Return the centripetal acceleration of a point."""
-    if moved.link < 0:
-        return 0.0, 0.0
-    square = rates[3 * moved.link] ** 2
-    return -square * moved.arm[0], -square * moved.arm[1]
+    return -(rates[3 * moved.link] ** 2) * moved.arm if moved.link >= 0 else Complex(0.0)
 
 
 def solve(jacobian: Array, right: Array) -> Array:

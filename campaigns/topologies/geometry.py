@@ -23,11 +23,9 @@ from typing import Any, NamedTuple
 
 from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Spot
-from campaigns.topologies.constraints import Array, Real, TURN
+from campaigns.topologies.constraints import Array, Complex, Real, TURN
 from linkage_ros.kinematics import GROUND, Linkage
 import numpy as np
-
-Complex = np.clongdouble
 
 
 @dataclass(frozen=True, slots=True)
