@@ -229,14 +229,10 @@ Attachments = Mapping[str, tuple[str, bytes]]
 
 
 def by_linkage_ros(
-    folder: Path,
-    topics: Topics,
-    attachments: Attachments,
-    messages: Iterable[NumberedMessage],
-    storage: Storage | None = None,
+    folder: Path, topics: Topics, attachments: Attachments, messages: Iterable[NumberedMessage]
 ) -> Path:
     """Write a bag with a flush after every 50 messages; return its file."""
-    writer = BagWriter(folder, topics, attachments, storage)
+    writer = BagWriter(folder, topics, attachments)
     for index, each in enumerate(messages):
         writer.write(*each)
         if index % 50 == 49:
