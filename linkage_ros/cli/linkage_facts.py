@@ -66,7 +66,7 @@ def _spatial_facts(account: Mapping[str, Any], units: DisplayUnits) -> Iterator[
     if account['spinning_rods']:
         yield 'rods that may spin', ', '.join(account['spinning_rods'])
     if account['held_joints']:
-        yield 'held still', f'{", ".join(account["held_joints"])}: turns of rods about themselves'
+        yield 'held still', f'{", ".join(account["held_joints"])}: turns that move nothing else'
     for given in account['inputs']:
         turns = given['unit'] == 'rad'
         unit = 'angle' if turns else f'length [{units.length}]'

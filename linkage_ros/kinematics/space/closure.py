@@ -25,7 +25,7 @@ from linkage_ros.kinematics.plane.linkage import Limits, SlideJoint, turn_ratios
 from linkage_ros.kinematics.results import Acceleration, Near, Plan, Position, Velocity
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
 from linkage_ros.kinematics.space.free_platforms import carry_platforms, free_platforms
-from linkage_ros.kinematics.space.hinge_balls import plan_balls_of_hinges
+from linkage_ros.kinematics.space.idle_turns import hold_idle_turns
 from linkage_ros.kinematics.space.linkage import (
     check_space_linkage,
     size_of,
@@ -72,7 +72,7 @@ class SpaceClosure(Closure):
         check_space_linkage(linkage)
         linkage = merge_pose(linkage)
         check_space_linkage(linkage)
-        planned, hung, one_with = plan_balls_of_hinges(linkage)
+        still, planned, hung, one_with = hold_idle_turns(linkage)
         plan = SpacePlan(planned, _add_knot)
         if platforms := free_platforms(plan):
             planned = carry_platforms(planned, platforms, linkage)
@@ -83,13 +83,13 @@ class SpaceClosure(Closure):
         plan.finish()
         self._plan = plan
         self.held = tuple(plan.linkage.held)
-        """Hinges of rods that keep their value."""
+        """Hinges that keep their value, since turns about them move nothing else."""
         from linkage_ros.kinematics.space.freedom import (
             check_freedom,  # local import: it loads numpy
             find_freedom,  # local import: it loads numpy
         )
 
-        freedom = find_freedom(planned, CarriedPoints(planned, plan.scale))
+        freedom = find_freedom(still, CarriedPoints(still, plan.scale))
         at_change_point = freedom.free and plan.finds_all
         for gone, kept in one_with.items():
             if kept in plan.frames:
@@ -119,12 +119,12 @@ class SpaceClosure(Closure):
             for name, joint in linkage.joints.items()
         )
         if at_change_point:
-            freedom = self._freedom_beside_pose(planned) or freedom
+            freedom = self._freedom_beside_pose(still) or freedom
             check_freedom(linkage, plan, freedom)
         self.freedom: Freedom = freedom
 
-    def _freedom_beside_pose(self, planned: SpaceLinkage) -> Freedom | None:
-        """Return the degrees of freedom of the planned linkage beside a change point."""
+    def _freedom_beside_pose(self, still: SpaceLinkage) -> Freedom | None:
+        """Return the degrees of freedom of a linkage of this plan beside a change point."""
         from linkage_ros.kinematics.space.freedom import (
             find_freedom,  # local import: it loads numpy
         )
@@ -133,7 +133,7 @@ class SpaceClosure(Closure):
         position = self.close_unlimited(*beside)
         if position.status is not Status.CLOSED:
             return None
-        moved = self._redraw(planned, position)
+        moved = self._redraw(still, position)
         return find_freedom(moved, CarriedPoints(moved, self.scale))
 
     def _redraw(self, linkage: SpaceLinkage, position: Position) -> SpaceLinkage:

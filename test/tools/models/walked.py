@@ -51,10 +51,13 @@ class Walked:
         )
 
     def _end(self, loop, tag):
-        """Return the frame of an end, or the place of a ball's."""
-        end = loop.find(tag)
+        """Return the frame of an end, the place of a ball's, or place and axis of a hinge's."""
+        end, axis = loop.find(tag), loop.find('parent_axis')
         numbers = (map(float, end.get(key).split()) for key in ('xyz', 'rpy'))
         there = self.model.get_transform(end.get('link')) @ _transform(*map(list, numbers))
+        if loop.get('type') == 'revolute' and axis is not None:
+            way = np.array([float(number) for number in axis.get('xyz').split()])
+            return np.column_stack([there[:3, 3], there[:3, :3] @ way / np.linalg.norm(way)])
         return there[:3, 3:] if loop.get('type') == 'spherical' else there
 
     def place(self, frame):

@@ -6,7 +6,7 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""Rods whose balls are three hinges through one point, as robots' files have them."""
+"""Rods and rings that may turn alone, as robots' files have them: balls are three hinges."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -14,11 +14,11 @@ from pathlib import Path
 
 from linkage_ros import load
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import SpaceClosure, SpatialJoint
+from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint
 import numpy as np
 import pytest
 
-from ...tools.models.heads import head
+from ...tools.models.heads import head, IDLE_TURNS, WAYS
 from ...tools.models.walked import Walked
 
 ROBOT = Path(__file__).parents[2] / 'tools' / 'models' / 'robots' / 'rods_on_three_hinges.urdf'
@@ -108,6 +108,60 @@ def test_six_rod_head_closes_its_urdf_tree(tmp_path, named):
         assert walked.gap() < 1e-12
 
 
+@pytest.mark.parametrize('seed', range(6))
+def test_legs_written_in_any_way_close_their_tree(tmp_path, seed):
+    """Rods are whole, welded, joined by a hinge or a ring, or slide; in any order of the file."""
+    rng = np.random.default_rng(seed)
+    first, *others = (str(way) for way in rng.choice(WAYS, 6))
+    ways = ['slide' if first == 'slide' else 'ball', *others]
+    robot = tmp_path / 'head.urdf'
+    robot.write_text(head(rng, ways))
+    closure = load(robot, {'input': [f'motor{number}' for number in range(1, 7)]})
+    assert len(closure.held) == sum(IDLE_TURNS[way] for way in ways)
+    walked = Walked(robot.read_bytes())
+    far = np.array([0.01 if way == 'slide' else 0.1 for way in ways])
+    for motors in far * rng.uniform(-1, 1, (20, 6)):
+        found = closure.position(*motors)
+        walked.pose((*closure.input_names, *closure.joint_names), (*motors, *found.joints))
+        assert walked.gap() < 1e-12
+        values = dict(zip(closure.joint_names, found.joints, strict=True))
+        assert not any(values.get(each) for each in closure.held)
+
+
+def with_ring(linkage, name, rng):
+    """Return the linkage with a ring at a hinge, which turns on both of its links."""
+    hinge = linkage.hinges[name]
+    ends = [hinge.parent, f'{name}_ring', hinge.child]
+    at = [np.array(hinge.at) + np.array(hinge.axis) * rng.uniform(-1, 1) for _ in range(2)]
+    halves = {
+        half: SpatialJoint(*joined, hinge.axis, tuple(place))
+        for half, joined, place in zip((name, f'{name}_2'), pairwise(ends), at, strict=True)
+    }
+    hinges = {**linkage.hinges, **halves}
+    order = rng.permutation(list(hinges))
+    return replace(linkage, hinges={each: hinges[each] for each in order})
+
+
+@pytest.mark.parametrize('name', ['bennett', 'hooke_joint', 'rssr', 'wishbone'])
+@pytest.mark.parametrize('seed', range(2))
+def test_rings_at_hinges_change_no_state(name, seed):
+    rng = np.random.default_rng(seed)
+    plain = load(name)
+    linkage, doubled = plain.linkage, []
+    for hinge in plain.linkage.hinges:
+        if hinge not in linkage.driven:
+            linkage, doubled = with_ring(linkage, hinge, rng), [*doubled, hinge]
+    halves = [f'{hinge}_2' for hinge in doubled]
+    closure = SpaceClosure(replace(linkage, published=(*doubled, *halves)))
+    assert len(closure.held) == len(doubled)
+    whole = SpaceClosure(replace(plain.linkage, published=tuple(doubled)))
+    for inputs in whole.linkage.pose.inputs + rng.uniform(-0.02, 0.02, (10, len(linkage.driven))):
+        found = closure.position(*inputs)
+        values = dict(zip(closure.joint_names, found.joints, strict=True))
+        sums = [values[hinge] + values[f'{hinge}_2'] for hinge in doubled]
+        assert sums == pytest.approx(whole.position(*inputs).joints, abs=1e-9)
+
+
 def test_driven_rod_spin_stays_an_input():
     closure = load(ROBOT, {'input': ['m1', 'm2', 'r1z', 'r2z']})
     assert closure.held == ()
@@ -155,3 +209,28 @@ def test_hinge_balls_equal_balls_beside_a_flat_parallelogram():
     for crank, near in RNG.uniform(-0.5, 0.5, (5, 2)):
         (rocker,) = SpaceClosure(balls).position(crank).joints
         assert closure.position(crank, near).joints == pytest.approx((rocker, near), abs=1e-9)
+
+
+def test_door_on_two_hinges_is_refused_by_name():
+    linkage = load('rssr').linkage
+    doors = {
+        f'door{number}': SpatialJoint('ground', 'door', (0.0, 0.0, 1.0), (0.3, 0.0, 0.1 * number))
+        for number in range(2)
+    }
+    with pytest.raises(DefinitionError, match='door stays free'):
+        SpaceClosure(replace(linkage, hinges={**linkage.hinges, **doors}))
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_spherical_five_bar_needs_both_motors(seed):
+    """Four hinges through one point are a mechanism, and none of its links turns alone."""
+    rng = np.random.default_rng(seed)
+    bars = ['ground', 'a', 'b', 'c', 'd', 'ground']
+    hinges = {}
+    for number, joined in enumerate(pairwise(bars)):
+        axis = tuple(rng.normal(size=3))
+        hinges[f'j{number}'] = SpatialJoint(*joined, axis, tuple(np.multiply(0.1, axis)))
+    linkage = SpaceLinkage({}, {}, hinges, {}, {}, ('j0',), ('j1',))
+    with pytest.raises(DefinitionError, match='1 input for 2 degrees of freedom'):
+        SpaceClosure(linkage)
+    assert SpaceClosure(replace(linkage, driven=('j0', 'j4'))).held == ()
