@@ -83,6 +83,8 @@ def add_closings(robot: ET.Element, content: Section) -> None:
             ET.SubElement(loop, tag, link=frames[frame], rpy='0 0 0')
     for name, kind in zip(changed, kinds, strict=True):
         if name not in joints:
+            if near := did_you_mean(str(name), [*joints.keys() - {*changed}], ''):
+                raise content.error('joint_name', f'there is no joint {quote(name)}', near)
             ET.SubElement(robot, UNREAD, of=f'{kind} of {name}, which is not a joint')
         elif kind == _FIXED:
             joints[name].set('type', 'fixed')

@@ -69,6 +69,12 @@ def read_mjcf(root: ET.Element, file: str) -> RobotGraph:
         for actuator in root.findall('actuator/*')
         for key in ('joint', 'jointinparent')
     }
+    pulled = {actuator.get('tendon') for actuator in root.findall('actuator/*[@tendon]')}
+    followers = {of.get('joint1') for of in equality}
+    for tendon in root.findall('tendon/fixed'):
+        # What a tendon moves together has one motor.
+        joints = [str(of.get('joint')) for of in tendon if of.get('joint') not in followers]
+        driven |= {*joints[:1]} if tendon.get('name') in pulled else set()
     weighed = {body.get('name') for body in root.iter('body') if body.find('inertial') is not None}
     kept = [of for of in equality if of.tag in ('connect', 'weld', 'joint', 'tendon')]
     _remove(root, _NOT_READ)

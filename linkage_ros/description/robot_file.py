@@ -43,6 +43,7 @@ from linkage_ros.description.robot_pose import (
     LINE,
     RobotPose,
     RobotTree,
+    roll_pitch_yaw,
 )
 from linkage_ros.description.section import Section
 from linkage_ros.description.urdf_file import (
@@ -73,6 +74,7 @@ from linkage_ros.kinematics import (
     SpaceLinkage,
     SpatialJoint,
     SpatialMass,
+    turn_ratios,
     turned_tensor,
     unit_of,
     Vector,
@@ -381,14 +383,11 @@ class _Robot:
                 ends = LoopEnd(first, ZERO), LoopEnd(other, ZERO)
                 yield UrdfLoop(f'{pin}_{number}' if number else pin, 'ball', ends)
         frames = self._tree.place_links({}) if self._urdf.pinned else {}
-        for end, parent in self._urdf.pinned:
-            found = PLACE.fullmatch(end)
-            assert found
-            child, *place = found.groups()
-            x, y, z = map(float, place)
-            on_parent = frames[parent].locate(frames[child].place((x, y, z)))
-            ends = LoopEnd(child, (x, y, z)), LoopEnd(parent, on_parent)
-            yield UrdfLoop(f'{child}_on_{parent}', 'ball', ends)
+        for child, parent, place, kind in self._urdf.pinned:
+            on_parent = frames[parent].locate(frames[child].place(place))
+            rpy = roll_pitch_yaw(*map(frames[parent].resolve, frames[child][:3]))
+            ends = LoopEnd(child, place), LoopEnd(parent, on_parent, rpy)
+            yield UrdfLoop(f'{child}_on_{parent}', kind, ends)
 
     def _places_of(self, loop: UrdfLoop) -> frozenset[tuple[str, Vector]]:
         """Return the ends of a loop as places on links that move."""
@@ -437,6 +436,7 @@ class _Robot:
         """
         driven = instead or self._driven
         ratios = {name: of for name, of in self._ratios.items() if name not in without}
+        ratios = turn_ratios(ratios, driven)
         free = [name for name in self._moving if name not in (*driven, *ratios)]
         told = {name: self._told.get(name, 0.0) for name in self._urdf.joints}
         pose = self._pose
@@ -487,6 +487,11 @@ class _Robot:
         published = [k for k in self._moving if k in found and k not in driven]
         left_out = [k for k, joint in joints.items() if joint.kind != 'fixed' and k not in found]
         left_out += [f'mimic of {name}' for name in without]
+        left_out += [
+            f'limits of {name}'
+            for name in self._moving
+            if self._near and not pose.is_within_limits({name: as_told[name]})
+        ]
         linkage = SpaceLinkage(
             *made,
             struts={},
@@ -557,7 +562,11 @@ class _Robot:
         is_one_way = (limits.low > -inf) != (limits.high < inf) and joint.name in self._driven
         if turns and limits.high - limits.low >= tau and not is_one_way:
             limits = replace(limits, low=-inf, high=inf)
-        if value != told and limits.low <= told <= limits.high:
+        is_within = limits.low <= told <= limits.high
+        if self._near and not is_within:
+            # No pose near is within.
+            limits = replace(limits, low=-inf, high=inf)
+        elif value != told and is_within:
             # CAD rounds: the pose is at a limit, and the corrected one just beyond it.
             room = _ROUNDED_VALUE if turns else _ROUNDED_VALUE * self._pose.size
             low, high = min(limits.low, value - room), max(limits.high, value + room)

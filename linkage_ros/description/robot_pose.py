@@ -282,8 +282,9 @@ class RobotPose:
         return min(max(value, limits.low), limits.high)
 
     def is_within_limits(self, values: Mapping[str, float]) -> bool:
-        """Return whether the joints that move are within their limits."""
-        limits = ((values[name], self._tree.joints[name].limits) for name in self._moving)
+        """Return whether these joints that move are within their limits."""
+        moving = (name for name in self._moving if name in values)
+        limits = ((values[name], self._tree.joints[name].limits) for name in moving)
         return all(within.low <= value <= within.high for value, within in limits)
 
     def _draw(self, name: str, value: float, nudge: float, drawn: Random) -> float:

@@ -143,8 +143,9 @@ class UrdfFile(NamedTuple):
     # Ratios of two chains of joints, which lead from their common ancestor to two links: name,
     # predecessor, successor, ratio.
     couplings: tuple[tuple[str, str, str, float], ...]
-    # Places, LINK.x,y,z, that meet a link where they are with all joints at 0, as Gazebo says.
-    pinned: tuple[tuple[str, str], ...]
+    # Links and those that they meet where they are with all joints at 0, as Gazebo says: at a
+    # place on the first, by a ball or fixed.
+    pinned: tuple[tuple[str, str, Vector, str], ...]
     unread: tuple[str, ...]  # Tags that may close loops and are not read, in words
 
 
@@ -297,16 +298,17 @@ class _UrdfReader:
 
     def _pinned_places(
         self, root: ET.Element, links: Mapping[str, object]
-    ) -> Iterator[tuple[str, str]]:
-        """Yield places on links, and the links that joints of <gazebo> pin them to."""
+    ) -> Iterator[tuple[str, str, Vector, str]]:
+        """Yield links, and the links that joints of <gazebo> pin them to, with place and kind."""
         for joint in filter(_is_pin_of_gazebo, root.findall('gazebo/joint')):
             where = f'joint {joint.get("name", "")} of <gazebo>'
             parent, child = ((joint.findtext(end) or '').strip() for end in ('parent', 'child'))
             for end, link in (('parent', parent), ('child', child)):
                 self._checked_link(link, end, where, links)
             pose = {'pose': joint.findtext('pose') or '0 0 0 0 0 0'}
-            values = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
-            yield f'{child}.{",".join(map(repr, values[:3]))}', parent
+            x, y, z, *_ = self._read_values(ET.Element('joint', pose), 'pose', where, 6, '')
+            kind = 'fixed' if joint.get('type') == 'fixed' else 'ball'
+            yield child, parent, (x, y, z), kind
 
     def _file_error(self, key: str, reason: str, remedy: str) -> FileError:
         return FileError(self._file, key, reason, remedy)
@@ -494,11 +496,11 @@ def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
 
 
 def _is_pin_of_gazebo(joint: ET.Element) -> bool:
-    """Return whether a joint of SDF is a pin whose pose is in the frame of its child."""
+    """Return whether a joint of SDF is a pin or weld whose pose is in the frame of its child."""
     pose = joint.find('pose')
     relative = '' if pose is None else pose.get('relative_to', '')
     in_child = relative in ('', joint.get('name'), (joint.findtext('child') or '').strip())
-    return in_child and joint.get('type', '') in ('revolute', 'continuous', 'ball')
+    return in_child and joint.get('type', '') in ('revolute', 'continuous', 'ball', 'fixed')
 
 
 def _unread_tags(root: ET.Element) -> Iterator[str]:

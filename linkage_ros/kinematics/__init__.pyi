@@ -165,6 +165,7 @@ from linkage_ros.kinematics.plane.linkage import (
     Side as Side,
     SlideJoint as SlideJoint,
     Slider as Slider,
+    turn_ratios as turn_ratios,
 )
 from linkage_ros.kinematics.plane.sides import (
     assembly_sides as assembly_sides,

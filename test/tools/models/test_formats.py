@@ -313,3 +313,46 @@ def test_wrong_closings_are_refused_in_one_line(tmp_path, case):
     with pytest.raises(LinkageError) as caught:
         load(file)
     assert str(caught.value) == f'{file}:{line}'
+
+
+FINGERS = """\
+<mujoco><worldbody>
+  <body name="right"><joint name="right" axis="0 0 1"/>
+    <body name="tip" pos="0.1 0 0"><joint name="tip" axis="0 0 1"/></body></body>
+  <body name="bar" pos="0 0.05 0"><joint name="bar" axis="0 0 1"/></body>
+  <body name="left" pos="-0.1 0 0"><joint name="left" axis="0 0 1"/>
+    <body name="left_tip" pos="-0.1 0 0"><joint name="left_tip" axis="0 0 1"/></body></body>
+  <body name="left_bar" pos="-0.1 0.05 0"><joint name="left_bar" axis="0 0 1"/></body>
+</worldbody>
+<tendon>
+  <fixed name="split"><joint joint="right" coef="0.5"/><joint joint="left" coef="0.5"/></fixed>
+</tendon>
+<equality>
+  <connect body1="bar" body2="tip" anchor="0.1 0 0"/>
+  <connect body1="left_bar" body2="left_tip" anchor="-0.1 0 0"/>
+  <joint joint1="right" joint2="left" polycoef="0 -1 0 0 0"/>
+</equality>
+<actuator><general tendon="split"/></actuator></mujoco>
+"""
+
+
+@pytest.mark.parametrize('chosen', [{}, {'input': 'right'}, {'input': 'left'}])
+def test_motor_on_a_tendon_drives_both_fingers(tmp_path, chosen):
+    """Parallelograms: all links of a finger turn alike, and one finger against the other."""
+    pytest.importorskip('mujoco')
+    (tmp_path / 'fingers.xml').write_text(FINGERS)
+    closure = load(tmp_path / 'fingers.xml', chosen)
+    (driven,) = closure.input_names
+    assert driven == chosen.get('input', 'left')
+    values = closure.position(0.3)
+    for name in ('left', 'left_bar', 'bar', 'right'):
+        if name != driven:
+            sign = 1.0 if ('left' in name) == (driven == 'left') else -1.0
+            assert values[name] == pytest.approx(sign * 0.3, abs=1e-12)
+
+
+def test_closings_file_with_a_misspelt_joint_is_refused(tmp_path):
+    file = ankle_with_closings(tmp_path)
+    file.write_text(CLOSINGS.replace('rod1_start', 'rod1_strat'))
+    with pytest.raises(LinkageError, match="no joint 'rod1_strat'; did you mean 'rod1_start'"):
+        load(file)

@@ -10,12 +10,12 @@
 
 from cmath import phase, rect
 from dataclasses import replace
-from math import cos, hypot, pi, remainder, sin, tau
+from math import cos, hypot, inf, pi, remainder, sin, tau
 
 from linkage_ros import load
 from linkage_ros.cli.main import main
 from linkage_ros.dynamics import Loads, Mechanics
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError, FileError, LinkageError
 from linkage_ros.kinematics import (
     Limits,
     PlanarClosure,
@@ -249,6 +249,34 @@ def test_simulator_pin_tags_close_a_loop(tags, floor):
         found = closure.position(crank - 0.5)
         for name in ('coupler_joint', 'rocker_joint'):
             assert found[name] == pytest.approx(closed_values(crank)[name] - at[name], abs=1e-12)
+
+
+def test_fixed_joint_of_gazebo_welds_as_at_zero():
+    """Half of the coupler hangs on the rocker; with all joints at 0 both halves are parallel."""
+    half = SDF_JOINT.replace('revolute', 'fixed').replace('<parent>rocker', '<parent>half')
+    weld = LINK('half') + joint('half_joint', 'rocker', 'half', '0.15 0 0', axis='0 0 1')
+    weld += half.replace('0.2 0 0 0', '0.1 0 0 0')
+
+    def values(crank):
+        at = closed_values(crank)
+        return at | {'half_joint': crank + at['coupler_joint'] - at['rocker_joint']}
+
+    closure = robot_of(robot(TREE, weld), input='crank_joint', at=values(0.5))
+    for crank in (0.3, 0.5, 1.1):
+        found = closure.position(crank)
+        for name in ('coupler_joint', 'rocker_joint', 'half_joint'):
+            assert found[name] == pytest.approx(values(crank)[name], abs=1e-12)
+
+
+def test_pose_near_leaves_out_limits_that_exclude_it():
+    """The rocker's limits exclude every closed pose; an exporter copied them."""
+    start, end = TREE.rsplit('lower="-3" upper="3"', 1)
+    limited, told = f'{start}lower="3" upper="3.3"{end}', closed_values(0.5)
+    closure = robot_of(robot(limited, LOOP_CONSTRAINT), input='crank_joint', at=told, near=True)
+    assert closure.linkage.left_out == ('limits of rocker_joint',)
+    assert closure.linkage.joints['rocker_joint'].limits.low == -inf
+    with pytest.raises(LinkageError, match=r"bring 'rocker_joint' to .* beyond its limits"):
+        robot_of(robot(limited, LOOP_CONSTRAINT), input='crank_joint', at=told)
 
 
 UNREAD = {
