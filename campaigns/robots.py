@@ -8,10 +8,10 @@
 
 
 """
-``python -m campaigns.robots FOLDER``: robots as they are published, each by one command.
+``python -m campaigns.robots CHECKOUT …``: robots as they are published, each by one command.
 
-The folder holds robots in folders of their own, as ``robots`` of Gepetto/example-parallel-robots
-does. Each is read as its files are, and solved at random states near its pose. Another library,
+A checkout is a folder with the name of one of the repositories in `ROBOTS`, or a robot's file.
+Each robot is read as its file is, and solved at random states near its pose. Another library,
 yourdfpy, places the links at the joints that were found: the frames of all that closes loops have
 to meet there. The page docs/robots.md says what it costs, and what is refused and why.
 """
@@ -19,16 +19,23 @@ to meet there. The page docs/robots.md says what it costs, and what is refused a
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 import io
 from pathlib import Path
+import resource
+import shlex
 import signal
+import subprocess
+import sys
 from time import process_time
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.description import load, read_as_urdf
 from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics import Array, PlanarClosure
 import numpy as np
+from trimesh.transformations import compose_matrix
 import yourdfpy
 
 PAGE = Path(__file__).parents[1] / 'docs' / 'robots.md'
@@ -39,77 +46,230 @@ LONGEST = 90
 FARTHEST = 0.15
 """How far inputs are drawn from the pose, in [rad]; slides a tenth of it, in [m]."""
 
+_LEG = ('motor_4barlink2', 'motor_4barlink4', 'motor_hip_x', 'motor_4barlink1', 'motor_4barlink3')
+_CASSIE = tuple(
+    f'{side}-{joint}'
+    for side in ('left', 'right')
+    for joint in ('knee', 'shin', 'heel-spring', 'foot')
+)
+_SPRINGS = ('right_spring_link_joint', 'left_spring_link_joint')
+
+ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
+    'Gepetto/example-parallel-robots': {
+        f'robots/{name}/robot.yaml': inputs
+        for name, inputs in {
+            '5bar_linkage': (),
+            '5bar_linkage_iso3d': (),
+            '5bar_linkage_iso6d': (),
+            'battobot_6d': (),
+            'cassie_like': (),
+            'digit_like': (),
+            'digit_like_2legs': (),
+            'digit_like_2legs_6D': (),
+            'digit_like_2legs_old': (),
+            'disney_like': (*_LEG, 'free_universal4'),
+            'disney_robot': (),
+            'kangaroo_like': (),
+            'kangaroo_like_2legs': (),
+            'robot_delta': (),
+            'talos_like': (),
+            'true_talos_2_legs': (),
+            'wl16_like': (),
+        }.items()
+    },
+    'andrei-herdt/mujoco_menagerie': {
+        'agility_cassie/cassie.xml': _CASSIE,
+        'robotiq_2f85/2f85.xml': ('right_driver_joint', *_SPRINGS),
+        'ufactory_xarm7/hand.xml': (),
+    },
+    'pollen-robotics/reachy_mini': {
+        'src/reachy_mini/descriptions/reachy_mini/mjcf/reachy_mini.xml': (),
+    },
+    'Rhoban/placo-examples': {'models/spm/robot.xml': ('m1', 'm2', 'm3')},
+    'Rhoban/onshape-to-robot-examples': {'planar-2dof/robot.xml': ()},
+    'ROAM-Lab-ND/generalized_rbda': {
+        'robot-models/four_bar.urdf': (),
+        'robot-models/planar_leg_linkage.urdf': (),
+        'robot-models/six_bar.urdf': ('joint1', 'joint2', 'joint3'),
+    },
+    'osrf/gazebo_tutorials': {
+        'kinematic_loop/four_bar_sdf/model.sdf': ('joint_A',),
+        'kinematic_loop/four_bar_split_fixed_sdf/model.sdf': ('joint_A',),
+        'kinematic_loop/four_bar_split_fixed_urdf/model.urdf': ('joint_A',),
+    },
+}
+"""Repositories and their robots that have loops, each with the inputs that are typed, if any."""
+
 _HEAD = f"""\
 # Robots as they are published
 
-This page is made by `python -m campaigns.robots FOLDER --write`; do not edit it. The robots are
-those of Gepetto/example-parallel-robots: URDFs of legs and arms with loops, which a YAML file
-beside each closes. The files are as published, and this is all that was typed:
+This page is made by `python -m campaigns.robots CHECKOUT … --write`; do not edit it. The files
+are as published, and what was typed is below.
 
-```sh no-test: needs a checkout of the robots
-linkage check FOLDER/ROBOT/robot.yaml --near
-```
+{STATES} states are drawn within {FARTHEST} rad of the pose and the limits of the inputs. At their
+joints yourdfpy, a library of another make, places the links: "gap" is the farthest that ends of
+what closes a loop are apart there, "turn" by how much frames of welds and axes of hinges differ
+in direction. Pins of planar loops may end beside each other along their axes. "Check" is the
+processor time of the command, with the search for the pose; "a state" that of one position, the
+mean of all, most of them where none was solved before.
 
-{STATES} states are drawn within {FARTHEST} rad of the pose. At their joints yourdfpy, a library of
-another make, places the links: "gap" is the farthest that frames which close a loop are apart
-there, "turn" by how much the frames of welds differ in direction. "Load" is processor time, with
-the search for the pose; "a state" is the mean of all, most of them where none was solved before.
-
-| robot | loops | inputs | joints found | load | a state | closed | gap | turn |
-| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |
+| robot | of | loops | inputs | joints found | check | a state | closed | gap | turn |
+| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 """
 
 
-def _welds(data: bytes) -> list[tuple[str, str, str]]:
-    """Return what closes loops, by kind and the two links, of a URDF whose frames are links."""
-    root = ET.fromstring(data)
-    return [
-        (loop.get('type', ''), *(end.get('link', '') for end in loop[:2]))
-        for loop in root.findall('loop_joint')
-    ]  # type: ignore[misc]
+class Robot(NamedTuple):
+    """A robot's file, and what is typed of it."""
+
+    checkout: Path  # The folder in which the file is named
+    source: str  # OWNER/NAME of the repository, '' if it is none of `ROBOTS`
+    name: str  # The file, from the checkout
+    inputs: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """Return a short name."""
+        path = Path(self.name)
+        return path.parent.name if path.stem in ('robot', 'model') else path.stem
+
+    @property
+    def command(self) -> list[str]:
+        """Return what is typed, beside the checkout."""
+        options = [word for name in self.inputs for word in ('--input', name)]
+        file = str(Path(self.source.rpartition('/')[2], self.name))
+        return ['linkage', 'check', file, '--near', *options]
 
 
-def measure(file: Path, draw: np.random.Generator) -> tuple[str, str]:
+class _Loop(NamedTuple):
+    """Two frames of links that meet, and what of their directions does."""
+
+    kind: str
+    links: tuple[str, str]
+    frames: tuple[Array, Array]  # In those of the links
+    axes: tuple[Array, Array] | None  # Of a hinge, in these frames
+    is_directed: bool
+
+
+def _find_loops(root: ET.Element, model: yourdfpy.URDF) -> Iterator[_Loop]:
+    """Yield what closes the loops of a URDF."""
+    for loop in root:
+        if loop.tag in ('loop_joint', 'loop', 'loop_constraint', 'constraint'):
+            ends = [end for end in loop if 'link' in end.attrib][:2]
+            own = [end.find('origin') for end in ends]
+            origins = [end if at is None else at for end, at in zip(ends, own, strict=True)]
+            first, second = (_frame(origin.attrib) for origin in origins)
+            axis = loop.find('parent_axis')
+            axis = loop.find('axis') if axis is None else axis
+            way = (
+                None if axis is None else np.array([float(x) for x in axis.attrib['xyz'].split()])
+            )
+            yield _Loop(
+                loop.get('type', ''),
+                (ends[0].attrib['link'], ends[1].attrib['link']),
+                (first, second),
+                None if way is None else (way, way),
+                all('rpy' in origin.attrib for origin in origins),
+            )
+    for joint in root.findall('gazebo/joint'):
+        # A joint of SDF is where it is in the child with all joints at 0.
+        parent, child = (joint.findtext(end, '').strip() for end in ('parent', 'child'))
+        pose = joint.findtext('pose', '0 0 0 0 0 0').split()
+        there = _frame({'xyz': ' '.join(pose[:3]), 'rpy': ' '.join(pose[3:])})
+        model.update_cfg(dict.fromkeys(model.actuated_joint_names, 0.0))
+        on = np.linalg.inv(model.get_transform(parent)) @ model.get_transform(child) @ there
+        yield _Loop(joint.get('type', ''), (parent, child), (on, there), None, True)
+
+
+def _frame(origin: dict[str, str]) -> Array:
+    """Return the matrix of an origin of a URDF."""
+    xyz, rpy = ([*map(float, origin.get(key, '0 0 0').split())] for key in ('xyz', 'rpy'))
+    return np.asarray(compose_matrix(translate=xyz, angles=rpy))
+
+
+class _Placed:
+    """The links of a robot as yourdfpy places them, and how far its loops are from closed."""
+
+    def __init__(self, data: bytes) -> None:
+        root = ET.fromstring(data)
+        for joint in root.findall('joint'):
+            # Every joint has the value that was found for it.
+            for mimic in joint.findall('mimic'):
+                joint.remove(mimic)
+        self._model = yourdfpy.URDF.load(
+            io.BytesIO(ET.tostring(root)), load_meshes=False, load_collision_meshes=False
+        )
+        self.loops = [*_find_loops(root, self._model)]
+
+    def errors(self, values: dict[str, float], is_planar: bool) -> tuple[float, float]:
+        """Return the largest gap, in [m], and difference of directions at values of joints."""
+        model, gap, turn = self._model, 0.0, 0.0
+        model.update_cfg({name: values.get(name, 0.0) for name in model.actuated_joint_names})
+        for loop in self.loops:
+            one, other = (
+                model.get_transform(link) @ frame
+                for link, frame in zip(loop.links, loop.frames, strict=True)
+            )
+            apart = one[:3, 3] - other[:3, 3]
+            if loop.axes is not None and loop.kind in ('revolute', 'continuous'):
+                axes = [at[:3, :3] @ way for at, way in zip((one, other), loop.axes, strict=True)]
+                axes = [axis / np.linalg.norm(axis) for axis in axes]
+                turn = max(turn, float(np.linalg.norm(np.cross(*axes))))
+                if is_planar:
+                    apart -= apart @ axes[0] * axes[0]
+            elif loop.kind == 'fixed' and loop.is_directed:
+                turn = max(turn, float(np.abs(one[:3, :3] - other[:3, :3]).max()))
+            gap = max(gap, float(np.linalg.norm(apart)))
+        return gap, turn
+
+
+def _check(robot: Robot) -> float:
+    """Return the processor time of the command that is typed, in [s]."""
+    words = [sys.executable, '-m', 'linkage_ros', *robot.command[1:]]
+    words[words.index('check') + 1] = str(robot.checkout / robot.name)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(words, capture_output=True, check=True, timeout=LONGEST)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def measure(robot: Robot, draw: np.random.Generator) -> tuple[str, str]:
     """Return a row of the page, and '' or why the robot is refused."""
-    name, begun = file.parent.name, process_time()
+    file = robot.checkout / robot.name
+    options: dict[str, Any] = {'near': True}
+    if robot.inputs:
+        options['input'] = list(robot.inputs)
     signal.signal(signal.SIGALRM, _give_up)
     signal.alarm(LONGEST)
     try:
-        closure: Any = load(file, {'near': True})
+        closure: Any = load(file, options)
     except LinkageError as error:
-        return '', f'* {name}: {error.reason}'
+        return '', f'* {robot.title}, of {robot.source}: {error.reason}; {error.remedy}'
     except _TooLongError:
-        return '', f'* {name}: read for more than {LONGEST} s'
+        return '', f'* {robot.title}, of {robot.source}: read for more than {LONGEST} s'
     finally:
         signal.alarm(0)
-    loading = process_time() - begun
-    data = read_as_urdf(file)
-    model = yourdfpy.URDF.load(io.BytesIO(data), load_meshes=False, load_collision_meshes=False)
-    loops = _welds(data)
-    driven = [given.joint for given in closure.linkage.inputs]
+    checking, placed = _check(robot), _Placed(read_as_urdf(file))
+    inputs = closure.linkage.inputs
+    far = np.array([FARTHEST * (0.1 if given.slider else 1.0) for given in inputs])
     start = np.array(closure.linkage.pose.inputs)
-    scale = np.array([0.1 if given.slider else 1.0 for given in closure.linkage.inputs])
+    low = np.maximum(start - far, [given.limits.low for given in inputs])
+    high = np.minimum(start + far, [given.limits.high for given in inputs])
     closed, gap, turn, solving = 0, 0.0, 0.0, 0.0
     for _ in range(STATES):
-        inputs = start + scale * draw.uniform(-FARTHEST, FARTHEST, len(driven))
+        state = draw.uniform(low, high)
         begun = process_time()
-        position = closure.position(*inputs.tolist())
+        position = closure.position(*state.tolist())
         solving += process_time() - begun
-        if not position.joints:
-            continue
-        closed += 1
-        values = dict(zip(closure.linkage.joints, position.joints, strict=True))
-        values |= dict(zip(driven, inputs, strict=True))
-        model.update_cfg({joint: values.get(joint, 0.0) for joint in model.actuated_joint_names})
-        for kind, *links in loops:
-            one, other = map(model.get_transform, links)
-            gap = max(gap, float(np.linalg.norm(one[:3, 3] - other[:3, 3])))
-            if kind == 'fixed':
-                turn = max(turn, float(np.abs(one[:3, :3] - other[:3, :3]).max()))
+        if position.joints:
+            closed += 1
+            values = dict(zip(closure.joint_names, position.joints, strict=True))
+            values |= dict(zip(closure.input_names, state.tolist(), strict=True))
+            found = placed.errors(values, is_planar=isinstance(closure, PlanarClosure))
+            gap, turn = max(gap, found[0]), max(turn, found[1])
     row = (
-        f'| {name} | {len(loops)} | {", ".join(driven)} | {len(closure.linkage.joints)} | '
-        f'{loading:.1f} s | {solving / STATES * 1e3:.1f} ms | {closed} of {STATES} | '
-        f'{gap:.0e} m | {turn:.0e} |'
+        f'| {robot.title} | {robot.source} | {len(placed.loops)} | {len(inputs)} | '
+        f'{len(closure.joint_names)} | {checking:.1f} s | {solving / STATES * 1e6:.0f} µs | '
+        f'{closed} of {STATES} | {gap:.0e} m | {turn:.0e} |'
     )
     return row, ''
 
@@ -122,21 +282,35 @@ def _give_up(_signal: int, _frame: object) -> None:
     raise _TooLongError
 
 
+def _find_robots(place: Path) -> list[Robot]:
+    """Return the robots of a checkout, or that of a file."""
+    if place.is_file():
+        return [Robot(place.parent, '', place.name, ())]
+    return [
+        Robot(place, source, name, inputs)
+        for source, robots in ROBOTS.items()
+        if source.rpartition('/')[2] == place.name
+        for name, inputs in robots.items()
+    ]
+
+
 def main() -> int:
-    """Measure all robots in a folder."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('folder', type=Path)
+    """Measure robots."""
+    parser = argparse.ArgumentParser('python -m campaigns.robots', description=__doc__)
+    names = ', '.join(ROBOTS)
+    parser.add_argument('place', type=Path, nargs='+', help=f'a robot, or a checkout: {names}')
     parser.add_argument('--write', action='store_true', help='write docs/robots.md')
     options = parser.parse_args()
-    draw = np.random.default_rng(SEED)
-    rows, refused = [], []
-    for file in sorted(options.folder.glob('*/robot.yaml')):
-        row, reason = measure(file, draw)
+    rows, refused, typed = [], [], []
+    for robot in (robot for place in options.place for robot in _find_robots(place)):
+        row, reason = measure(robot, np.random.default_rng(SEED))
         print(row or reason, flush=True)
         (rows if row else refused).append(row or reason)
-    page = '\n'.join([_HEAD + '\n'.join(rows), '', '## Refused, and why', '', *refused, ''])
+        typed.append(shlex.join(robot.command))
+    block = ['```sh no-test: needs checkouts of the robots', *typed, '```']
+    page = [_HEAD + '\n'.join(rows), '', '## Refused, and why', '', *refused, '']
     if options.write:
-        PAGE.write_text(page, 'utf-8')
+        PAGE.write_text('\n'.join([*page, '## What was typed', '', *block, '']), 'utf-8')
     return 0
 
 
