@@ -52,12 +52,14 @@ _CASSIE = tuple(
     for side in ('left', 'right')
     for joint in ('knee', 'shin', 'heel-spring', 'foot')
 )
+# At 0 its legs are too short by 18 mm; so the foot stands under the hip.
+_WL16 = ('motor_4=0.023', 'motor_1=0.019', 'motor_2=0.023', 'motor_3=0.14', 'motor_5=0.039')
 _SPRINGS = ('right_spring_link_joint', 'left_spring_link_joint')
 
 ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
     'Gepetto/example-parallel-robots': {
-        f'robots/{name}/robot.yaml': inputs
-        for name, inputs in {
+        f'robots/{name}/robot.yaml': typed
+        for name, typed in {
             '5bar_linkage': (),
             '5bar_linkage_iso3d': (),
             '5bar_linkage_iso6d': (),
@@ -74,7 +76,7 @@ ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
             'robot_delta': (),
             'talos_like': (),
             'true_talos_2_legs': (),
-            'wl16_like': (),
+            'wl16_like': _WL16,
         }.items()
     },
     'andrei-herdt/mujoco_menagerie': {
@@ -98,7 +100,7 @@ ROBOTS: dict[str, dict[str, tuple[str, ...]]] = {
         'kinematic_loop/four_bar_split_fixed_urdf/model.urdf': ('joint_A',),
     },
 }
-"""Repositories and their robots that have loops, each with the inputs that are typed, if any."""
+"""Repositories and their robots with loops, each with inputs and values of a pose as typed."""
 
 _HEAD = f"""\
 # Robots as they are published
@@ -124,7 +126,7 @@ class Robot(NamedTuple):
     checkout: Path  # The folder in which the file is named
     source: str  # OWNER/NAME of the repository, '' if it is none of `ROBOTS`
     name: str  # The file, from the checkout
-    inputs: tuple[str, ...]
+    typed: tuple[str, ...]  # Inputs, and values as NAME=VALUE
 
     @property
     def title(self) -> str:
@@ -133,9 +135,18 @@ class Robot(NamedTuple):
         return path.parent.name if path.stem in ('robot', 'model') else path.stem
 
     @property
+    def options(self) -> dict[str, Any]:
+        """Return the same as options of `load`."""
+        told = dict(word.split('=') for word in self.typed if '=' in word)
+        inputs = [word for word in self.typed if '=' not in word]
+        given = {'input': inputs} if inputs else {}
+        return {'near': True, 'at': {name: float(value) for name, value in told.items()}, **given}
+
+    @property
     def command(self) -> list[str]:
         """Return what is typed, beside the checkout."""
-        options = [word for name in self.inputs for word in ('--input', name)]
+        names = [(f'--{"start" if "=" in name else "input"}', name) for name in self.typed]
+        options = [word for pair in names for word in pair]
         file = str(Path(self.source.rpartition('/')[2], self.name))
         return ['linkage', 'check', file, '--near', *options]
 
@@ -235,13 +246,10 @@ def _check(robot: Robot) -> float:
 def measure(robot: Robot, draw: np.random.Generator) -> tuple[str, str]:
     """Return a row of the page, and '' or why the robot is refused."""
     file = robot.checkout / robot.name
-    options: dict[str, Any] = {'near': True}
-    if robot.inputs:
-        options['input'] = list(robot.inputs)
     signal.signal(signal.SIGALRM, _give_up)
     signal.alarm(LONGEST)
     try:
-        closure: Any = load(file, options)
+        closure: Any = load(file, robot.options)
     except LinkageError as error:
         return '', f'* {robot.title}, of {robot.source}: {error.reason}; {error.remedy}'
     except _TooLongError:
@@ -287,10 +295,10 @@ def _find_robots(place: Path) -> list[Robot]:
     if place.is_file():
         return [Robot(place.parent, '', place.name, ())]
     return [
-        Robot(place, source, name, inputs)
+        Robot(place, source, name, typed)
         for source, robots in ROBOTS.items()
         if source.rpartition('/')[2] == place.name
-        for name, inputs in robots.items()
+        for name, typed in robots.items()
     ]
 
 
