@@ -316,7 +316,9 @@ def main() -> int:
         (rows if row else refused).append(row or reason)
         typed.append(shlex.join(robot.command))
     block = ['```sh no-test: needs checkouts of the robots', *typed, '```']
-    page = [_HEAD + '\n'.join(rows), '', '## Refused, and why', '', *refused, '']
+    plain = sum(' --input ' not in line and ' --start ' not in line for line in typed)
+    count = f'{len(rows)} of {len(typed)} robots run; of {plain} nothing but `--near` was typed.'
+    page = [_HEAD + '\n'.join(rows), '', count, '', '## Refused, and why', '', *refused, '']
     if options.write:
         PAGE.write_text('\n'.join([*page, '## What was typed', '', *block, '']), 'utf-8')
     return 0

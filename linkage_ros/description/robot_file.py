@@ -455,6 +455,7 @@ class _Robot:
                 near = self._find_near(values, driven, ratios)
                 if near is None or not self._near:
                     reason = f'the loop {worst} is open by {apart:.3g} {unit} in the pose'
+                    reason += ', and no pose near closes all' if self._near else ''
                     raise DefinitionError('at', reason, self._remedy_of(near, ratios))
                 values = near
                 break

@@ -41,8 +41,8 @@ _FEW = 3
 _NEAR_ZERO, _ZERO = 0.25, 1e-7
 """Upper bounds of the smallest singular value on the grid next to a zero, and of a zero."""
 
-_ROUNDS = 100
-"""Rounds of the search: each moves on, or halves its steps."""
+_ROUNDS, _LESS = 100, 0.999
+"""Rounds of the search: each moves on to a value that is so much less, or halves its steps."""
 
 
 def turning_points(closure: Closure) -> dict[str, list[float]]:
@@ -84,12 +84,14 @@ def find_standing_state(closure: Closure) -> tuple[float, ...] | None:
         tried = best + steps * around
         values = _smallest_singular_values(closure, tried)
         number = int(np.argmin(values))
-        if values[number] < least:
+        if values[number] < _LESS * least:
             best, least = tried[number], values[number]
         else:
             steps *= 0.5
         if least < _ZERO:
             return tuple(best.tolist())
+        if steps.max(initial=0.0) < _SAME:
+            break
     return None
 
 
