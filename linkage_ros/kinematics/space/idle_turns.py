@@ -95,16 +95,12 @@ def _as_one(linkage: SpaceLinkage, name: str, gone: str, kept: str) -> SpaceLink
     """Return the linkage with the links at a hinge as one."""
 
     def join(joints: Mapping[str, SpatialJoint]) -> dict[str, SpatialJoint]:
-        own = {gone: kept}
-        return {
-            of: replace(
-                joint,
-                parent=own.get(joint.parent, joint.parent),
-                child=own.get(joint.child, joint.child),
-            )
+        ends = {
+            of: [kept if end == gone else end for end in (joint.parent, joint.child)]
             for of, joint in joints.items()
             if of != name
         }
+        return {of: replace(joints[of], parent=one, child=two) for of, (one, two) in ends.items()}
 
     links = dict(linkage.links)
     if points := links.pop(gone, ()):
@@ -135,10 +131,10 @@ def _rods(linkage: SpaceLinkage, reach: float) -> Iterator[list[_IdleEnd]]:
         for link in parts:
             for point in linkage.links.get(link, ()):
                 on = tuple(other for other in carriers[point] if other != link)
-                if on or point in moved:
-                    ends.append(
-                        None if point in moved else _IdleEnd(link, linkage.points[point], on)
-                    )
+                if point in moved:
+                    ends.append(None)
+                elif on:
+                    ends.append(_IdleEnd(link, linkage.points[point], on))
             for name in joints[link]:
                 if name in linkage.hinges:
                     ends.append(_end_at(linkage, joints, link, name, reach))
@@ -192,17 +188,15 @@ def _end_at(
     driven = {*linkage.driven, *linkage.ratios, *followed}
     if first in driven:
         return None
-    chain, at = [first], link
-    alone: _IdleEnd | None = None
-    while True:
-        joint = linkage.pair_joints[chain[-1]]
-        at = joint.child if joint.parent == at else joint.parent
-        alone = alone or _IdleEnd(link, linkage.hinges[first].at, (at,), (first,))
-        if len(chain) == _OF_BALL:
-            break
+    joint, chain = linkage.pair_joints[first], [first]
+    at = joint.child if joint.parent == link else joint.parent
+    alone = _IdleEnd(link, joint.at, (at,), (first,))
+    while len(chain) < _OF_BALL:
         if at == GROUND or len(joints[at]) != 2 or linkage.links.get(at):
             return alone
         chain.append(next(name for name in joints[at] if name != chain[-1]))
+        joint = linkage.pair_joints[chain[-1]]
+        at = joint.child if joint.parent == at else joint.parent
     if not linkage.hinges.keys() >= {*chain} or not driven.isdisjoint(chain):
         return alone
     one, two, three = (linkage.hinges[name] for name in chain)
