@@ -81,6 +81,13 @@ def test_commands_succeed_or_refuse_in_one_line(
     assert sum(tally.counts['linkages'] for tally in tallies[test].values()) == WANTED[test]
 
 
+@pytest.mark.parametrize('family', [name for name in FAMILIES if name.startswith('class III')])
+def test_random_platforms_have_no_findings(family: str) -> None:
+    """Platforms on rails fix angles up to whole turns, which no dyad does."""
+    tally = run(parts(SEED, {KINEMATICS: 2}, [family]), jobs=1)[KINEMATICS][family]
+    assert not tally.notes, notes_of(tally, family, KINEMATICS)
+
+
 def test_topology_result_is_independent_of_the_process_count() -> None:
     work = parts(
         SEED,

@@ -184,6 +184,8 @@ class ArrayForm:
                 return self._absolute_value(*given)
             case 'sqrt':
                 return self._square_root(*given)
+            case 'remainder':
+                return self._remainder(*given)
         if name in _COMPARED:
             return self._compare(name, *given)
         return self._new_operation(name, *given)
@@ -314,6 +316,11 @@ class ArrayForm:
         return self._new_operation(
             'sqrt', one, bounds=BlockBounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
         )
+
+    def _remainder(self, one: Number, period: Number) -> Number:
+        """Return the distance from the nearest multiple of a period, which numpy has not."""
+        turns = self._new_operation('round', self._divide(one, period))
+        return self._subtract(one, self._multiply(period, turns))
 
     def _compare(self, name: str, one: Number, other: Number) -> Number:
         if _is_constant(one) and _is_constant(other):
