@@ -309,15 +309,15 @@ def main() -> int:
     parser.add_argument('place', type=Path, nargs='+', help=f'a robot, or a checkout: {names}')
     parser.add_argument('--write', action='store_true', help='write docs/robots.md')
     options = parser.parse_args()
-    rows, refused, typed = [], [], []
+    rows, refused, typed, plain = [], [], [], 0
     for robot in (robot for place in options.place for robot in _find_robots(place)):
         row, reason = measure(robot, np.random.default_rng(SEED))
         print(row or reason, flush=True)
         (rows if row else refused).append(row or reason)
+        plain += bool(row and not robot.typed)
         typed.append(shlex.join(robot.command))
     block = ['```sh no-test: needs checkouts of the robots', *typed, '```']
-    plain = sum(' --input ' not in line and ' --start ' not in line for line in typed)
-    count = f'{len(rows)} of {len(typed)} robots run; of {plain} nothing but `--near` was typed.'
+    count = f'{len(rows)} of {len(typed)} robots run, {plain} of them with `--near` alone.'
     page = [_HEAD + '\n'.join(rows), '', count, '', '## Refused, and why', '', *refused, '']
     if options.write:
         PAGE.write_text('\n'.join([*page, '## What was typed', '', *block, '']), 'utf-8')
