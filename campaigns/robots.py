@@ -316,7 +316,7 @@ def main() -> int:
         (rows if row else refused).append(row or reason)
         plain += bool(row and not robot.typed)
         typed.append(shlex.join(robot.command))
-    block = ['```sh no-test: needs checkouts of the robots', *typed, '```']
+    block = ['```sh no-test: needs a checkout of the robots', *typed, '```']
     count = f'{len(rows)} of {len(typed)} robots run, {plain} of them with `--near` alone.'
     page = [_HEAD + '\n'.join(rows), '', count, '', '## Refused, and why', '', *refused, '']
     if options.write:
