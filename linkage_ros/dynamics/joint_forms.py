@@ -193,6 +193,7 @@ def spatial_forms(closure: SpaceClosure, rubbing: Collection[int]) -> JointForms
         Action(link, GROUND, _strut_direction(closure, _rod_ends(closure, link)))
         for link in closure.idle
     )
+    spins += tuple(efforts[name] for name in closure.held)
     return JointForms(linkage.link_names[1:], tuple(joints), efforts, spins)
 
 
