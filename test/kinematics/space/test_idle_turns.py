@@ -13,8 +13,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from linkage_ros import load
+from linkage_ros.dynamics import Loads, Mechanics, Reactions
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint
+from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, SpatialMass
 import numpy as np
 import pytest
 
@@ -209,6 +210,25 @@ def test_hinge_balls_equal_balls_beside_a_flat_parallelogram():
     for crank, near in RNG.uniform(-0.5, 0.5, (5, 2)):
         (rocker,) = SpaceClosure(balls).position(crank).joints
         assert closure.position(crank, near).joints == pytest.approx((rocker, near), abs=1e-9)
+
+
+def test_joint_forces_at_rings_balance_the_drive():
+    """What balances every link is the effort that the power of the weights asks for."""
+    linkage = with_ring(load('rssr').linkage, 'rocker_joint', np.random.default_rng(4))
+    inertia = (2e-3, 0.0, 0.0, 3e-3, 0.0, 2e-3)
+    masses = {
+        'crank': SpatialMass(1.0, (0.02, 0.01, 0.0), inertia),
+        'rocker': SpatialMass(2.0, (0.1, 0.02, 0.1), inertia),
+    }
+    closure = SpaceClosure(linkage.with_masses(masses, massless=linkage.link_names[1:]))
+    assert len(closure.held) == 1
+    mechanics = Mechanics(closure, Loads((0.0, 0.0, -9.81)))
+    position = closure.position(0.4)
+    velocity = closure.velocity(position, 2.0)
+    motion = position, velocity, closure.acceleration(position, velocity, -3.0)
+    found = Reactions(mechanics).drive_efforts(*motion)
+    assert found == pytest.approx(mechanics.drive_efforts(*motion), rel=1e-9)
+    assert abs(found[0]) > 0.01
 
 
 def test_door_on_two_hinges_is_refused_by_name():
