@@ -105,6 +105,15 @@ def test_accuracy_writes_a_page_and_a_picture(by_hand: Any, tmp_path: Path) -> N
     assert picture.read_text('utf-8').startswith('<svg')
 
 
+def test_page_without_errors_has_no_field_for_a_need(tmp_path: Path) -> None:
+    """Only prices were measured, so no need can be answered."""
+    page = tmp_path / 'x.html'
+    assert run('demo', '--quick', '--only', 'effects', '-o', str(page)) == 0
+    text = page.read_text('utf-8')
+    assert 'Accuracy of demo' in text
+    assert 'id="need"' not in text
+
+
 def test_stopped_accuracy_command_writes_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,8 +47,10 @@ def answers_of(budget: Budget) -> list[NeedAnswer]:
     """
     Return the answers to all needs that differ, from the greatest error to the least.
 
-    The last one is to a need that nothing meets.
+    The last one is to a need that nothing meets. There are none if no errors were measured.
     """
+    if not _error_knobs(budget):
+        return []
     choices = _best_choices(budget)
     return [
         *(_met_answer(budget, choice, '') for choice in choices),
