@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.bag import MID_RUN, Storage, Topic, WITH_THE_RUN
 from linkage_ros.description import RecordParameters, Scene
-from linkage_ros.errors import RecordingError
+from linkage_ros.errors import LinkageError, missing_packages_reported, RecordingError
 from linkage_ros.replay import scene_files, to_attachments
 from linkage_ros.tick import DESCRIPTION, TickLoop
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -76,12 +76,6 @@ class RunRecording:
         handles, each with its key in the run's account; topics with the same key form a list.
         ``description``: message on topic `DESCRIPTION` that begins each file; empty for none.
         """
-        from linkage_ros.bag import (  # local import: many nodes record nothing
-            BagWriter,
-            compression_type,
-            Recorder,
-        )
-
         record = scene.record or _DEFAULT
         storage = record.storage
         # The bag lacks what a running tick remembers: a replay has to know that.
@@ -102,6 +96,12 @@ class RunRecording:
             )
 
         try:
+            with missing_packages_reported():
+                from linkage_ros.bag import (  # local import: many nodes record nothing
+                    BagWriter,
+                    compression_type,
+                    Recorder,
+                )
             # The client of a service does not know the working directory of this process.
             runs = Path(directory or record.directory).absolute()
             described = topics()
@@ -109,7 +109,7 @@ class RunRecording:
                 compression_type(storage.compression, runs)  # fails now, not at the first snapshot
                 return self._start_memory(loop, storage, [t for _, t in described], new_bag)
             writer = new_bag(True)
-        except (RecordingError, FileNotFoundError) as error:  # no working directory any more
+        except (LinkageError, FileNotFoundError) as error:  # no working directory any more
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure

@@ -259,6 +259,35 @@ def test_node_imports_packages_only_where_called_for(
     assert done.stdout.split() == [str(imported)], done.stderr
 
 
+@pytest.mark.parametrize(
+    ('name', 'record', 'code', 'told'),
+    [
+        ('nothing', '', 0, []),
+        ('recording', 'record: {directory: runs}', 1, ['mcap: is not installed; python3 -m pip']),
+    ],
+)
+def test_node_without_mcap_runs_and_records_nothing(domain, write_scene, name, record, code, told):
+    program = (
+        'import sys; sys.modules["mcap"] = None; from threading import Event; '
+        'from linkage_ros.node.run import run_linkage_node; '
+        'sys.exit(run_linkage_node(Event(), [], {"scene": sys.argv[1]}, seconds=0.2))'
+    )
+    scene = write_scene(f'without_mcap_{name}', f'drive: {{constant_rate: {{rate: 1}}}}\n{record}')
+    done = subprocess.run(
+        [sys.executable, '-c', program, str(scene)],
+        cwd=ROOT,
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == code, done.stderr
+    errors = [line for line in done.stderr.splitlines() if 'ERROR' in line]
+    assert len(errors) == len(told)
+    assert all(words in line for words, line in zip(told, errors, strict=True))
+
+
 def test_missing_trajectory_msgs_is_reported_in_one_line(domain, write_scene):
     program = (
         'import sys; sys.modules["trajectory_msgs"] = None; from threading import Event; '
