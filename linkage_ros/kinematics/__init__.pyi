@@ -45,6 +45,8 @@ from linkage_ros.kinematics.analysis.ranges import (
 )
 from linkage_ros.kinematics.analysis.reached_values import (
     find_reached_values as find_reached_values,
+    reach_boxes as reach_boxes,
+    ReachBox as ReachBox,
 )
 from linkage_ros.kinematics.analysis.searched_inputs import search_inputs as search_inputs
 from linkage_ros.kinematics.analysis.shapes import (

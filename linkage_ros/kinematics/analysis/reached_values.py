@@ -15,7 +15,7 @@ on a grid over the box, and from its best places on in ever shorter steps along 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from itertools import product
 from math import isfinite, remainder, tau
@@ -47,9 +47,46 @@ class ReachedValues(NamedTuple):
     closes: bool  # Whether the loops close everywhere within these limits
 
 
+class ReachBox(NamedTuple):
+    """Limits of the inputs of a linkage, and the joints whose values are sought within them."""
+
+    closure: Closure
+    joints: tuple[str, ...]
+    limits: tuple[Limits, ...]  # Of each input
+
+    def values(self) -> Callable[[Sequence[float]], list[float]]:
+        """
+        Return what solves for these joints where each input has a part of its range, 0 to 1.
+
+        It returns nothing where the linkage is open. Angles are near those in the middle.
+        """
+        closure, of_joints = self.closure, [*map(self.closure.joint_names.index, self.joints)]
+        middle = closure.close_unlimited(*(0.5 * (of.low + of.high) for of in self.limits)).joints
+
+        def values_at(parts: Sequence[float]) -> list[float]:
+            ends = zip(self.limits, parts, strict=True)
+            at = (of.low + part * (of.high - of.low) for of, part in ends)
+            joints = closure.close_unlimited(*at).joints
+            if not joints:
+                return []
+            return [
+                middle[k] + remainder(joints[k] - middle[k], tau)
+                if middle and closure.turning[k]
+                else joints[k]
+                for k in of_joints
+            ]
+
+        return values_at
+
+
 def find_reached_values(closure: Closure) -> list[ReachedValues]:
+    """Return what is reached within each of the `reach_boxes`."""
+    return [found for box in reach_boxes(closure) for found in _search_box(box)]
+
+
+def reach_boxes(closure: Closure) -> Iterator[ReachBox]:
     """
-    Return what joints reach within the limits of the inputs, and inputs within those of joints.
+    Yield the limits of inputs with the joints to seek, and those of joints with the inputs.
 
     Inputs are taken if all have limits and there are two or three; joints with limits, if they are
     as many. Of a single input the branches tell it.
@@ -58,42 +95,24 @@ def find_reached_values(closure: Closure) -> list[ReachedValues]:
     limits = {name: of for name, of in linkage.limits.items() if _is_between(of)}
     limited = [name for name in closure.joint_names if name in limits and name not in inputs]
     others = [name for name in closure.joint_names if name not in inputs]
-    found: list[ReachedValues] = []
     if {*inputs} <= {*limits} and len(inputs) in _COUNTS:
         wanted = (limited or others)[:_MOST_JOINTS]
-        found += _search_box(closure, wanted, [limits[name] for name in inputs])
+        yield ReachBox(closure, tuple(wanted), tuple(limits[name] for name in inputs))
     if len(inputs) == len(limited) and len(inputs) in _COUNTS:
         with suppress(DefinitionError):
             inverse = closure.driven_by(*limited)
-            found += _search_box(inverse, inputs, [limits[name] for name in limited])
-    return found
+            yield ReachBox(inverse, inputs, tuple(limits[name] for name in limited))
 
 
 def _is_between(limits: Limits) -> bool:
     return isfinite(limits.low) and isfinite(limits.high)
 
 
-def _search_box(
-    closure: Closure, names: Sequence[str], box: Sequence[Limits]
-) -> Iterator[ReachedValues]:
+def _search_box(box: ReachBox) -> Iterator[ReachedValues]:
     """Yield the least and greatest value of joints within limits of the inputs."""
-    rows = [closure.joint_names.index(name) for name in names]
-    count = _COUNTS[len(box)]
-    middle = closure.close_unlimited(*(0.5 * (of.low + of.high) for of in box)).joints
-
-    def values_at(parts: Sequence[float]) -> list[float]:
-        """Return the joints where each input has a part of its range; empty if they are open."""
-        at = (of.low + part * (of.high - of.low) for of, part in zip(box, parts, strict=True))
-        joints = closure.close_unlimited(*at).joints
-        if not (joints and middle):
-            return [*joints]
-        return [
-            middle[k] + remainder(value - middle[k], tau) if turns else value
-            for k, (value, turns) in enumerate(zip(joints, closure.turning, strict=True))
-        ]
-
+    count, values_at = _COUNTS[len(box.limits)], box.values()
     ways = [k / (count - 1) for k in range(count)]
-    grid = {parts: values_at(parts) for parts in product(ways, repeat=len(box))}
+    grid = {parts: values_at(parts) for parts in product(ways, repeat=len(box.limits))}
     closed = {parts: values for parts, values in grid.items() if values}
 
     def greatest(row: int, sign: float) -> float:
@@ -104,7 +123,7 @@ def _search_box(
             if step <= _LEAST_STEP:
                 break
             moved = False
-            for k, way in product(range(len(box)), (-step, step)):
+            for k, way in product(range(len(box.limits)), (-step, step)):
                 there = tuple(
                     min(max(part + way * (i == k), 0.0), 1.0) for i, part in enumerate(at)
                 )
@@ -114,6 +133,6 @@ def _search_box(
             step = step if moved else 0.5 * step
         return sign * best
 
-    for name, row in zip(names, rows, strict=True) if closed else ():
+    for row, name in enumerate(box.joints) if closed else ():
         ends = greatest(row, -1.0), greatest(row, 1.0)
-        yield ReachedValues(name, *ends, closure.input_names, len(closed) == len(grid))
+        yield ReachedValues(name, *ends, box.closure.input_names, len(closed) == len(grid))

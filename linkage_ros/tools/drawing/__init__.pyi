@@ -57,6 +57,7 @@ from linkage_ros.tools.drawing.plot_command import (
     curves_over_time as curves_over_time,
     is_after_gap as is_after_gap,
 )
+from linkage_ros.tools.drawing.reach import reach_lines as reach_lines
 from linkage_ros.tools.drawing.space_drawing import (
     Camera as Camera,
     choose_camera as choose_camera,

@@ -12,6 +12,8 @@ Draw a linkage in a pose, its range behind it, and beside it its joints over the
 A spatial linkage is seen from a camera far away, with the z axis of its ground upward. Without
 --azimuth and --elevation it stands where places of the linkage hide each other least.
 
+With --reach the picture shows what joints reach instead, by lines at equal inputs.
+
 A DXF holds the links as flat parts with holes instead, in millimetres, to be cut.
 """
 
@@ -30,6 +32,7 @@ from linkage_ros.cli import (
     add_robot,
     bounded_number,
     DEGREES,
+    DisplayUnits,
     output_or,
     PICTURES,
     read_inputs,
@@ -48,6 +51,7 @@ from linkage_ros.description import (
 )
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import (
+    Closure,
     prepare_view,
     read_drawn_pose,
     SpaceClosure,
@@ -56,6 +60,7 @@ from linkage_ros.kinematics import (
 from linkage_ros.resources import named_file
 from linkage_ros.tools.drawing.dxf import links_dxf
 from linkage_ros.tools.drawing.figure import assemblies_picture, paint_picture
+from linkage_ros.tools.drawing.reach import draw_reach
 
 EXAMPLE = 'linkage draw jansen_leg -o jansen_leg.svg --names'
 
@@ -78,7 +83,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='draw each assembly that closes, with the pose for the file, which is printed too',
     )
-
+    parser.add_argument(
+        '--reach',
+        action='store_true',
+        help='draw what two joints reach within the limits of two inputs, or inputs within theirs',
+    )
     add_camera(parser)
 
 
@@ -133,12 +142,22 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         print(arguments.output)
         return 0
     units = arguments.angles = DEGREES.of_file(content.units)
+    if arguments.reach:
+        return _draw_reach(closure, arguments, units)
     typed = [read_inputs(closure.linkage, at, '--at', units) for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem
     file = output_or(arguments, Path(f'{name}.png'))
     shown = prepare_view(closure, pose, ghosts)._replace(length=units.length)
     paint_picture(shown, name, file, names=arguments.names, camera=camera)
+    print(file)
+    return 0
+
+
+def _draw_reach(closure: Closure, arguments: argparse.Namespace, units: DisplayUnits) -> int:
+    """Draw what joints reach within limits."""
+    file = output_or(arguments, Path(f'{Path(arguments.file).stem}_reach.png'))
+    draw_reach(closure, file, units)
     print(file)
     return 0
 
