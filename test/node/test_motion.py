@@ -234,6 +234,24 @@ rclpy.shutdown()
 """
 
 
+@pytest.fixture
+def run_program(domain):
+    """Return a function that runs a program, with what it reads from its command line."""
+
+    def run(program, *arguments):
+        return subprocess.run(
+            [sys.executable, '-c', program, *map(str, arguments)],
+            cwd=ROOT,
+            env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+
+    return run
+
+
 @pytest.mark.parametrize(
     ('name', 'text', 'package', 'imported'),
     [
@@ -244,66 +262,38 @@ rclpy.shutdown()
     ],
 )
 def test_node_imports_packages_only_where_called_for(
-    domain, write_scene, folder, name, text, package, imported
+    run_program, write_scene, folder, name, text, package, imported
 ):
     scene = write_scene(f'imports_{name}', text.replace('FOLDER', str(folder / 'runs')))
-    done = subprocess.run(
-        [sys.executable, '-c', PROGRAM, str(scene), package],
-        cwd=ROOT,
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
+    done = run_program(PROGRAM, scene, package)
     assert done.stdout.split() == [str(imported)], done.stderr
 
 
+WITHOUT = """
+import sys
+from threading import Event
+sys.modules[sys.argv[2]] = None
+from linkage_ros.node.run import run_linkage_node
+sys.exit(run_linkage_node(Event(), [], {'scene': sys.argv[1]}, seconds=0.2))
+"""
+
+
 @pytest.mark.parametrize(
-    ('name', 'record', 'code', 'told'),
+    ('name', 'text', 'package', 'code', 'told'),
     [
-        ('nothing', '', 0, []),
-        ('recording', 'record: {directory: runs}', 1, ['mcap: is not installed; python3 -m pip']),
+        ('acceleration', 'effects: {acceleration: {}}', 'trajectory_msgs', 2,
+         ['install the ROS package trajectory_msgs']),
+        ('nothing', '', 'mcap', 0, []),
+        ('recording', 'record: {directory: runs}', 'mcap', 1,
+         ['mcap: is not installed; python3 -m pip']),
     ],
-)
-def test_node_without_mcap_runs_and_records_nothing(domain, write_scene, name, record, code, told):
-    program = (
-        'import sys; sys.modules["mcap"] = None; from threading import Event; '
-        'from linkage_ros.node.run import run_linkage_node; '
-        'sys.exit(run_linkage_node(Event(), [], {"scene": sys.argv[1]}, seconds=0.2))'
-    )
-    scene = write_scene(f'without_mcap_{name}', f'drive: {{constant_rate: {{rate: 1}}}}\n{record}')
-    done = subprocess.run(
-        [sys.executable, '-c', program, str(scene)],
-        cwd=ROOT,
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+)  # fmt: skip
+def test_missing_packages_are_reported_where_needed(
+    run_program, write_scene, name, text, package, code, told
+):
+    drive = 'drive: {constant_rate: {rate: 1}}'
+    done = run_program(WITHOUT, write_scene(f'without_{name}', f'{drive}\n{text}'), package)
     assert done.returncode == code, done.stderr
     errors = [line for line in done.stderr.splitlines() if 'ERROR' in line]
     assert len(errors) == len(told)
     assert all(words in line for words, line in zip(told, errors, strict=True))
-
-
-def test_missing_trajectory_msgs_is_reported_in_one_line(domain, write_scene):
-    program = (
-        'import sys; sys.modules["trajectory_msgs"] = None; from threading import Event; '
-        'from linkage_ros.node.run import run_linkage_node; '
-        'sys.exit(run_linkage_node(Event(), [], {"scene": sys.argv[1]}))'
-    )
-    scene = write_scene('not_installed', 'effects: {acceleration: {}}')
-    done = subprocess.run(
-        [sys.executable, '-c', program, str(scene)],
-        cwd=ROOT,
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-    assert done.returncode == 2
-    (line,) = [line for line in done.stderr.splitlines() if 'ERROR' in line]
-    assert 'install the ROS package trajectory_msgs' in line

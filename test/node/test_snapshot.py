@@ -383,7 +383,7 @@ def slow_disk(monkeypatch):
         answer.wait(30)
         return BagWriter(*arguments)
 
-    monkeypatch.setattr('linkage_ros.node.run_recording.BagWriter', slow)
+    monkeypatch.setattr('linkage_ros.bag.BagWriter', slow)
     return answer
 
 
