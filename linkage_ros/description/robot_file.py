@@ -70,6 +70,7 @@ from linkage_ros.kinematics import (
     Limits,
     PoseCorrections,
     Ratio,
+    SpaceClosure,
     SpaceFrame,
     SpaceLinkage,
     SpatialJoint,
@@ -146,11 +147,18 @@ def read_robot_closure(
         robot = _Robot(urdf, given['input'], given['at'], given['close'], given['near'])
         robot.check_driven()
         errors: list[DefinitionError] = []
+        idle: list[Closure] = []
         for without in robot.needless_choices(publish_inputs):
             try:
-                return close(robot, without)
-            except DefinitionError as error:  # noqa: PERF203
+                closure = close(robot, without)
+            except DefinitionError as error:
                 errors.append(error)
+                continue
+            if not _holds_a_follower(closure, without):
+                return closure
+            idle.append(closure)
+        if idle:
+            return idle[0]
         # The first is without all; the next the likeliest of as many as are needed.
         raise errors[:2][-1]
     except DefinitionError as error:
@@ -166,6 +174,16 @@ def read_robot_closure(
         where = f'{"link" if section == "links" else "joint"} {part.partition(".")[0]}'
         remedy = error.remedy.replace('draw another pose', 'give another: at: {JOINT: VALUE}')
         raise FileError(urdf.file, where if part else '', error.reason, remedy) from None
+
+
+def _holds_a_follower(closure: Closure, without: Sequence[str]) -> bool:
+    """Return whether a joint that does not follow would say how far a link turns that is held."""
+    if not isinstance(closure, SpaceClosure):
+        return False
+    hinges = closure.linkage.hinges
+    links = {link for name in closure.held for link in (hinges[name].parent, hinges[name].child)}
+    followers = [hinges[name] for name in without if name in hinges]
+    return any((links - {GROUND}) & {hinge.parent, hinge.child} for hinge in followers)
 
 
 class _LinkageParts(NamedTuple):

@@ -98,7 +98,6 @@ def make(kind: str, place: Path) -> None:
 
 COMMAND = 'from linkage_ros.cli.main import main'
 
-NODE = 'from linkage_ros.node.linkage_node import main'
 
 NEED_BAGS = (
     ['run', 'x.yaml'], ['demo'], ['plot', 'bag'], ['info', 'bag'],
@@ -143,13 +142,6 @@ def test_bag_commands_without_mcap_name_what_to_install(folder, typed) -> None:
     assert line.startswith(
         f'linkage {typed[0]}: mcap: is not installed; python3 -m pip install mcap '
     )
-
-
-def test_node_without_mcap_names_what_to_install(folder) -> None:
-    answer = without('mcap', folder, NODE, '--ros-args', '-p', 'scene:=x.yaml')
-    assert (answer.returncode, answer.stdout) == (2, '')
-    (line,) = answer.stderr.splitlines()
-    assert line.startswith('linkage_node: mcap: is not installed; python3 -m pip install mcap ')
 
 
 def test_check_works_without_mcap(folder) -> None:
