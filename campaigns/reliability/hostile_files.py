@@ -268,8 +268,6 @@ _BESIDE = '^(left out: |accuracy of |pictures: )'
 """Lines beside a result: omissions of an import, progress of a measurement or of an animation."""
 
 _OTHERWISE = {
-    # All errors of a scene are reported.
-    'scene': Manners(errors=1000, beside=_BESIDE),
     # There may be no linkage that meets the task.
     'synthesize': Manners((0, 1, 2), beside=_BESIDE),
     # What cannot be compared is told beside the result.

@@ -356,12 +356,18 @@ Try = tuple[str, str]
 """How a try ended, and its violation in a line; '' for none."""
 
 
+_PLACED = re.compile(r'linkage \w+: .*?:\d+: ')
+"""Beginning of an error that names a place in a file."""
+
+_MOST_ERRORS = 1000
+"""Most errors of one file."""
+
+
 class Manners(NamedTuple):
     """How a command has to end."""
 
     codes: tuple[int, ...] = (0, 2)  # Allowed exit codes
     notes: int = 0  # Most lines on standard error beside a result
-    errors: int = 1  # Most lines on standard error with exit code 2
     longest: int = 1000  # Most characters of such a line
     # Pattern of lines that do not count, and of those that do not count beside a result.
     beside: str = '$^'
@@ -375,7 +381,10 @@ def fault_of(ended: Ended, manners: Manners) -> str:
     lines = [line for line in errors.splitlines() if not re.search(manners.beside, line)]
     if code == 0:
         lines = [line for line in lines if not re.search(manners.with_result, line)]
-    most = manners.errors if code == 2 else manners.notes
+    most = manners.notes
+    if code == 2:
+        # All errors of a file are told, each in a line that names its place.
+        most = _MOST_ERRORS if all(map(_PLACED.match, lines)) else 1
     fault = ''
     if code not in manners.codes:
         fault = f'{code}: {errors.strip()}'

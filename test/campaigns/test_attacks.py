@@ -83,7 +83,7 @@ def test_mutated_files_differ_in_many_ways() -> None:
     [
         ('check', 0, '', False),
         ('check', 2, 'linkage check: x: is wrong; correct it\n', False),
-        ('scene', 2, 'linkage scene: one\nlinkage scene: other\n', False),
+        ('check', 2, 'linkage check: x.yaml:1: is wrong\nlinkage check: x.yaml:2: too\n', False),
         ('synthesize', 1, '', False),
         (
             'replay',
