@@ -52,7 +52,7 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
         arguments = [command, str(file)]
         if command == 'accuracy':
             arguments.append('--quick')
-            arguments += ['-o', str(Path(folder) / 'page')]
+            arguments += ['-o', str(Path(folder) / 'page.html')]
         if output:
             arguments += ['-o', str(Path(folder) / f'out.{output}')]
         code, errors, _ = in_process(arguments, _SECONDS)

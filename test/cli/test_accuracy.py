@@ -114,6 +114,18 @@ def test_page_without_errors_has_no_field_for_a_need(tmp_path: Path) -> None:
     assert 'id="need"' not in text
 
 
+@pytest.mark.parametrize('linkage', ['five_bar', 'ankle_motors', 'torque'])
+def test_effects_of_several_inputs_have_their_prices(
+    linkage: str, tmp_path: Path, capsys: Any
+) -> None:
+    source = f'linkage: {linkage}\ndrive: {{topic: {{}}}}\neffects: {{velocity: {{}}}}\n'
+    (file := tmp_path / 'scene.yaml').write_text(source)
+    scene = 'torque_ankle' if linkage == 'torque' else str(file)
+    assert run(scene, '--quick', '--only', 'effects', '--json') == 0
+    names = [each['name'] for each in json.loads(capsys.readouterr().out)['sources']]
+    assert 'velocity' in names
+
+
 def test_stopped_accuracy_command_writes_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

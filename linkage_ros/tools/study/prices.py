@@ -115,10 +115,11 @@ def _input_paths(linkage: LinkagePipeline) -> list[Path]:
     closure, scene_linkage = linkage.closure, linkage.scene_linkage
     joints = scene_linkage.instead_of_inputs
     if not joints:
-        widest = InputSweep(closure).widest_range
-        if len(closure.linkage.inputs) == 1 and (widest is None or widest.is_whole):
-            speed = tau * _CRANK_RATE
-            return [lambda seconds: (speed * seconds, speed)]
+        if len(closure.linkage.inputs) == 1:
+            widest = InputSweep(closure).widest_range
+            if widest is None or widest.is_whole:
+                speed = tau * _CRANK_RATE
+                return [lambda seconds: (speed * seconds, speed)]
         return swinging_inputs(closure, _CRANK_RATE)
     exchange = ExchangedInputs(closure, joints, scene_linkage.drive[1].branch)
     if (branch := exchange.branch) is None:
