@@ -143,7 +143,8 @@ class Server:
             together = asyncio.gather(*goodbyes, return_exceptions=True)
             await asyncio.wait_for(together, 2.0 * _GOODBYE)
         if self._runner is not None:
-            await self._runner.cleanup()
+            runner, self._runner = self._runner, None
+            await runner.cleanup()
 
     def count_refusal(self, what: str) -> None:
         """Count something that is refused; say so the first time."""
@@ -156,6 +157,8 @@ class Server:
         error = context.get('exception')
         if isinstance(error, OSError):
             self.count_refusal(f'a connection ({error.strerror})')
+        elif isinstance(error, ValueError) and self._runner is None:
+            pass  # asyncio listens again 1 s after a refusal, here at a port that is closed
         elif error is not None:
             self._report(str(defect_error('linkage view', error)))
 

@@ -18,6 +18,7 @@ import json
 import os
 from pathlib import Path
 import random
+import resource
 import shutil
 import signal
 import socket
@@ -32,7 +33,15 @@ from urllib.request import urlopen
 
 import aiohttp
 from linkage_ros.errors import LinkageError
-from linkage_ros.tools.view import bag_page, Conversation, LARGEST, MOST_PAGES, UserFile, Worker
+from linkage_ros.tools.view import (
+    bag_page,
+    Conversation,
+    LARGEST,
+    MOST_PAGES,
+    Server,
+    UserFile,
+    Worker,
+)
 from linkage_ros.tools.view.report import Window
 import pytest
 
@@ -502,6 +511,28 @@ def test_too_many_connections_are_reported_in_one_line(tmp_path: Path) -> None:
             assert page.status == 200
     assert line == 'linkage view: refused a connection (Too many open files)\n'
     assert said[1] == ''
+
+
+@in_loop
+async def test_server_ends_silently_after_a_refused_connection() -> None:
+    """The event loop listens again 1 s after a refusal, also on a port that is closed by then."""
+    lines: list[str] = []
+    server = Server(lambda: '', (), lines.append)
+    asyncio.get_running_loop().set_exception_handler(server.report_failure)
+    await server.start()
+    address = urlsplit(server.address)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with socket.socket() as client:
+        try:
+            # No file can be opened beside those that are open now.
+            resource.setrlimit(resource.RLIMIT_NOFILE, (3, hard))
+            client.connect((address.hostname, address.port))
+            await asyncio.sleep(0.1)
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    await server.end()
+    await asyncio.sleep(1.2)
+    assert lines == ['refused a connection (Too many open files)']
 
 
 def test_view_writes_a_page_to_a_file(tmp_path: Path) -> None:
