@@ -46,6 +46,7 @@ from linkage_ros.kinematics.plane.topology import (
     Structure,
 )
 from linkage_ros.kinematics.space.carried_points import CarriedPoints, unit_across
+from linkage_ros.kinematics.space.folding_joints import Course, folding_joint, FoldingJoint
 from linkage_ros.kinematics.space.joints import HingePair, LowerPair, SlidePair
 from linkage_ros.kinematics.space.linkage import SpaceLinkage, SpatialJoint, unit_of
 from linkage_ros.kinematics.space.planar_loops import find_planar_loops, PlanarLoop
@@ -53,6 +54,7 @@ from linkage_ros.kinematics.space.steps import (
     AimedHinge,
     CarriedPoint,
     ClosedHinge,
+    ClosedJoint,
     ClosedSlide,
     frame_of,
     FramedLink,
@@ -463,20 +465,44 @@ class SpacePlan:
         index = self._set_frame(ends[1], frame)
         self.coordinates[name] = len(self.state.coordinates)
         if isinstance(joint, HingePair):
-            radius = hypot(place[0], place[1])
-            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, 0.0)
-            # Where 0 lies among the whole turns follows from the value in the pose.
-            trial = LinkState([*self.state.coordinates], [*self.state.pins])
-            if step.close(trial).status.has_pose:
-                found = trial.coordinates[-1]
-                step = replace(step, direction=self._direction(place, found, name))
+            radius, direction = hypot(place[0], place[1]), atan2(place[1], place[0])
+            step: Any = ClosedHinge(joint, place, to, bar, sign, index, radius, direction)
         else:
             step = ClosedSlide(joint, place, to, bar, sign, index)
+        side = f'{"+" if sign > 0.0 else "-"}, as in the pose'
+        if (folding := self._fold(step, ends[0], known)) is not None:
+            step, side = folding, f'{side}, and passes its change points'
+        trial = LinkState([*self.state.coordinates], [*self.state.pins])
+        if isinstance(joint, HingePair) and step.close(trial).status.has_pose:
+            # Where 0 lies among the whole turns follows from the value in the pose.
+            turns = round((trial.coordinates[-1] - self.pose_value(name)) / tau)
+            step = replace(step, direction=step.direction + tau * turns)
         self.add_step(step)
-        side = '+' if sign > 0.0 else '-'
         method = f'{name}, on {ends[0]}, by {by} from {known} to {point}'
-        self.end_group('closed', (ends[1],), method, f'{side}, as in the pose')
+        self.end_group('closed', (ends[1],), method, side)
         return True
+
+    def _fold(self, step: ClosedJoint, on: str, known: str) -> FoldingJoint | None:
+        """Return a closed joint that passes its change points, if one joint moves its rod."""
+        seat, link = step.joint.seat, self.pose_frames[on]
+        x, y, z = map(link.turn, seat[:3])
+        base = SpaceFrame(x, y, z, link.place(seat.origin))
+        end = base.locate(self.places[known])
+        for name, joint in self.linkage.pair_joints.items() if not step.rod.moved_by else ():
+            ends = {joint.parent, joint.child} - {on}
+            moves_end = len(ends) == 1 and not ends.isdisjoint(self.carriers[known])
+            if name not in self.coordinates or not moves_end:
+                continue
+            index, value = self.coordinates[name], self.pose_value(name)
+            axis = base.resolve(self._axis_to(name, *ends))
+            if self._slides(name):
+                course = Course.along(index, value, axis, end)
+            else:
+                at = base.locate(scale(1.0 / self.scale, joint.at))
+                course = Course.about(index, value, axis, at, end)
+            keeps_turns = index in self.turns_with
+            return folding_joint(step, course, value, keeps_turns=keeps_turns)
+        return None
 
     # Links and points
 
