@@ -27,7 +27,7 @@ from linkage_ros.cli.terminal import give_up_output
 
 CAMPAIGNS = {
     # Each module has `add_options` and `run`; it may have a PAGE, and FAMILIES with `show`.
-    'accuracy': 'campaigns.accuracy.page',
+    'accuracy': 'campaigns.accuracy.run',
     'attacks': 'campaigns.reliability.attacks',
     'damage': 'campaigns.reliability.damage',
     'disk': 'campaigns.reliability.disk',
@@ -37,7 +37,7 @@ CAMPAIGNS = {
     'mutants': 'campaigns.mutants',
     'space': 'campaigns.space',
     'synthesis': 'campaigns.synthesis',
-    'topologies': 'campaigns.topologies.page',
+    'topologies': 'campaigns.topologies.run',
 }
 
 

@@ -10,13 +10,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 import multiprocessing
+from operator import itemgetter
 from pathlib import Path
 import time
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 from bench.report import say, show, Table, write_page
+from campaigns.tally import Judgement, Tally
 from linkage_ros.tools.study import percentile
 
 Work = TypeVar('Work')
@@ -84,34 +87,41 @@ def parts_of(seed: int, counts: Mapping[str, int], size: int, test: str = '') ->
     ]
 
 
-class Mergeable(Protocol):
-    """A tally of findings that takes in the findings of another part."""
+Judge = Callable[[Part], Iterable[tuple[int, Judgement]]]
+"""Yields the numbers of linkages of a part, each with its results."""
 
-    def merge(self, other: Any, /) -> None: ...
-
-
-TallyOf = TypeVar('TallyOf', bound=Mergeable)
+Tallies = dict[str, dict[str, Tally]]
+"""A tally of each test and family, in the order of the work."""
 
 
-def tallies_of(
-    do: Callable[[Part], tuple[Part, TallyOf]],
-    work: Sequence[Part],
-    jobs: int,
-    new: Callable[[], TallyOf],
-    progress: Callable[[int], None] = lambda _: None,
-) -> dict[tuple[str, str], TallyOf]:
-    """
-    Run all parts and merge their findings.
-
-    That is a tally of each test and family, in the order of the work. ``do`` runs one part,
-    ``new`` makes an empty tally, and ``progress`` is called with the number of linkages of each
-    part that is done.
-    """
-    tallies = {(part.test, part.family): new() for part in work}
-    for part, tally in results_of(do, work, jobs):
-        tallies[part.test, part.family].merge(tally)
-        progress(part.size)
+def tallies_of(judge: Judge, work: Sequence[Part], jobs: int, unit: str = '') -> Tallies:
+    """Judge all parts and merge the results; with a ``unit`` of their sizes, print progress."""
+    tallies: Tallies = {}
+    for part in work:
+        tallies.setdefault(part.test, {}).setdefault(part.family, Tally())
+    advance = progress_lines(sum(part.size for part in work), unit) if unit else None
+    for part, tally in results_of(partial(_tally_of, judge), work, jobs):
+        tallies[part.test][part.family].merge(tally)
+        if advance:
+            advance(part.size)
     return tallies
+
+
+def _tally_of(judge: Judge, part: Part) -> tuple[Part, Tally]:
+    tally = Tally()
+    for number, judged in judge(part):
+        tally.add(number, judged)
+    return part, tally
+
+
+def show_results(judged: Judgement) -> None:
+    """Print the results of a linkage."""
+    print(dict(judged.counts))
+    for case, name, text in judged.notes:
+        print(f'case {case}: {name} {text}')
+    for quantity, errors in judged.errors.items():
+        case, joint, error = max(errors, key=itemgetter(2))
+        print(f'worst {quantity}: {error:.3g} u·κ in case {case}, joint {joint}')
 
 
 def progress_lines(total: float, unit: str) -> Callable[[float], None]:

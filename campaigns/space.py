@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 from bench import ROOT
 from bench.report import Table
 from campaigns import space_reference as exact
-from campaigns.accuracy.judge import Findings as Judged, QUANTITIES, Tally
-from campaigns.accuracy.page import accuracy_table, LIMIT, worst_table
-from campaigns.campaign import Findings, Page, Part, parts_of, progress_lines, tallies_of
+from campaigns.accuracy.run import accuracy_table, LIMIT, worst_table
+from campaigns.campaign import Findings, Page, Part, parts_of, tallies_of
+from campaigns.tally import Judgement, QUANTITIES
 from linkage_ros.description import load
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics import SpaceClosure, SpaceLinkage, SpatialJoint, Status
@@ -280,15 +280,13 @@ def draw_case(seed: int, family: str, number: int) -> Case:
     return FAMILIES[family](Random(f'{seed}/{family}/{number}'))
 
 
-def do(part: Part) -> tuple[Part, Tally]:
-    """Do one part."""
+def judge_part(part: Part) -> Iterator[tuple[int, Judgement]]:
+    """Compare the cases of a part with the reference."""
     errors = [draw_case(part.seed, part.family, number).errors for number in part.numbers]
-    findings = Judged(Counter(cases=part.size))
+    judged = Judgement(Counter(cases=part.size))
     for quantity, found in zip(QUANTITIES, zip(*errors, strict=True), strict=True):
-        findings.errors[quantity] = [(case, 0, error) for case, error in enumerate(found)]
-    tally = Tally()
-    tally.add(part.first, findings)
-    return part, tally
+        judged.errors[quantity] = [(case, 0, error) for case, error in enumerate(found)]
+    yield part.first, judged
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -305,12 +303,10 @@ def show(options: argparse.Namespace) -> None:
 def run(options: argparse.Namespace) -> Findings:
     """Compare steps and linkages with the reference."""
     counts = {name: max(options.cases // SLOWER.get(name, 1), 1) for name in options.only}
-    total = sum(counts.values())
     work = parts_of(options.seed, counts, _PART)
-    tallies = tallies_of(do, work, options.jobs, Tally, progress_lines(total, 'cases'))
-    named = {family: tally for (_, family), tally in tallies.items()}
-    table, above = accuracy_table(named), worst_table(named, LIMIT)
+    tallies = tallies_of(judge_part, work, options.jobs, 'cases')['']
+    table, above = accuracy_table(tallies), worst_table(tallies, LIMIT)
     rows = [(name, f'{counts[name]:,}', *cells) for name, *cells in table.rows]
     table = Table(table.title, ('family', 'cases', *table.head[1:]), [*rows])
-    facts = [('cases', f'{total:,}')]
+    facts = [('cases', f'{sum(counts.values()):,}')]
     return Findings([table, above], [' '.join(row) for row in above.rows], facts)

@@ -21,8 +21,8 @@ number. So the result does not depend on how the work is shared, and any linkage
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import metadata
 from math import acos, cos, hypot, pi, sin
 from random import Random
@@ -30,12 +30,12 @@ import time
 from typing import Any, NamedTuple
 
 from bench.report import say, show as show_table, Table
-from campaigns.campaign import Findings, Part, parts_of, progress_lines, tallies_of
-from flint import arb, ctx
+from campaigns.campaign import Findings, Part, parts_of, tallies_of
+from campaigns.tally import Judgement, Quantity, Tally
+from flint import arb, arb_mat, ctx
 from linkage_ros.tools.design import solve_links, three_pairs
 from linkage_ros.tools.design.pairs.freudenstein import TRUSTED
 import numpy as np
-from numpy.typing import NDArray
 
 PRECISION = 384
 """In bits. A cluster of 1e-9 rad costs digits twice; more than fifty are left."""
@@ -112,23 +112,16 @@ def _row(a: Any, b: Any, c: Any, cosine: Any, sine: Any, x: Any, y: Any) -> tupl
 def _sensitivity(
     lengths: tuple[Any, ...], angles: list[Any], rows: list[tuple[Any, ...]]
 ) -> tuple[float, ...]:
-    """F = 0 in the three pairs: ∂L/∂x = −J⁻¹·∂F/∂x, by cross products of the rows of J."""
-    normals = []
-    for i in range(3):
-        (p, q, r, *_), (s, t, w, *_) = rows[(i + 1) % 3], rows[(i + 2) % 3]
-        normals.append((q * w - r * t, r * s - p * w, p * t - q * s))
-    determinant = sum(u * v for u, v in zip(rows[0][:3], normals[0], strict=True))
-    return tuple(
-        float(
-            sum(
-                abs(
-                    normals[i][j] * (abs(rows[i][3] * angles[i]) + abs(rows[i][4] * angles[3 + i]))
-                )
-                for i in range(3)
-            )
-            / abs(determinant)
-            + abs(length)
+    """F = 0 in the three pairs: ∂L/∂x = −J⁻¹·∂F/∂x."""
+    inverse = arb_mat([row[:3] for row in rows]).inv()
+    changes = [
+        abs(by_crank * crank) + abs(by_rocker * rocker)
+        for (*_, by_crank, by_rocker), crank, rocker in zip(
+            rows, angles[:3], angles[3:], strict=True
         )
+    ]
+    return tuple(
+        float(sum(abs(inverse[j, i]) * changes[i] for i in range(3)) + abs(length))
         for j, length in enumerate(lengths)
     )
 
@@ -300,95 +293,59 @@ _PART = 500
 _ROUNDOFF = 2.0**-53
 
 
-class Worst(NamedTuple):
-    """An error, in units of roundoff times sensitivity, and the number of its linkage."""
-
-    error: float
-    linkage: int
-
-
-NONE = Worst(0.0, -1)
-
-
-@dataclass
-class Tally:
-    """The findings for a family."""
-
-    cases: int = 0  # Number of linkages
-    flagged: int = 0  # Number of linkages for which the result trusts no digit of some length
-    # Sum over the other linkages of the number of trusted digits of the least trusted length.
-    digits: float = 0.0
-    # Greatest error of the linkages that are not flagged, relative to the sensitivity that the
-    # result gives; lengths dominated by second derivatives are left out.
-    worst: Worst = NONE
-    # The same, relative to the sensitivity of the true linkage, computed in balls.
-    worst_true: Worst = NONE
-    # Greatest error of the linkages that are not flagged, relative to the loss that the result
-    # gives.
-    worst_lost: Worst = NONE
-    # Smallest and largest ratio of the two sensitivities.
-    kappa: tuple[float, float] = (np.inf, 0.0)
-
-    def merge(self, other: Tally) -> None:
-        """Add the findings of another part of the campaign."""
-        self.cases += other.cases
-        self.flagged += other.flagged
-        self.digits += other.digits
-        self.worst = max(self.worst, other.worst)
-        self.worst_true = max(self.worst_true, other.worst_true)
-        self.worst_lost = max(self.worst_lost, other.worst_lost)
-        self.kappa = min(self.kappa[0], other.kappa[0]), max(self.kappa[1], other.kappa[1])
-
-
 def make(seed: int, family: str, index: int) -> Case:
     """Return a linkage of a family."""
     return draw(FAMILIES[family], Random(f'{seed}/{family}/{index}'))
 
 
-def judge(cases: list[Case], first: int) -> Tally:
-    """Synthesise all linkages from their pairs at once, and compare."""
+# Errors of a length, in units of roundoff times sensitivity, by the sensitivity that the result
+# gives, lengths dominated by second derivatives left out; by that of the true linkage; and
+# relative to the loss that the result gives. Then the ratio of the two sensitivities, inverted
+# too.
+WORST, TRUE, LOST, ABOVE, BELOW = ERRORS = ('worst', 'true', 'lost', 'above', 'below')
+
+
+def judge_part(part: Part) -> Iterator[tuple[int, Judgement]]:
+    """
+    Synthesise all linkages of a part from their pairs at once, and compare.
+
+    A linkage is flagged if the result trusts no digit of some length; the errors are those of the
+    others. ``millidigits`` are the trusted digits of their least trusted lengths, in thousandths.
+    """
+    cases = [make(part.seed, part.family, number) for number in part.numbers]
     result = three_pairs([case.crank for case in cases], [case.truth.rocker for case in cases])
     off = np.abs(result.lengths - [case.lengths for case in cases])
     kappa = np.array([case.truth.sensitivity for case in cases])
     trusted = np.flatnonzero((result.reliable_digits > 0.0).all(1))
-    tally = Tally(len(cases), len(cases) - len(trusted))
+    judged = Judgement(Counter(cases=len(cases), flagged=len(cases) - len(trusted)))
     if len(trusted):
         off, kappa = off[trusted], kappa[trusted]
         sensitivity = result.sensitivity[trusted]
         lost = result.lost_digits[trusted] * np.abs(result.lengths[trusted])
-        numbers = first + trusted
         linear = lost < 2.0 * TRUSTED * _ROUNDOFF * sensitivity
-        tally.digits = float(result.reliable_digits[trusted].min(1).sum())
-        tally.worst = _worst(np.where(linear, off / sensitivity, 0.0) / _ROUNDOFF, numbers)
-        tally.worst_true = _worst(np.where(linear, off / kappa, 0.0) / _ROUNDOFF, numbers)
-        tally.worst_lost = _worst(off / lost, numbers)
-        tally.kappa = float((sensitivity / kappa).min()), float((sensitivity / kappa).max())
-    return tally
+        digits = result.reliable_digits[trusted].min(1).sum()
+        judged.counts['millidigits'] = round(1e3 * float(digits))
+        for name, errors in zip(
+            ERRORS,
+            (
+                np.where(linear, off / sensitivity, 0.0) / _ROUNDOFF,
+                np.where(linear, off / kappa, 0.0) / _ROUNDOFF,
+                off / lost,
+                sensitivity / kappa,
+                kappa / sensitivity,
+            ),
+            strict=True,
+        ):
+            # A length that is not a number is as wrong as can be.
+            worst = np.nan_to_num(errors, nan=np.inf).max(1)
+            pairs = zip(trusted.tolist(), worst.tolist(), strict=True)
+            judged.errors[name] = [(case, 0, error) for case, error in pairs]
+    yield part.first, judged
 
 
 def parts(cases: int, seed: int, families: list[str]) -> list[Part]:
     """Return the work for a number of linkages of each family."""
     return parts_of(seed, dict.fromkeys(families, cases), _PART)
-
-
-def do(part: Part) -> tuple[Part, Tally]:
-    """Do one part."""
-    return part, judge([make(part.seed, part.family, i) for i in part.numbers], part.first)
-
-
-def run_parts(
-    work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
-) -> dict[str, Tally]:
-    """Run all parts as `tallies_of` does, and return the tally of each family."""
-    tallies = tallies_of(do, work, jobs, Tally, progress)
-    return {family: tally for (_, family), tally in tallies.items()}
-
-
-def _worst(errors: NDArray[np.float64], numbers: NDArray[np.intp]) -> Worst:
-    # A length that is not a number is as wrong as can be.
-    each = np.nan_to_num(errors, nan=np.inf).max(1)
-    place = int(each.argmax())
-    return Worst(float(each[place]), int(numbers[place]))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -399,39 +356,48 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Findings:
     """Design linkages back from their pairs."""
     work = parts(options.cases, options.seed, options.only)
-    progress = progress_lines(sum(part.size for part in work), 'linkages')
-    tallies = run_parts(work, options.jobs, progress)
-    cases = sum(tally.cases for tally in tallies.values())
-    facts = ('cases', f'{cases:,}'), ('python-flint', metadata.version('python-flint'))
+    tallies = tallies_of(judge_part, work, options.jobs, 'linkages')['']
+    cases = f'{sum(part.size for part in work):,}'
+    facts = ('cases', cases), ('python-flint', metadata.version('python-flint'))
     families = [(name, family.description) for name, family in FAMILIES.items()]
     tables = [_errors(tallies), Table('Families', ('family', 'description'), families), _speed()]
     faults = [
-        f'{family}: {tally.worst}, {tally.worst_lost}'
+        f'{family}: {name} {errors.greatest():.3g} of linkage {linkage_of(errors)}'
         for family, tally in tallies.items()
-        if tally.worst.error > TRUSTED or tally.worst_lost.error > 1.0
+        for name, most in ((WORST, TRUSTED), (LOST, 1.0))
+        if (errors := tally.quantities.get(name, Quantity())).greatest() > most
     ]
     return Findings(tables, faults, facts)
 
 
-def _errors(tallies: dict[str, Tally]) -> Table:
+def linkage_of(errors: Quantity) -> int:
+    """Return the number of the linkage with the greatest error."""
+    return errors.worst[0].linkage + errors.worst[0].case
+
+
+def _errors(tallies: Mapping[str, Tally]) -> Table:
     table = Table(
         'Errors of lengths, in 2⁻⁵³·sensitivity',
         ('family', 'linkages', 'flagged', 'mean digits', 'worst', 'linkage',
          'by true sensitivity', 'ratio', 'relative to loss'),
     )  # fmt: skip
     for family, tally in tallies.items():
-        trusted = tally.cases - tally.flagged
+        counts = tally.counts
+        worst, true, lost, above, below = (
+            tally.quantities.get(name, Quantity()) for name in ERRORS
+        )
+        trusted = counts['cases'] - counts['flagged']
         table.rows.append(
             [
                 family,
-                f'{tally.cases:,}',
-                f'{tally.flagged:,}',
-                f'{tally.digits / trusted:.1f}' if trusted else '',
-                f'{tally.worst.error:.3g}',
-                str(tally.worst.linkage),
-                f'{tally.worst_true.error:.3g}',
-                f'{tally.kappa[0]:.2f}–{tally.kappa[1]:.2f}',
-                f'{tally.worst_lost.error:.2f}',
+                f'{counts["cases"]:,}',
+                f'{counts["flagged"]:,}',
+                f'{1e-3 * counts["millidigits"] / trusted:.1f}' if trusted else '',
+                f'{worst.greatest():.3g}',
+                str(linkage_of(worst)) if trusted else '',
+                f'{true.greatest():.3g}',
+                f'{1.0 / below.greatest():.2f}–{above.greatest():.2f}' if trusted else '',
+                f'{lost.greatest():.2f}',
             ]
         )
     return table

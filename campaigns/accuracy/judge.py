@@ -6,20 +6,15 @@
 # WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific
 # language governing permissions and limitations under the License.
 
-"""
-Compare the package with the reference for one linkage, and tally the errors of many.
-
-Millions of errors are kept as histograms and a few worst cases. The result does not depend on
-their order.
-"""
+"""Compare the package with the reference for one linkage."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
 from math import isfinite, pi
-from typing import Any, NamedTuple
+from typing import Any
 
 from campaigns.accuracy.mechanism import Mechanism, Turn
 from campaigns.accuracy.reference import (
@@ -31,13 +26,12 @@ from campaigns.accuracy.reference import (
     Truth,
 )
 from campaigns.series import CORRECT, FACTORIALS, UNIT_ROUNDOFF
+from campaigns.tally import Judgement, QUANTITIES
 from flint import arb, ctx
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, Status
 import numpy as np
-import numpy.typing as npt
 
-QUANTITIES = ('position', 'velocity', 'acceleration')
 FAULTS = ('wrong', 'missed', 'false', 'refused', 'crashed')
 AT_TOGGLE = 'position at a toggle'
 
@@ -59,28 +53,15 @@ Answer = tuple[tuple[float, ...], ...]
 """The package's positions, velocities and accelerations of the published joints."""
 
 
-@dataclass
-class Findings:
-    """The results of a linkage's cases."""
+def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Judgement:
+    """
+    Compare the package with the reference at input angles φ, at rate 1 and accelerations α.
 
-    # Number of cases: ``cases``, ``closed``, ``open``, ``at limit``, ``wrong`` (assembly),
-    # ``missed``, ``false`` (closures), ``refused`` (regular, but reported as a toggle or
-    # indeterminate), ``crashed``.
-    counts: Counter[str] = field(default_factory=Counter)
-    # For each quantity (case, joint, error in u·κ).
-    errors: dict[str, list[tuple[int, int, float]]] = field(default_factory=dict)
-    # For each case with a finding its description.
-    notes: list[tuple[int, str]] = field(default_factory=list)
-
-    def count(self, case: int, outcome: str, note: str = '') -> None:
-        self.counts[outcome] += 1
-        if outcome not in {'open', 'at limit'}:
-            self.notes.append((case, f'{outcome} {note}'.strip()))
-
-
-def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Findings:
-    """Compare the package with the reference at input angles φ, at rate 1 and accelerations α."""
-    findings = Findings(Counter(cases=len(phi)))
+    It counts ``cases``, ``closed``, ``open``, ``at limit``, and as findings ``wrong`` (assembly),
+    ``missed`` and ``false`` (closures), ``refused`` (regular, but reported as a toggle or
+    indeterminate) and ``crashed``.
+    """
+    findings = Judgement(Counter(cases=len(phi)))
     reference = Reference(mechanism)
     truths = [reference.solve(*case) for case in zip(phi, alpha, strict=True)]
     try:
@@ -89,21 +70,26 @@ def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Finding
         for i, truth in enumerate(truths):
             at_limit = truth.outcome is Outcome.SINGULAR or is_at_limit(reference, phi[i])
             closed = truth.outcome is Outcome.CLOSED and not at_limit
-            findings.count(i, 'missed' if closed else 'open', str(error))
+            if closed:
+                findings.find('missed', str(error), i)
+            else:
+                findings.counts['open'] += 1
         return findings
     answers: dict[int, Answer] = {}
     toggles: dict[int, Answer] = {}
     for i, truth in enumerate(truths):
         try:
-            status, answer = _ask(closure, phi[i], alpha[i])
+            status, answer = answer_of(closure, phi[i], alpha[i])
         except Exception as error:  # noqa: BLE001 - any exception is counted
-            findings.count(i, 'crashed', repr(error))
+            findings.find('crashed', repr(error), i)
             continue
         outcome = _compare_status(reference, phi[i], truth, status)
         if outcome == 'closed':
             answers[i] = answer
-        elif outcome:
-            findings.count(i, outcome, f'{status.name}, in truth {truth.outcome.name}')
+        elif outcome in FAULTS:
+            findings.find(outcome, f'{status.name}, in truth {truth.outcome.name}', i)
+        else:
+            findings.counts[outcome] += 1
             if outcome == 'at limit' and status is Status.TOGGLE and truth.joints and answer[0]:
                 toggles[i] = answer
     _measure(findings, reference, truths, phi, alpha, answers, QUANTITIES)
@@ -111,7 +97,8 @@ def judge(mechanism: Mechanism, phi: list[float], alpha: list[float]) -> Finding
     return findings
 
 
-def _ask(closure: Any, phi: float, alpha: float) -> tuple[Status, Answer]:
+def answer_of(closure: Any, phi: float, alpha: float) -> tuple[Status, Answer]:
+    """Return the status of a case and, if it is closed, positions, velocities, accelerations."""
     position = closure.position(phi)
     if position.status is not Status.CLOSED:
         return position.status, (position.joints,)
@@ -121,7 +108,7 @@ def _ask(closure: Any, phi: float, alpha: float) -> tuple[Status, Answer]:
 
 
 def _compare_status(reference: Reference, phi: float, truth: Truth, status: Status) -> str:
-    """Return the outcome of a comparison, a key of `Findings.counts`."""
+    """Return the outcome of a comparison, a key of the counts."""
     if truth.outcome is Outcome.CLOSED and status is Status.CLOSED:
         return 'closed'
     if truth.outcome is Outcome.OPEN and status is Status.OPEN:
@@ -134,7 +121,7 @@ def _compare_status(reference: Reference, phi: float, truth: Truth, status: Stat
 
 
 def _measure(
-    findings: Findings,
+    findings: Judgement,
     reference: Reference,
     truths: list[Truth],
     phi: list[float],
@@ -161,17 +148,15 @@ def _measure(
         if errors[:, 0].max() > _SUSPICIOUS and _is_other_assembly(
             reference, phi[i], alpha[i], answer, off[:, 0].max()
         ):
-            findings.count(i, 'wrong')
+            findings.find('wrong', case=i)
             continue
         named = quantities
         if errors.max() > _BAND and named is QUANTITIES and is_at_limit(reference, phi[i]):
-            findings.count(i, 'at limit')
+            findings.counts['at limit'] += 1
             named = (AT_TOGGLE,)
         findings.counts['closed' if named is QUANTITIES else 'toggles'] += 1
         for k, quantity in enumerate(named):
-            findings.errors.setdefault(quantity, []).extend(
-                (i, j, error) for j, error in enumerate(errors[:, k].tolist())
-            )
+            findings.note_errors(quantity, i, errors[:, k].tolist())
 
 
 def _differences(reference: Reference, truth: Truth, answer: Answer) -> tuple[Array, Array, Array]:
@@ -217,102 +202,3 @@ def _is_other_assembly(
             if errors[:, 0].max() < off / _SUSPICIOUS:
                 return True
     return False
-
-
-OCTAVE = 32
-"""Bins from one power of two to the next: a percentile is right to 2 %."""
-
-_LOWEST, _HIGHEST = -24, 64
-BINS = (_HIGHEST - _LOWEST) * OCTAVE + 2
-"""The first bin has all smaller errors, the last one all larger errors and NaN."""
-
-_KEPT = 3
-
-
-class Worst(NamedTuple):
-    """An error and its place; the worst sorts first."""
-
-    minus_error: float
-    linkage: int
-    case: int
-    joint: int
-
-
-class Note(NamedTuple):
-    """Another fault and its place."""
-
-    linkage: int
-    case: int
-    text: str
-
-
-def bins_of(errors: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    """Return the bin of each error."""
-    with np.errstate(divide='ignore', invalid='ignore'):
-        octaves = np.log2(errors) - _LOWEST
-    places = np.floor(np.nan_to_num(octaves * OCTAVE, nan=BINS, posinf=BINS, neginf=-1.0)) + 1
-    return np.asarray(np.clip(places, 0, BINS - 1), np.int64)
-
-
-def edges() -> npt.NDArray[np.float64]:
-    """Return the upper end of each bin but the last."""
-    return np.asarray(2.0 ** (_LOWEST + np.arange(BINS - 1) / OCTAVE))
-
-
-@dataclass
-class Quantity:
-    """The errors of one quantity in one family."""
-
-    histogram: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS, np.int64))
-    worst: list[Worst] = field(default_factory=list)
-
-    def add(self, linkage: int, errors: list[tuple[int, int, float]]) -> None:
-        self.histogram += np.bincount(
-            bins_of(np.array([error for _, _, error in errors])), minlength=BINS
-        )
-        self._keep([Worst(-error, linkage, case, joint) for case, joint, error in errors])
-
-    def merge(self, other: Quantity) -> None:
-        self.histogram += other.histogram
-        self._keep(other.worst)
-
-    def _keep(self, worst: list[Worst]) -> None:
-        self.worst = sorted([*self.worst, *worst])[:_KEPT]
-
-    def count(self) -> int:
-        return int(self.histogram.sum())
-
-    def greatest(self) -> float:
-        """Return the greatest error, in u·κ."""
-        return -self.worst[0].minus_error if self.worst else 0.0
-
-    def percentile(self, share: float) -> float:
-        """Return the quantile of a share of all errors, to the width of a bin."""
-        place = int(np.searchsorted(np.cumsum(self.histogram), share * self.count()))
-        return min(float(edges()[min(place, BINS - 2)]), self.greatest())
-
-
-@dataclass
-class Tally:
-    """The findings for one family."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-    quantities: dict[str, Quantity] = field(default_factory=dict)
-    notes: list[Note] = field(default_factory=list)
-
-    def add(self, linkage: int, findings: Findings) -> None:
-        """Count the findings of one linkage."""
-        self.counts += findings.counts
-        for quantity, errors in findings.errors.items():
-            self.quantities.setdefault(quantity, Quantity()).add(linkage, errors)
-        self._keep([Note(linkage, case, text) for case, text in findings.notes])
-
-    def merge(self, other: Tally) -> None:
-        """Add the findings of another part of the campaign."""
-        self.counts += other.counts
-        for quantity, errors in other.quantities.items():
-            self.quantities.setdefault(quantity, Quantity()).merge(errors)
-        self._keep(other.notes)
-
-    def _keep(self, notes: list[Note]) -> None:
-        self.notes = sorted([*self.notes, *notes])[:_KEPT]

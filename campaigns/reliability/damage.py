@@ -16,18 +16,18 @@ false, and no loss without a report.
 from __future__ import annotations
 
 import argparse
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from random import Random
 import tempfile
-from typing import NamedTuple
 
 from bench.report import Table
-from campaigns.campaign import Findings, Page, progress_lines, results_of
+from campaigns.campaign import Findings, Page, Part, parts_of, tallies_of
 from campaigns.reliability.judge import FAULT, read
 from campaigns.reliability.recording import JOINT_STATE, KILLED, OURS, START, WRITERS
+from campaigns.tally import Judgement, Tally
 from linkage_ros.bag import (
     BagMessage,
     Message,
@@ -161,75 +161,59 @@ JUDGES: dict[str, Callable[[Subject], str]] = {
 }
 
 
-class Part(NamedTuple):
-    """Some of the damages to one bag."""
+DAMAGES = ('cut', 'flip')
+"""The file is truncated to so many bytes, or one bit is inverted."""
 
-    # The bag, as arguments of `make`.
-    kind: str
-    seed: int
-    size: int
-    damage: str  # 'cut': the file is truncated to so many bytes; 'flip': one bit is inverted
-    places: Sequence[int]  # The sizes, or the numbers of the bits
+Samples = Mapping[str, int | None]
+"""How many damages of a kind are tried for each writer, at random; None for all."""
 
 
-@dataclass
-class Tally:
-    """Number of verdicts by kind, damage and judge, and the first damages that are faults."""
-
-    verdicts: Counter[tuple[str, str, str, str]] = field(default_factory=Counter)
-    faults: list[str] = field(default_factory=list)
-
-    def add(self, other: Tally) -> None:
-        self.verdicts += other.verdicts
-        self.faults += other.faults[: 20 - len(self.faults)]
+def find_places(
+    seed: int, kind: str, damage: str, length: int, sample: int | None
+) -> Sequence[int]:
+    """Return sizes to truncate to, or numbers of bits to invert, in a file of some length."""
+    count = length if damage == 'cut' else 8 * length
+    if sample is None or sample >= count:
+        return range(count)
+    return sorted(Random(f'{seed} {kind} {damage}').sample(range(count), sample))
 
 
-def parts(kinds: Iterable[str], seed: int, size: int, sample: int | None) -> list[Part]:
-    """Return all damages to bags of some kinds; with ``sample`` so many of each at random."""
+def parts(seed: int, size: int, samples: Samples) -> list[Part]:
+    """Return the damages to bags of some kinds, each made with ``size``."""
     work = []
-    for kind in kinds:
+    for kind, sample in samples.items():
         with tempfile.TemporaryDirectory() as folder:
             length = len(make(kind, Path(folder) / 'run', seed, size).content)
-        for damage, count in (('cut', length), ('flip', 8 * length)):
-            places: Sequence[int] = range(count)
-            if sample is not None and sample < count:
-                places = sorted(Random(f'{seed} {kind} {damage}').sample(places, sample))
-            work += [
-                Part(kind, seed, size, damage, places[slice(start, start + _PART)])
-                for start in range(0, len(places), _PART)
-            ]
+        for damage in DAMAGES:
+            count = len(find_places(seed, kind, damage, length, sample))
+            work += parts_of(seed, {kind: count}, _PART, damage)
     return work
 
 
-def run_parts(work: Sequence[Part], jobs: int) -> Iterator[tuple[Part, Tally]]:
-    """Damage and judge; yield each part when it is done."""
-    yield from results_of(_run_part, work, jobs)
-
-
-def _run_part(part: Part) -> tuple[Part, Tally]:
+def judge_part(size: int, samples: Samples, part: Part) -> Iterator[tuple[int, Judgement]]:
     """Make the bag; at each place damage its file, judge, and undo the damage."""
-    tally = Tally()
+    judged, kind = Judgement(), part.family
     with tempfile.TemporaryDirectory() as folder:
-        subject = make(part.kind, Path(folder) / 'run', part.seed, part.size)
+        subject = make(kind, Path(folder) / 'run', part.seed, size)
         content = subject.content
+        places = find_places(part.seed, kind, part.test, len(content), samples[kind])
         with subject.file.open('r+b', buffering=0) as file:
-            for place in part.places:
-                at, bit = divmod(place, 8) if part.damage == 'flip' else (place, 0)
-                if part.damage == 'flip':
+            for place in (places[number] for number in part.numbers):
+                at, bit = divmod(place, 8) if part.test == 'flip' else (place, 0)
+                if part.test == 'flip':
                     file.seek(at)
                     file.write(bytes([content[at] ^ 1 << bit]))
                 else:
                     file.truncate(place)
                 for name, judge in JUDGES.items():
                     verdict = judge(subject)
-                    tally.verdicts[part.kind, part.damage, name, verdict] += 1
-                    if verdict.startswith(FAULT) and len(tally.faults) < 20:
-                        tally.faults.append(
-                            f'{name}, {part.kind}, {part.damage} {place}: {verdict}'
-                        )
+                    if verdict.startswith(FAULT):
+                        judged.find(f'{name}: {verdict}', f'{kind}, {part.test} {place}', place)
+                    else:
+                        judged.counts[f'{name}: {verdict}'] += 1
                 file.seek(at)
-                file.write(content[slice(at, at + 1 if part.damage == 'flip' else None)])
-    return part, tally
+                file.write(content[slice(at, at + 1 if part.test == 'flip' else None)])
+    yield part.first, judged
 
 
 PAGE = Page(
@@ -261,27 +245,26 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Findings:
     """Damage and judge."""
-    work = parts([OURS], options.seed, options.size, options.sample)
+    samples: dict[str, int | None] = {OURS: options.sample}
     if options.others:
-        others = [kind for kind in WRITERS if kind != OURS]
-        work += parts(others, options.seed, options.size, options.others)
-    tally = Tally()
-    total = sum(len(part.places) for part in work)
-    progress = progress_lines(total, 'damages')
-    for part, judged in run_parts(work, options.jobs):
-        tally.add(judged)
-        progress(len(part.places))
-    tables = [_table(tally, kind, damage) for kind in WRITERS for damage in ('cut', 'flip')]
-    tables = [table for table in tables if table.rows]
-    return Findings(tables, tally.faults, [('damages', f'{total:,}')])
+        samples |= {kind: options.others for kind in WRITERS if kind != OURS}
+    work = parts(options.seed, options.size, samples)
+    judge = partial(judge_part, options.size, samples)
+    tallies = tallies_of(judge, work, options.jobs, 'damages')
+    bags = [(kind, damage, tallies[damage][kind]) for kind in samples for damage in DAMAGES]
+    faults = [f'{name}: {note.text}' for *_, tally in bags for name, note in tally.findings()]
+    tables = [_table(f'{kind}: {damage}', tally) for kind, damage, tally in bags]
+    return Findings(tables, faults, [('damages', f'{sum(part.size for part in work):,}')])
 
 
-def _table(tally: Tally, kind: str, damage: str) -> Table:
-    counts: dict[str, Counter[str]] = {}
-    for (of_kind, of_damage, judge, verdict), count in tally.verdicts.items():
-        if (of_kind, of_damage) == (kind, damage):
-            counts.setdefault(verdict, Counter())[judge] += count
-    table = Table(f'{kind}: {damage}', ('verdict', *JUDGES))
+def _table(title: str, tally: Tally) -> Table:
+    counts: dict[str, list[int]] = {}
+    for column, judge in enumerate(JUDGES):
+        for name, count in tally.counts.items():
+            if name.startswith(f'{judge}: '):
+                verdict = name.removeprefix(f'{judge}: ')
+                counts.setdefault(verdict, [0] * len(JUDGES))[column] = count
+    table = Table(title, ('verdict', *JUDGES))
     for verdict in sorted(counts, key=lambda v: (not v.startswith(FAULT), v)):
-        table.rows.append([verdict, *(f'{counts[verdict][judge]:,}' for judge in JUDGES)])
+        table.rows.append([verdict, *(f'{count:,}' for count in counts[verdict])])
     return table

@@ -10,12 +10,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass, field
 from math import tau
 import random
 from typing import Any
 
+from campaigns.tally import Judgement, QUANTITIES
 from campaigns.topologies.constraints import (
     Array,
     condition_numbers,
@@ -30,8 +29,6 @@ from campaigns.topologies.topology import follow, Topology, Walks
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import Closure, GROUND, Status
 import numpy as np
-
-QUANTITIES = ('position', 'velocity', 'acceleration')
 
 STATES = 16
 """Number of states at which each linkage is solved."""
@@ -55,24 +52,6 @@ _STILL = 2.0**-10
 """Least κ of a joint, relative to the greatest κ of the state."""
 
 CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
-
-
-@dataclass
-class Findings:
-    """The findings for a linkage."""
-
-    # Number of states by state, and of findings by name.
-    counts: Counter[str] = field(default_factory=Counter)
-    # (finding, description), the first of each name.
-    notes: list[tuple[str, str]] = field(default_factory=list)
-    # For each quantity the errors in u·κ.
-    errors: dict[str, list[float]] = field(default_factory=dict)
-
-    def find(self, name: str, note: str) -> None:
-        """Count a finding."""
-        if not self.counts[name]:
-            self.notes.append((name, note))
-        self.counts[name] += 1
 
 
 class Truth:
@@ -124,7 +103,7 @@ def judge_states(
     topology: Topology,
     closure: Closure,
     rng: random.Random,
-    findings: Findings,
+    findings: Judgement,
     walks: Walks | None,
 ) -> None:
     """Compare positions, rates, accelerations and statuses at random states."""
@@ -142,7 +121,7 @@ def judge_states(
         _judge_change_point(topology, closure, at, findings)
 
 
-def closure_of(topology: Topology, findings: Findings) -> Closure | None:
+def closure_of(topology: Topology, findings: Judgement) -> Closure | None:
     """Return the closure of a linkage that closes by construction."""
     try:
         return Closure(topology.linkage)
@@ -168,7 +147,7 @@ def _values(topology: Topology, rng: random.Random, number: int) -> list[float]:
 
 
 def _scalar_answers(
-    closure: Closure, inputs: Array, rates: Array, accelerations: Array, findings: Findings
+    closure: Closure, inputs: Array, rates: Array, accelerations: Array, findings: Judgement
 ) -> list[tuple[Any, tuple[tuple[float, ...], ...]] | None]:
     """Return the position and joints with their derivatives; None for an exception."""
     answers: list[tuple[Any, tuple[tuple[float, ...], ...]] | None] = []
@@ -199,7 +178,7 @@ def _compare_arrays(
     accelerations: Array,
     answers: list[Any],
     truth: Truth,
-    findings: Findings,
+    findings: Judgement,
 ) -> None:
     """Compare the solution of arrays with that of single states."""
     from linkage_ros.kinematics import CODES  # local import: with numpy only
@@ -234,7 +213,7 @@ def _compare(
     truth: Truth,
     answers: list[Any],
     motion_of_inputs: tuple[Array, Array],
-    findings: Findings,
+    findings: Judgement,
 ) -> None:
     closed = []
     for k, answer in enumerate(answers):
@@ -287,7 +266,7 @@ def _compare(
             _other_pose(topology, closure, truth, position, inputs[:, [column]], at, findings)
             continue
         for name, error in zip(QUANTITIES, errors, strict=True):
-            findings.errors.setdefault(name, []).append(error)
+            findings.note_errors(name, k, [error])
             if error > LIMIT:
                 findings.find(f'error: {name}', f'{at}: {error:.3g} u·κ')
         if column == 0:
@@ -301,7 +280,7 @@ def _other_pose(
     position: Any,
     inputs: Array,
     at: str,
-    findings: Findings,
+    findings: Judgement,
 ) -> None:
     """Find out whether a wrong pose closes at all."""
     residual = closure.residual(position)
@@ -317,7 +296,7 @@ def _compare_points(
     motion: Motion,
     position: Any,
     at: str,
-    findings: Findings,
+    findings: Judgement,
 ) -> None:
     """Compare the positions of all points."""
     angles = motion.unknowns[0::3, 0]
@@ -339,7 +318,7 @@ def _compare_points(
 
 
 def _judge_change_point(
-    topology: Topology, closure: Closure, value: float, findings: Findings
+    topology: Topology, closure: Closure, value: float, findings: Judgement
 ) -> None:
     """Compare a passed change point with the states close to it on both sides."""
     steps = _BESIDE * np.array([-1, 1, -2, 2], Real)

@@ -14,9 +14,9 @@ from math import inf, remainder, tau
 from typing import NamedTuple
 
 from campaigns.accuracy.dyads import RPR
+from campaigns.tally import Judgement
 from campaigns.topologies.constraints import Array, Real
 from campaigns.topologies.geometry import Geometry, Margin, Passing
-from campaigns.topologies.judge import Findings
 from campaigns.topologies.topology import Topology, Walks
 from linkage_ros.kinematics import Closure, GROUND, SingularInput, Status
 import numpy as np
@@ -42,7 +42,7 @@ class Travel(NamedTuple):
 
 
 def judge_ranges(
-    topology: Topology, closure: Closure, findings: Findings, walks: Walks | None
+    topology: Topology, closure: Closure, findings: Judgement, walks: Walks | None
 ) -> None:
     """Compare the package's ranges and singular values of a single input with its samples."""
     turning = not topology.linkage.inputs[0].slider
@@ -128,7 +128,7 @@ def _judge_singular(
     travel: Travel,
     singular: tuple[SingularInput, ...],
     same: float,
-    findings: Findings,
+    findings: Judgement,
 ) -> None:
     """Compare the listed singular values with the true ones, by their kind."""
     turning = not topology.linkage.inputs[0].slider
@@ -155,7 +155,7 @@ def _judge_singular(
         findings.find('singular: listed, but regular', f'{unmatched[0].value:.9g}')
 
 
-def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: Findings) -> None:
+def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: Judgement) -> None:
     """Compare the range about the pose with the part over which the linkage can be followed."""
     turning = not topology.linkage.inputs[0].slider
     start = topology.start[0]

@@ -10,10 +10,10 @@
 
 from __future__ import annotations
 
-from campaigns.accuracy.adversarial import ADVERSARIAL
-from campaigns.accuracy.judge import AT_TOGGLE, FAULTS, judge, QUANTITIES, Tally
-from campaigns.accuracy.random_families import RANDOM
-from campaigns.accuracy.run import make, parts, run
+from campaigns.accuracy.judge import AT_TOGGLE, FAULTS, judge
+from campaigns.accuracy.run import FAMILIES, judge_part, make, parts
+from campaigns.campaign import tallies_of
+from campaigns.tally import QUANTITIES, Tally
 import pytest
 
 RANDOM_CASES, HARD_CASES = 10_000, 2_000
@@ -64,12 +64,12 @@ They are the worst of the eleven million cases of the formulas and the κ of ver
 
 @pytest.fixture(scope='module')
 def tallies() -> dict[str, Tally]:
-    return run(parts(RANDOM_CASES, HARD_CASES, SEED), jobs=2)
+    return tallies_of(judge_part, parts(RANDOM_CASES, HARD_CASES, SEED), jobs=2)['']
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
+@pytest.mark.parametrize('family', FAMILIES)
 def test_errors_stay_within_their_limits(tallies: dict[str, Tally], family: str) -> None:
     quantities = tallies[family].quantities
     assert {*quantities} - {AT_TOGGLE} == {*QUANTITIES}
@@ -97,7 +97,7 @@ def test_cases_once_above_the_limit_are_within_it(family: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
+@pytest.mark.parametrize('family', FAMILIES)
 def test_campaign_finds_no_wrong_status(tallies: dict[str, Tally], family: str) -> None:
     tally = tallies[family]
     assert not {name: tally.counts[name] for name in FAULTS if tally.counts[name]}, tally.notes
@@ -105,7 +105,7 @@ def test_campaign_finds_no_wrong_status(tallies: dict[str, Tally], family: str) 
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize('family', [*RANDOM, *ADVERSARIAL])
+@pytest.mark.parametrize('family', FAMILIES)
 def test_every_campaign_case_is_counted(tallies: dict[str, Tally], family: str) -> None:
     counts = tallies[family].counts
     assert counts['closed'] > 0.2 * counts['cases']
@@ -114,7 +114,8 @@ def test_every_campaign_case_is_counted(tallies: dict[str, Tally], family: str) 
 
 def test_campaign_result_is_independent_of_the_process_count() -> None:
     work = [part for part in parts(1500, 800, SEED) if part.family in {'RRR', 'wound crank'}]
-    alone, shared = run(work, jobs=1), run(work[::-1], jobs=2)
+    alone = tallies_of(judge_part, work, jobs=1)['']
+    shared = tallies_of(judge_part, work[::-1], jobs=2)['']
     assert alone.keys() == shared.keys()
     for family, tally in alone.items():
         other = shared[family]

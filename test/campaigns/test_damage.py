@@ -10,18 +10,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from functools import partial
 from pathlib import Path
 
+from campaigns.campaign import Tallies, tallies_of
 from campaigns.reliability import damage as judge_module
 from campaigns.reliability.damage import (
+    DAMAGES,
+    judge_part,
     judge_reading,
     judge_salvage,
     JUDGES,
     make,
     parts,
-    run_parts,
-    Tally,
 )
 from campaigns.reliability.judge import FAULT
 from campaigns.reliability.recording import KILLED, OURS, WRITERS
@@ -38,39 +39,34 @@ SIZE = 40_000
 
 
 @pytest.fixture(scope='module')
-def tally() -> Tally:
-    tally = Tally()
-    for _, judged in run_parts(parts([*WRITERS], SEED, SIZE, SAMPLE), jobs=1):
-        tally.add(judged)
-    return tally
+def tallies() -> Tallies:
+    samples = dict.fromkeys(WRITERS, SAMPLE)
+    judge = partial(judge_part, SIZE, samples)
+    return tallies_of(judge, parts(SEED, SIZE, samples), jobs=1)
 
 
-def test_damage_is_reported_or_harmless(tally: Tally) -> None:
-    assert tally.faults == []
-    assert sum(tally.verdicts.values()) == len(WRITERS) * 2 * SAMPLE * len(JUDGES)
+def test_damage_is_reported_or_harmless(tallies: Tallies) -> None:
+    for damage in DAMAGES:
+        for tally in tallies[damage].values():
+            assert tally.findings() == []
+            verdicts = [tally.counts[name] for name in tally.counts if ': ' in name]
+            assert sum(verdicts) == SAMPLE * len(JUDGES)
 
 
 @pytest.mark.sample(0)
-def test_damage_sample_contains_every_usual_verdict(tally: Tally) -> None:
-    ours = Counter[tuple[str, str, str]]()
-    for (kind, *rest), count in tally.verdicts.items():
-        if kind == OURS:
-            ours[tuple(rest)] += count
-    assert ours['cut', 'read', 'refused'] == SAMPLE
-    assert ours['cut', 'read, truncated allowed', 'a part, damage reported'] > SAMPLE / 2
-    assert ours['flip', 'read', 'a part, damage reported'] > SAMPLE / 4
-    assert ours['flip', 'recover', 'a part, damage reported'] > SAMPLE / 4
-    assert ours['flip', 'recover', 'all, nothing reported'] > SAMPLE / 50
+def test_damage_sample_contains_every_usual_verdict(tallies: Tallies) -> None:
+    cut, flip = (tallies[damage][OURS].counts for damage in DAMAGES)
+    assert cut['read: refused'] == SAMPLE
+    assert cut['read, truncated allowed: a part, damage reported'] > SAMPLE / 2
+    assert flip['read: a part, damage reported'] > SAMPLE / 4
+    assert flip['recover: a part, damage reported'] > SAMPLE / 4
+    assert flip['recover: all, nothing reported'] > SAMPLE / 50
 
 
-def test_single_bit_never_loses_all_of_a_killed_bag(tally: Tally) -> None:
-    verdicts = {
-        verdict: count
-        for (kind, damage, judge, verdict), count in tally.verdicts.items()
-        if (kind, damage, judge) == (KILLED, 'flip', 'recover')
-    }
-    assert sum(verdicts.values()) == SAMPLE
-    assert 'none, damage reported' not in verdicts
+def test_single_bit_never_loses_all_of_a_killed_bag(tallies: Tallies) -> None:
+    counts = tallies['flip'][KILLED].counts
+    assert sum(counts[name] for name in counts if name.startswith('recover: ')) == SAMPLE
+    assert 'recover: none, damage reported' not in counts
 
 
 FALSE = {

@@ -15,19 +15,20 @@ from dataclasses import replace
 import random
 from typing import Any
 
+from campaigns.campaign import Tallies, tallies_of
+from campaigns.tally import Judgement, QUANTITIES, Tally
 from campaigns.topologies.constraints import Equations, Real
 from campaigns.topologies.families import FAMILIES
-from campaigns.topologies.judge import closure_of, Findings, judge_states, QUANTITIES
+from campaigns.topologies.judge import closure_of, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges
 from campaigns.topologies.run import (
     CHECK,
     CHECK_ALTERED,
     FILE,
+    judge_part,
     KINEMATICS,
     make,
     parts,
-    run,
-    Tally,
 )
 from campaigns.topologies.topology import start_of, Topology
 from linkage_ros.kinematics import Closure, InputRange, SingularInput, Status
@@ -43,16 +44,15 @@ WANTED = {KINEMATICS: 1, CHECK: 8, CHECK_ALTERED: 8, FILE: 2}
 
 
 @pytest.fixture(scope='module')
-def tallies() -> dict[str, dict[str, Tally]]:
-    return run(parts(SEED, WANTED), jobs=2)
+def tallies() -> Tallies:
+    return tallies_of(judge_part, parts(SEED, WANTED), jobs=2)
 
 
 def notes_of(tally: Tally, family: str, test: str) -> str:
     return '\n'.join(
-        f'{note.finding}: {note.text}; see python -m campaigns topologies --seed {SEED} '
+        f'{name}: {note.text}; see python -m campaigns topologies --seed {SEED} '
         f'--test "{test}" --show "{family}" {note.linkage}'
-        for notes in tally.notes.values()
-        for note in notes
+        for name, note in tally.findings()
     )
 
 
@@ -60,22 +60,18 @@ def notes_of(tally: Tally, family: str, test: str) -> str:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('family', FAMILIES)
-def test_random_topologies_have_no_findings(
-    tallies: dict[str, dict[str, Tally]], family: str
-) -> None:
+def test_random_topologies_have_no_findings(tallies: Tallies, family: str) -> None:
     tally = tallies[KINEMATICS][family]
     assert not tally.notes, notes_of(tally, family, KINEMATICS)
     assert tally.counts['states closed'] > 0.1 * 16 * tally.counts['linkages']
-    assert {*tally.errors} == {*QUANTITIES}
+    assert {*tally.quantities} == {*QUANTITIES}
 
 
 @pytest.mark.sample(0)
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize('test', [CHECK, CHECK_ALTERED, FILE])
-def test_commands_succeed_or_refuse_in_one_line(
-    tallies: dict[str, dict[str, Tally]], test: str
-) -> None:
+def test_commands_succeed_or_refuse_in_one_line(tallies: Tallies, test: str) -> None:
     notes = [notes_of(tally, family, test) for family, tally in tallies[test].items()]
     assert not any(notes), '\n'.join(filter(None, notes))
     assert sum(tally.counts['linkages'] for tally in tallies[test].values()) == WANTED[test]
@@ -84,7 +80,8 @@ def test_commands_succeed_or_refuse_in_one_line(
 @pytest.mark.parametrize('family', [name for name in FAMILIES if name.startswith('class III')])
 def test_random_platforms_have_no_findings(family: str) -> None:
     """Platforms on rails fix angles up to whole turns, which no dyad does."""
-    tally = run(parts(SEED, {KINEMATICS: 2}, [family]), jobs=1)[KINEMATICS][family]
+    work = parts(SEED, {KINEMATICS: 2}, [family])
+    tally = tallies_of(judge_part, work, jobs=1)[KINEMATICS][family]
     assert not tally.notes, notes_of(tally, family, KINEMATICS)
 
 
@@ -94,20 +91,23 @@ def test_topology_result_is_independent_of_the_process_count() -> None:
         {KINEMATICS: sample_count(6, 2), CHECK: sample_count(4, 1)},
         ['RRR moving–ground', 'RPR input–ground'],
     )
-    alone, shared = run(work, jobs=1), run(work[::-1], jobs=2)
+    alone, shared = (tallies_of(judge_part, *how) for how in ((work, 1), (work[::-1], 2)))
     for test, families in alone.items():
         for family, tally in families.items():
             other = shared[test][family]
             assert (tally.counts, tally.notes) == (other.counts, other.notes)
-            assert tally.worst == other.worst
+            assert all(
+                errors.worst == other.quantities[name].worst
+                for name, errors in tally.quantities.items()
+            )
 
 
 def topology_of(family: str, accepted: Callable[[Topology], bool] = lambda _: True) -> Topology:
     return next(made for i in range(100) if accepted(made := make(SEED, family, i)[0]))
 
 
-def judged(topology: Topology, linkage: Any = None, closure: Any = None) -> Findings:
-    findings = Findings()
+def judged(topology: Topology, linkage: Any = None, closure: Any = None) -> Judgement:
+    findings = Judgement()
     solved = closure or Closure(linkage or topology.linkage)
     judge_states(topology, solved, random.Random(1), findings, None)
     return findings
@@ -127,7 +127,7 @@ def test_judge_detects_a_slightly_changed_linkage() -> None:
     point, (x, y) = list(links[link].items())[-1]
     links[link][point] = (x * (1.0 + 1e-12), y * (1.0 + 1e-12))
     errors = judged(topology, replace(topology.linkage, links=links)).errors
-    assert max(errors['position']) > 100.0
+    assert max(error for *_, error in errors['position']) > 100.0
 
 
 class Wrong:
@@ -142,7 +142,7 @@ class Wrong:
 
 
 def has_limits(topology: Topology) -> bool:
-    closure = closure_of(topology, Findings())
+    closure = closure_of(topology, Judgement())
     turning = not topology.linkage.inputs[0].slider
     return closure is not None and turning and not closure.input_ranges[0].is_whole
 
@@ -160,10 +160,10 @@ def test_judge_detects_wrong_ranges_and_singular_inputs() -> None:
         ({'singular_inputs': (*closure.singular_inputs, other)}, 'singular: listed, but regular'),
         ({'singular_inputs': passed}, 'singular: toggle has another status'),
     ):
-        findings = Findings()
+        findings = Judgement()
         judge_ranges(topology, Wrong(closure, **wrong), findings, None)  # type: ignore[arg-type]
         assert findings.counts[finding], findings.counts
-    findings = Findings()
+    findings = Judgement()
     judge_ranges(topology, closure, findings, None)
     assert not findings.notes
 

@@ -10,10 +10,10 @@
 from math import hypot
 from random import Random
 
-from campaigns.accuracy.judge import QUANTITIES
 from campaigns.series import Tape
 from campaigns.space import draw_case, FAMILIES, LIMIT, SLOWER
 from campaigns.space_reference import errors_of
+from campaigns.tally import QUANTITIES
 from linkage_ros.kinematics import Status
 from linkage_ros.kinematics.space.joints import HingePair, SlidePair
 from linkage_ros.kinematics.space.steps import (
